@@ -1,0 +1,222 @@
+"""A camera: elements along an axis and a sensor, checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.light_field import LightField
+from vcc.optics.faces import Element
+from vcc.sensor import Sensor
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from vcc.engines import EngineName
+    from vcc.image import Image
+    from vcc.plan.explain import Explanation
+    from vcc.plan.model import Plan
+
+
+@dataclass(frozen=True, init=False)
+class Camera:
+    """Thin elements along an axis and a sensor behind them.
+
+    A light field given to the camera is taken to lie at the entrance plane, z = 0.
+
+    Args:
+        elements: in any order; kept sorted by z. Elements at the same z commute.
+        sensor: where the picture is recorded.
+
+    Raises:
+        InputError: an element before the entrance plane or behind the sensor, two elements of one name.
+    """
+
+    elements: tuple[Element, ...]
+    sensor: Sensor
+
+    def __init__(self, elements: Iterable[Element], sensor: Sensor) -> None:
+        listed = tuple(elements)
+        for element in listed:
+            if not isinstance(element, Element):
+                raise InputError(f"a camera's elements are vcc.Element objects, not {type(element).__name__}")
+            if element.z < 0:
+                raise InputError(
+                    f"{element.label} stands before the entrance plane z = 0, where the light field is given: "
+                    "move the whole camera towards +z"
+                )
+            if element.z > sensor.z:
+                raise InputError(
+                    f"{element.label} (z = {element.z * 1e3:g} mm) stands behind the sensor "
+                    f"(z = {sensor.z * 1e3:g} mm): light never reaches it"
+                )
+        if sensor.z < 0:
+            raise InputError(f"the sensor stands before the entrance plane: z = {sensor.z * 1e3:g} mm")
+        names = [element.name for element in listed if element.name]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f'{names.count(name)} elements are named "{name}": names must differ')
+        object.__setattr__(self, "elements", tuple(sorted(listed, key=lambda element: element.z)))
+        object.__setattr__(self, "sensor", sensor)
+
+    def rays_at(self, z: float, *, before: bool = False) -> Affine:
+        """The map of rays from the entrance plane to the plane at z, all linear optics on the way folded.
+
+        Args:
+            z: place on the axis, metres, 0 or more.
+            before: whether to stop before the elements that stand exactly at z, rather than behind them.
+
+        Raises:
+            InputError: z is before the entrance plane.
+        """
+        if z < 0:
+            raise InputError(f"z = {z * 1e3:g} mm lies before the entrance plane of the camera")
+        ray, here = Affine.identity(), 0.0
+        for element in self.elements:
+            if element.z > z or (before and element.z == z):
+                break
+            deflection = element.faces().deflection
+            if deflection is None:
+                continue
+            x, y = element.decentre
+            centred = Affine.translation(x, y, 0, 0) @ deflection @ Affine.translation(-x, -y, 0, 0)
+            ray = centred @ Affine.propagation(element.z - here) @ ray
+            here = element.z
+        return Affine.propagation(z - here) @ ray
+
+    def compile(
+        self,
+        light_field: LightField,
+        *,
+        interpolation: str = "linear",
+        between_views: str = "auto",
+        scene_distance: float | None = None,
+        refine: int | str = "auto",
+    ) -> Plan:
+        """The plan by which an engine makes the picture; `capture` does this for you.
+
+        Args: see `capture`.
+        """
+        from vcc.plan.compiler import compile_plan
+
+        return compile_plan(
+            self,
+            light_field,
+            interpolation=interpolation,
+            between_views=between_views,
+            scene_distance=scene_distance,
+            refine=refine,
+        )
+
+    def capture(
+        self,
+        light_field: LightField,
+        *,
+        interpolation: str = "linear",
+        between_views: str = "auto",
+        scene_distance: float | None = None,
+        refine: int | str = "auto",
+        engine: EngineName | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Image:
+        """The picture that the sensor records of a light field.
+
+        Args:
+            light_field: given at the entrance plane z = 0.
+            interpolation: within a view: ``"nearest"`` (the paper's, for comparison), ``"linear"`` or
+                ``"cubic"`` (Catmull-Rom: sharper, may undershoot at hard edges).
+            between_views: ``"auto"`` interpolates between views along the scene's parallax where
+                neighbouring views differ by more than about a pixel on the sensor; ``"none"`` never does.
+            scene_distance: the distance in metres of the scene before the entrance plane, by which that
+                interpolation goes; None takes the range of distances that the light field states or shows.
+            refine: ``"auto"`` divides cells and samples where a mask is finer than they are, at a cost that
+                `explain` states; a number divides samples by it each way, and 1 divides nothing.
+            engine: ``"numba"`` (default for NumPy arrays), ``"array_api"`` (default for PyTorch, JAX and
+                other arrays: carries gradients) or ``"reference"`` (slow; defines what is correct).
+            progress: called with (done, total) as the work advances.
+
+        Returns:
+            Irradiance on the sensor, radiance × steradian (paper, eq. 5), as light lands on it (inverted).
+
+        Warns:
+            ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field.
+
+        Raises:
+            InputError: an option that does not exist.
+        """
+        import warnings
+
+        from vcc.engines import run_plan
+        from vcc.errors import ResultWarning
+        from vcc.image import Image
+
+        plan = self.compile(
+            light_field,
+            interpolation=interpolation,
+            between_views=between_views,
+            scene_distance=scene_distance,
+            refine=refine,
+        )
+        values = run_plan(plan, light_field.values, engine=engine, progress=progress)
+        if plan.missing_rays > 0.01:
+            warnings.warn(
+                f"{plan.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
+                f"({plan.missing_reason}); the picture is darker there",
+                ResultWarning,
+                stacklevel=2,
+            )
+        return Image(values, self.sensor.frame, missing_rays=plan.missing_rays)
+
+    def explain(self, light_field: LightField, **options: Any) -> Explanation:
+        """The plan for a light field in words: what was folded, pulled to the sensor, chosen, and its cost.
+
+        Args:
+            light_field: given at the entrance plane.
+            options: as in `capture`.
+        """
+        from vcc.plan.explain import explain
+
+        return explain(self, light_field, **options)
+
+    def light_field_at(
+        self, light_field: LightField, z: float, *, before: bool = False, memory_limit: int | None = None
+    ) -> LightField:
+        """The light field at a plane inside the camera: all linear optics folded, all masks on the way applied.
+
+        Args:
+            light_field: given at the entrance plane.
+            z: the plane, metres behind the entrance plane.
+            before: whether to stop before the elements that stand exactly at z.
+            memory_limit: bytes that new samples may take; None takes `vcc.operators.MEMORY_LIMIT`.
+                Without a mask on the way nothing is allocated.
+
+        Raises:
+            InputError: z outside the camera, or more memory needed than allowed.
+        """
+        from vcc.operators import masked_at
+
+        if z > self.sensor.z:
+            raise InputError(f"z = {z * 1e3:g} mm lies behind the sensor at {self.sensor.z * 1e3:g} mm")
+        planes = []
+        for element in self.elements:
+            if element.z > z or (before and element.z == z):
+                break
+            pattern = element.faces().pattern
+            if pattern is not None:
+                planes.append((pattern, element.decentre, self.rays_at(element.z, before=True)))
+        return masked_at(light_field, planes, memory_limit).transformed(self.rays_at(z, before=before))
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the axis, the elements, the sensor and fans of rays. See `vcc.plot.plot_camera`."""
+        from vcc.plot import plot_camera
+
+        return plot_camera(self, **options)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.camera_file`."""
+        from vcc.camera_file import save_camera
+
+        save_camera(self, path)

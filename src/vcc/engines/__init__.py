@@ -1,0 +1,70 @@
+"""Engines run a plan on the samples of a light field; they know nothing of optics.
+
+All of them compute the same sum (`vcc.plan.model`). ``reference`` is the plain one that defines what is
+correct, ``array_api`` works on arrays of PyTorch, JAX and others and carries gradients, ``numba`` is fast on
+NumPy arrays. An engine is an argument or follows from the arrays' type; there is no global setting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from vcc.errors import InputError
+from vcc.plan.model import Plan
+
+EngineName = Literal["reference", "array_api", "numba"]
+Progress = Callable[[int, int], None]
+
+
+def run_plan(
+    plan: Plan, values: Any, *, engine: EngineName | None = None, progress: Progress | None = None
+) -> Any:
+    """The picture that a plan makes of a light field's samples.
+
+    Args:
+        plan: from `vcc.Camera.compile`.
+        values: samples (v, u, t, s[, channels]), of the light field that the plan was made for or of
+            another with the same shape and frame.
+        engine: see `vcc.Camera.capture`; None lets the type of ``values`` decide.
+        progress: called with (done, total).
+
+    Returns:
+        Irradiance (rows, columns[, channels]), float32; an array of the library of ``values`` with the
+        ``array_api`` engine, else of NumPy.
+
+    Raises:
+        InputError: an unknown engine, or one that does not take arrays of this type.
+    """
+    chosen = engine or ("numba" if isinstance(values, np.ndarray) else "array_api")
+    if chosen not in get_args(EngineName):
+        raise InputError(f"there is no engine {chosen!r}: choose one of {', '.join(get_args(EngineName))}")
+    if chosen != "array_api" and not isinstance(values, np.ndarray):
+        raise InputError(
+            f"engine {chosen!r} takes NumPy arrays, not {type(values).__module__}.{type(values).__name__}: "
+            "use engine='array_api'"
+        )
+    if plan.swap_pixel_axes:
+        values = _pixel_axes_swapped(values)
+    if chosen == "reference":
+        from vcc.engines import reference
+
+        return reference.run(plan, values, progress)
+    if chosen == "array_api":
+        from vcc.engines import array_api
+
+        return array_api.run(plan, values, progress)
+    from vcc.engines import numba_cpu
+
+    return numba_cpu.run(plan, values, progress)
+
+
+def _pixel_axes_swapped(values: Any) -> Any:
+    if isinstance(values, np.ndarray):
+        return values.swapaxes(2, 3)
+    from array_api_compat import array_namespace
+
+    order = (0, 1, 3, 2, *range(4, values.ndim))
+    return array_namespace(values).permute_dims(values, order)

@@ -1,0 +1,85 @@
+"""The reference engine: the sum of the plan written out plainly, in float64. It defines what is correct.
+
+    I(x, y) = scale · Σ_q L(q) · w(view) · Π T(m(q)) · F(x; x(q)) · F(y; y(q))
+
+The one subtlety: where the frame shears the pixel grid, a sample's column on the sensor is taken at the row
+that is looked at, x(q) + shear · (y − y(q)), so that the shares still sum to one both ways.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.engines.smear import finish
+from vcc.plan.footprint import refinement_matrix, shares
+from vcc.plan.model import MaskLookup, Plan
+
+Array = NDArray[np.float64]
+
+
+def run(plan: Plan, values: NDArray[Any], progress: Callable[[int, int], None] | None = None) -> NDArray[Any]:
+    """The picture of samples (v, u, t, s[, channels]) by a plan, float32; see `vcc.engines.run_plan`."""
+    channels = values.shape[4:] or (1,)
+    rows, columns = plan.raster_shape
+    raster = np.zeros((rows, columns, *channels))
+    total = plan.weights.size
+    for done, (b, a) in enumerate(np.ndindex(plan.weights.shape)):
+        if progress is not None:
+            progress(done, total)
+        if plan.weights[b, a] == 0:
+            continue
+        view = values[plan.view_rows[b], plan.view_columns[a]].astype(np.float64)
+        flux, k, l = _samples_of(plan, view.reshape(*view.shape[:2], *channels))  # noqa: E741
+        flux = flux * plan.weights[b, a]
+        for mask in plan.masks:
+            flux = flux * _mask_weights(mask, b, a, k, l)[..., None]
+        _spread(plan, raster, flux, b, a, k, l)
+    if progress is not None:
+        progress(total, total)
+    picture = finish(plan, raster * plan.scale)
+    return picture if values.ndim == 5 else picture[..., 0]
+
+
+def _samples_of(plan: Plan, view: Array) -> tuple[Array, Array, Array]:
+    """The samples of a view, divided where the plan says so, with their column and row indices k, l."""
+    if plan.refine == 1:
+        return view, np.arange(view.shape[1], dtype=float), np.arange(view.shape[0], dtype=float)
+    down, first_l = refinement_matrix(plan.interpolation, view.shape[0], plan.refine)
+    across, first_k = refinement_matrix(plan.interpolation, view.shape[1], plan.refine)
+    fine = np.einsum("al,bk,lkc->abc", down, across, view, optimize=True)
+    k = first_k + np.arange(fine.shape[1]) / plan.refine
+    l = first_l + np.arange(fine.shape[0]) / plan.refine  # noqa: E741
+    return fine, k, l
+
+
+def _mask_weights(mask: MaskLookup, b: int, a: int, k: Array, l: Array) -> Array:  # noqa: E741
+    """T at each sample (l, k): linear interpolation in the texture, zero outside."""
+    column = mask.column[b, a] + mask.step[0, 0] * k[None, :] + mask.step[0, 1] * l[:, None]
+    row = mask.row[b, a] + mask.step[1, 0] * k[None, :] + mask.step[1, 1] * l[:, None]
+    rows, columns = mask.texture.shape
+    padded = np.pad(mask.texture.astype(np.float64), 1)
+    column, row = np.clip(column + 1, 0, columns), np.clip(row + 1, 0, rows)
+    c, r = np.floor(column).astype(int), np.floor(row).astype(int)
+    fc, fr = column - c, row - r
+    above = padded[r, c] * (1 - fc) + padded[r, c + 1] * fc
+    below = padded[r + 1, c] * (1 - fc) + padded[r + 1, c + 1] * fc
+    return np.asarray(above * (1 - fr) + below * fr)
+
+
+def _spread(plan: Plan, raster: Array, flux: Array, b: int, a: int, k: Array, l: Array) -> None:  # noqa: E741
+    """Add each sample's light to the pixels under its footprint."""
+    rows, columns = plan.raster_shape
+    fine = plan.refine
+    pixel = np.arange(columns, dtype=float)
+    y = plan.y[b, a] + plan.step[1, 0] * k[None, :] + plan.step[1, 1] * l[:, None]
+    for row in range(rows):
+        share_y = shares(plan.interpolation, float(row), y, plan.row_step / fine)
+        if not share_y.any():
+            continue
+        line = (share_y[..., None] * flux).sum(axis=0)
+        x = plan.x[b, a] + plan.shear * (row - plan.y[b, a]) + plan.column_step * k
+        raster[row] += shares(plan.interpolation, pixel[:, None], x[None, :], plan.column_step / fine) @ line

@@ -1,0 +1,47 @@
+"""The last step of every engine: closing the gaps between views, and what lies against the sensor."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.plan.model import Plan
+
+
+def tent(half_width: float) -> NDArray[np.float64]:
+    """A tent of this half width in pixels, averaged over each pixel: an odd number of weights of sum 1."""
+    if half_width == 0:
+        return np.ones(1)
+    reach = math.ceil(half_width + 0.5)
+    edges = np.clip((np.arange(-reach, reach + 2) - 0.5) / half_width, -1, 1)
+    return np.diff(edges - np.sign(edges) * edges**2 / 2)
+
+
+def tent_matrix(half_width: float, pixels: int, guard: int) -> NDArray[np.float64]:
+    """The tent as a matrix from raster to sensor pixels along one axis, guard cut off."""
+    weights = tent(half_width)
+    reach = len(weights) // 2
+    matrix = np.zeros((pixels, pixels + 2 * guard))
+    for shift, weight in zip(range(-reach, reach + 1), weights, strict=True):
+        here = np.arange(pixels)
+        there = here + guard + shift
+        inside = (there >= 0) & (there < pixels + 2 * guard)
+        matrix[here[inside], there[inside]] += weight
+    return matrix
+
+
+def finish(plan: Plan, raster: NDArray[Any]) -> NDArray[np.float32]:
+    """The picture from the raster (rows, columns, channels) of NumPy numbers."""
+    if any(plan.smear):
+        from scipy.ndimage import convolve1d
+
+        raster = convolve1d(raster, tent(plan.smear[0]), axis=0, mode="constant")
+        raster = convolve1d(raster, tent(plan.smear[1]), axis=1, mode="constant")
+    if plan.guard:
+        raster = raster[plan.guard : -plan.guard, plan.guard : -plan.guard]
+    if plan.sensor_transmission is not None:
+        raster = raster * plan.sensor_transmission[..., None]
+    return np.asarray(raster, dtype=np.float32)

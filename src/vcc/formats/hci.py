@@ -1,0 +1,141 @@
+"""The 4D light-field benchmark of HCI (Honauer et al. 2016): ``input_CamNNN.png`` and ``parameters.cfg``."""
+
+from __future__ import annotations
+
+import configparser
+import math
+import re
+from pathlib import Path
+
+from vcc.errors import InputError
+from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
+from vcc.units import mm
+
+PARAMETERS = "parameters.cfg"
+
+_NAME = re.compile(r"input_Cam(\d+)", re.IGNORECASE)
+
+
+def find(folder: Path) -> ViewGrid | None:
+    """The grid of the folder's ``input_CamNNN`` pictures, NNN = row × columns + column; None without any.
+
+    ``parameters.cfg`` states the grid and the cameras. Without it the grid must be square.
+
+    Raises:
+        InputError: a ``parameters.cfg`` that cannot be understood, a number of views that is no square
+            (without one), or a grid that `vcc.formats.grid.arrange` refuses.
+    """
+    numbered = {
+        file: int(match[1]) for file in pictures_in(folder) if (match := _NAME.fullmatch(file.stem))
+    }
+    if not numbered:
+        return None
+    stated = read_grid_shape(folder)
+    rows, columns = stated or _square(list(numbered.values()), folder)
+    places = [Place(number // columns, number % columns, file) for file, number in numbered.items()]
+    files = arrange(places, folder, (range(rows), range(columns)))
+    return ViewGrid("HCI 4D light-field benchmark", files, read_geometry(folder) or Geometry())
+
+
+def read_grid_shape(folder: Path) -> tuple[int, int] | None:
+    """(rows, columns) of views that ``parameters.cfg`` states; None without that file.
+
+    Raises:
+        InputError: the file cannot be understood.
+    """
+    settings = _settings(folder)
+    if settings is None:
+        return None
+    rows, columns = (_number(settings, "extrinsics", f"num_cams_{axis}", folder) for axis in "yx")
+    if rows < 1 or columns < 1 or rows % 1 or columns % 1:
+        raise InputError(f"{folder / PARAMETERS} states a grid of {rows:g}×{columns:g} cameras")
+    return int(rows), int(columns)
+
+
+def read_geometry(folder: Path) -> Geometry | None:
+    """The cameras of ``parameters.cfg``; None without that file.
+
+    spacing = baseline_mm, slope per pixel = sensor_size_mm / focal_length_mm / max(W, H), and
+    focus_distance_m of 0 stands for parallel cameras. Disparity, pixels per view, is then
+    b·f_px·(1/Z − 1/F), positive = nearer than the focus distance.
+
+    Raises:
+        InputError: the file cannot be understood.
+    """
+    settings = _settings(folder)
+    if settings is None:
+        return None
+
+    def positive(section: str, key: str) -> float:
+        value = _number(settings, section, key, folder)
+        if not value > 0:
+            raise InputError(f"{folder / PARAMETERS}: {key} is {value:g}, and must be greater than 0")
+        return value
+
+    width = positive("intrinsics", "image_resolution_x_px")
+    height = positive("intrinsics", "image_resolution_y_px")
+    baseline = positive("extrinsics", "baseline_mm") * mm
+    sensor = positive("intrinsics", "sensor_size_mm") * mm
+    focal_length = positive("intrinsics", "focal_length_mm") * mm
+    focus = _number(settings, "extrinsics", "focus_distance_m", folder)
+    if focus < 0:
+        raise InputError(f"{folder / PARAMETERS}: focus_distance_m is {focus:g}, and must be 0 or more")
+    low = _number(settings, "meta", "disp_min", folder, needed=False)
+    high = _number(settings, "meta", "disp_max", folder, needed=False)
+    return Geometry(
+        spacing=(baseline, baseline),
+        slope_per_pixel=sensor / focal_length / max(width, height),
+        focus_distance=focus if focus > 0 else math.inf,
+        disparity_range=(low, high) if low <= high else None,  # NaN where not stated
+        picture_shape=(int(height), int(width)),
+    )
+
+
+def _settings(folder: Path) -> configparser.ConfigParser | None:
+    path = folder / PARAMETERS
+    if not path.is_file():
+        return None
+    settings = configparser.ConfigParser(interpolation=None, strict=False)
+    try:
+        settings.read_string(path.read_text(encoding="utf-8"))
+    except (configparser.Error, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{path} cannot be read as an HCI camera file: {' '.join(str(error).split())}"
+        ) from None
+    return settings
+
+
+def _number(
+    settings: configparser.ConfigParser | None,
+    section: str,
+    key: str,
+    folder: Path,
+    *,
+    needed: bool = True,
+) -> float:
+    """A number of the file; NaN for one that is not there and not needed."""
+    text = settings.get(section, key, fallback=None) if settings is not None else None
+    if text is None:
+        if not needed:
+            return math.nan
+        raise InputError(f"{folder / PARAMETERS} does not state {key} in its section [{section}]. Add it")
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f'{folder / PARAMETERS}: {key} is "{text}", not a number')
+    return value
+
+
+def _square(numbers: list[int], folder: Path) -> tuple[int, int]:
+    """The side of the square grid that holds these views, from their count or their last number."""
+    side = math.isqrt(len(numbers))
+    if side * side != len(numbers):
+        side = math.isqrt(max(numbers) + 1)
+        if side * side != max(numbers) + 1:
+            raise InputError(
+                f"{folder} holds {len(numbers)} views input_CamNNN, which is not a square grid, and no "
+                f"{PARAMETERS} that states num_cams_x and num_cams_y. Add that file or a views.csv"
+            )
+    return side, side

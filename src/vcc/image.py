@@ -1,0 +1,94 @@
+"""The picture that a sensor records: irradiance on a grid, and the frame that places it on the sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.sampled import IMAGE_AXES, Index, sliced
+
+if TYPE_CHECKING:
+    from os import PathLike
+    from typing import Any
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Image:
+    """Mean irradiance over each pixel, as light lands on the sensor.
+
+    Args:
+        values: irradiance, shape (rows, columns) or (rows, columns, channels), radiance × steradian. For a
+            captured picture, an array of the library that the light field came in (NumPy: float32).
+        frame: maps (column, row, 1) to (x, y, 1) on the sensor, metres; x points right, y down, as seen by
+            someone looking at the scene.
+        missing_rays: the share of the rays that the camera asked for and the light field did not hold,
+            0 to 1.
+        inverted: whether this is a real, upside-down image (what a camera records), which `upright` turns.
+    """
+
+    values: Any
+    frame: Affine
+    missing_rays: float = 0.0
+    inverted: bool = True
+
+    def __post_init__(self) -> None:
+        if len(self.values.shape) not in (2, 3):
+            raise InputError(
+                f"an image has the axes (rows, columns[, channels]), not shape {tuple(self.values.shape)}"
+            )
+        if self.frame.dimensions != 2:
+            raise InputError("an image needs a 3×3 frame, from (column, row, 1) to (x, y, 1)")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the values: (rows, columns) or (rows, columns, channels)."""
+        return tuple(self.values.shape)
+
+    @property
+    def pixel_area(self) -> float:
+        """The area of a pixel, m²."""
+        return abs(self.frame.determinant)
+
+    def __getitem__(self, index: Index | tuple[Index, ...]) -> Image:
+        """A piece of the picture, in its place: slices along (rows, columns[, channel])."""
+        values, frame, _ = sliced(self.values, self.frame, index, IMAGE_AXES, "an image")
+        return replace(self, values=values, frame=frame)
+
+    def upright(self) -> Image:
+        """The picture as a person wants to see it: turned by 180° if it is inverted, else unchanged."""
+        if not self.inverted:
+            return self
+        rows, columns = self.shape[:2]
+        turned = self.frame @ Affine(np.array([[-1.0, 0, columns - 1], [0, -1.0, rows - 1], [0, 0, 1]]))
+        values = self.values
+        if isinstance(values, np.ndarray):
+            values = values[::-1, ::-1]
+        else:
+            from array_api_compat import array_namespace
+
+            values = array_namespace(values).flip(values, axis=(0, 1))
+        return replace(self, values=values, frame=turned, inverted=False)
+
+    def to_numpy(self) -> NDArray[np.float32]:
+        """The values as a float32 NumPy array, wherever they are."""
+        from vcc.sampled import to_numpy
+
+        return to_numpy(self.values).astype(np.float32, copy=False)
+
+    def save(self, path: str | PathLike[str], **options: Any) -> Any:
+        """Write the picture; the ending of ``path`` chooses the format. See `vcc.formats.pictures.save_image`."""
+        from vcc.formats.pictures import save_image
+
+        return save_image(self, path, **options)
+
+    def __repr__(self) -> str:
+        from vcc.units import text
+
+        pitch = text(float(f"{self.pixel_area**0.5:.6g}"))
+        missing = f", {self.missing_rays:.1%} of the rays missing" if self.missing_rays > 0 else ""
+        return f"Image({'×'.join(map(str, self.shape))}, pixel {pitch}{missing})"

@@ -1,0 +1,324 @@
+"""The 4-D light field: radiance along rays, sampled on a grid that an affine frame places in space."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.sampled import LIGHT_FIELD_AXES, Index, sliced, to_numpy
+
+if TYPE_CHECKING:
+    from vcc.image import Image
+
+
+class DisparityRange:
+    """The disparities that a light field shows, measured when first asked for and then kept.
+
+    Shared by a light field and all pieces of it, so that each piece is treated like the whole.
+    """
+
+    def __init__(self, measure: Callable[[], tuple[float, float] | None]) -> None:
+        self._measure = measure
+        self._known = False
+        self._value: tuple[float, float] | None = None
+
+    def get(self) -> tuple[float, float] | None:
+        """(lowest, highest) in pixels per view, or None where the pictures show no parallax to measure."""
+        if not self._known:
+            self._value = self._measure()
+            self._known = True
+        return self._value
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LightField:
+    """Radiance samples and the frame that says which ray each of them is.
+
+    Args:
+        values: radiance, shape (v, u, t, s) or (v, u, t, s, channels): rows of views, columns of views,
+            rows of pixels, columns of pixels. A NumPy array, or one of PyTorch, JAX or another array-API
+            library. Floating-point values are radiance in any unit; unsigned integers are fractions of
+            their largest value (8-bit 255 is radiance 1). Linear in light, not display-referred.
+        frame: maps (i, j, k, l, 1) to the ray (u, v, s, t, 1) in metres and slopes at the plane where the
+            light field is given; i counts along u (axis 1), j along v (axis 0), k along s (axis 3), l along
+            t (axis 2). A camera takes this plane to be its entrance plane z = 0.
+        disparity_range: (lowest, highest) disparity of the scene in pixels per view along u, positive =
+            nearer than the plane on which the views converge, where known. It decides how views are
+            interpolated under strong defocus; unknown, it is measured from the pictures when needed.
+
+    Raises:
+        InputError: not 4-D or 5-D, an empty axis, a dtype that is not unsigned integer or floating point,
+            samples that are NaN, infinite or negative, or a frame that is not 5×5 and invertible.
+    """
+
+    values: Any
+    frame: Affine
+    disparity_range: tuple[float, float] | None = None
+    _shared_disparity: DisparityRange | None = field(default=None, repr=False)
+    _disparity_factor: float = field(default=1.0, repr=False)
+    _checked: bool = field(default=False, repr=False)
+
+    def __post_init__(self) -> None:
+        shape = tuple(self.values.shape)
+        if len(shape) not in (4, 5):
+            raise InputError(
+                f"a light field has the axes (v, u, t, s) or (v, u, t, s, channel); this array has {len(shape)}: "
+                f"shape {shape}. For one view, use values[None, None]"
+            )
+        if 0 in shape:
+            raise InputError(f"a light field of shape {shape} holds no samples")
+        if self.frame.dimensions != 4:
+            raise InputError("a light field needs a 5×5 frame, from (i, j, k, l, 1) to (u, v, s, t, 1)")
+        if not self.frame.is_invertible():
+            raise InputError(
+                "the frame of a light field must be invertible: each sample is another ray. This one is not:\n"
+                f"{self.frame!r}"
+            )
+        if self.disparity_range is not None and not self.disparity_range[0] <= self.disparity_range[1]:
+            raise InputError(f"disparity_range is (lowest, highest), not {self.disparity_range}")
+        if not self._checked:
+            _check_samples(self.values)
+            object.__setattr__(self, "_checked", True)
+        if self._shared_disparity is None:
+            object.__setattr__(self, "_shared_disparity", DisparityRange(self._measure_disparity))
+
+    @classmethod
+    def from_views(
+        cls,
+        values: Any,
+        spacing: float | tuple[float, float],
+        slope_per_pixel: float | tuple[float, float],
+        focus_distance: float = math.inf,
+        disparity_range: tuple[float, float] | None = None,
+    ) -> LightField:
+        """A light field from pictures taken by a planar array of parallel cameras, upright, row 0 at the top.
+
+        With view (j, i) and pixel (l, k) counted from the middle of their grids (i₀, j₀, k₀, l₀):
+        u = (i − i₀)·du, s = u/F − (k − k₀)·ps, likewise v, t. A point at distance Z then moves by
+        −du·(1/Z − 1/F)/ps pixels per view.
+
+        Args:
+            values: the pictures, shape (rows of views, columns of views, rows, columns[, channels]).
+            spacing: distance between neighbouring views, metres: one number or (dv, du).
+            slope_per_pixel: pixel pitch over focal length of the cameras: one number or (pt, ps).
+            focus_distance: where the views converge, metres (shifted, not rotated, cameras); infinite if
+                their axes are parallel.
+            disparity_range: see `LightField`.
+
+        Raises:
+            InputError: a spacing, slope or focus distance of zero or less, or what `LightField` refuses.
+        """
+        dv, du = spacing if isinstance(spacing, tuple) else (spacing, spacing)
+        pt, ps = slope_per_pixel if isinstance(slope_per_pixel, tuple) else (slope_per_pixel, slope_per_pixel)
+        for name, value in (
+            ("spacing", du),
+            ("spacing", dv),
+            ("slope_per_pixel", ps),
+            ("slope_per_pixel", pt),
+            ("focus_distance", focus_distance),
+        ):
+            if not value > 0:
+                raise InputError(f"{name} must be greater than 0, not {value}")
+        if len(values.shape) not in (4, 5):
+            return cls(values, Affine.identity())  # its own check names the fault
+        nv, nu, nt, ns = values.shape[:4]
+        matrix = np.zeros((5, 5))
+        matrix[4, 4] = 1.0
+        matrix[0, 0], matrix[1, 1] = du, dv
+        matrix[2, 0], matrix[3, 1] = du / focus_distance, dv / focus_distance
+        matrix[2, 2], matrix[3, 3] = -ps, -pt
+        centre = np.array([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2])
+        return cls(values, Affine(matrix) @ Affine.translation(*-centre), disparity_range)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the values: (v, u, t, s) or (v, u, t, s, channels)."""
+        return tuple(self.values.shape)
+
+    @property
+    def channels(self) -> int | None:
+        """How many colour channels there are; None for a light field without a channel axis."""
+        return self.shape[4] if len(self.shape) == 5 else None
+
+    @property
+    def full_scale(self) -> float:
+        """The stored value that stands for radiance 1: the largest integer, or 1 for floating point."""
+        kind = to_dtype(self.values)
+        return float(np.iinfo(kind).max) if kind.kind == "u" else 1.0
+
+    @property
+    def sample_volume(self) -> float:
+        """The phase-space volume du·dv·ds·dt of one sample's cell, m² (slopes have no unit)."""
+        return abs(self.frame.determinant)
+
+    @property
+    def flux(self) -> float:
+        """All the light that the samples stand for, per channel: Σ radiance × cell, m² × radiance."""
+        total = float(np.sum(to_numpy(self.values), dtype=np.float64)) / self.full_scale
+        return total * self.sample_volume / (self.channels or 1)
+
+    def __getitem__(self, index: Index | tuple[Index, ...]) -> LightField:
+        """A piece of the light field, in its place: slices along (v, u, t, s[, channel])."""
+        values, frame, steps = sliced(self.values, self.frame, index, LIGHT_FIELD_AXES, "a light field")
+        return self._with(values, frame, steps[0] / steps[2])
+
+    def view(self, row: int, column: int) -> Image:
+        """One view as a picture whose frame maps (column, row, 1) to the slopes (s, t, 1) of its pixels.
+
+        Args:
+            row: which row of views, 0 at the top; negative counts from the end.
+            column: which column of views, 0 at the left.
+
+        Raises:
+            InputError: there is no such view.
+        """
+        from vcc.image import Image
+
+        nv, nu = self.shape[:2]
+        if not (-nv <= row < nv and -nu <= column < nu):
+            raise InputError(f"there is no view ({row}, {column}) in a grid of {nv}×{nu} views")
+        j, i = row % nv, column % nu
+        at_view = self.frame @ Affine.translation(i, j, 0, 0)
+        slopes = Affine.from_parts(at_view.linear[2:, 2:], at_view.offset[2:])
+        values = to_numpy(self.values[j, i]) / np.float32(self.full_scale)
+        return Image(values.astype(np.float32), slopes, inverted=False)
+
+    def scaled(self, factor: float) -> LightField:
+        """The light field of the same scene in a world ``factor`` times as large (slopes stay).
+
+        A gantry's 40 cm aperture becomes a lens-sized one with ``lf.scaled(0.05)``; all distances to the
+        scene shrink with it.
+
+        Raises:
+            InputError: a factor of zero or less.
+        """
+        if not (factor > 0 and math.isfinite(factor)):
+            raise InputError(f"a world is scaled by a finite factor greater than 0, not {factor}")
+        return self._with(self.values, Affine.scaling(factor, factor, 1, 1) @ self.frame)
+
+    def transformed(self, affine: Affine) -> LightField:
+        """The light field after a linear element or flight: 𝕋 of the paper (section 3.2.1), exact, lazy.
+
+        Only the frame changes: no sample is touched, no light lost. ``lf.transformed(Affine.lens(f))``.
+
+        Args:
+            affine: an invertible 5×5 map of rays.
+        """
+        return self._with(self.values, affine @ self.frame)
+
+    def measured_disparity_range(self) -> tuple[float, float] | None:
+        """(lowest, highest) disparity in pixels per view along u, given or else measured from the pictures.
+
+        None where there is nothing to measure it from: one view, or pictures without texture.
+        Measured once and kept; pieces of a light field answer as the whole does.
+        """
+        known = self.disparity_range
+        if known is None and self._shared_disparity is not None:
+            known = self._shared_disparity.get()
+        if known is None:
+            return None
+        low, high = sorted((known[0] * self._disparity_factor, known[1] * self._disparity_factor))
+        return low, high
+
+    def disparity_of(self, distance: float) -> float:
+        """The disparity, pixels per view along u, of a point ``distance`` metres before this plane (paper's Z).
+
+        The point is seen at pixel k − disparity·i in view i. For an array of cameras this is
+        du·(1/Z − 1/F)/ps, the formula of the HCI benchmark (Honauer et al. 2016).
+        """
+        position, slope = self.frame.linear[0], self.frame.linear[2]
+        vergence = 1.0 / distance
+        # A point at z = −Z sends rays with s − u/Z constant; follow that along i and k.
+        return float((slope[0] - position[0] * vergence) / (slope[2] - position[2] * vergence))
+
+    def distance_of(self, disparity: float) -> float:
+        """The distance in metres of what shows ``disparity`` pixels per view along u: `disparity_of` undone."""
+        position, slope = self.frame.linear[0], self.frame.linear[2]
+        numerator = position[0] - disparity * position[2]
+        denominator = slope[0] - disparity * slope[2]
+        return math.inf if denominator == 0 else float(numerator / denominator)
+
+    def replaced(self, values: Any) -> LightField:
+        """The same frame and scene with other samples, for instance on another array library.
+
+        Raises:
+            InputError: another grid of samples, or what `LightField` refuses.
+        """
+        if tuple(values.shape)[:4] != self.shape[:4]:
+            raise InputError(f"samples of shape {tuple(values.shape)} do not fit a light field of shape {self.shape}")
+        return replace(self, values=values, _checked=False)
+
+    def _with(self, values: Any, frame: Affine, disparity_factor: float = 1.0) -> LightField:
+        return replace(
+            self,
+            values=values,
+            frame=frame,
+            _disparity_factor=self._disparity_factor * disparity_factor,
+        )
+
+    def _measure_disparity(self) -> tuple[float, float] | None:
+        from vcc.parallax import disparity_range  # late: light fields come before what looks at them
+
+        try:
+            views = to_numpy(self.values)
+        except Exception:  # an array under a tracer has a shape but no values yet
+            return None
+        return disparity_range(views)
+
+    def __repr__(self) -> str:
+        sizes = "×".join(map(str, self.shape))
+        return f"LightField({sizes} {to_dtype(self.values)}, {describe_geometry(self)})"
+
+
+def describe_geometry(light_field: LightField) -> str:
+    """The geometry of a light field in words, for people: spacing, slope per pixel, convergence."""
+    linear = light_field.frame.linear
+    separable = np.allclose(linear[[0, 0, 0, 1, 1, 1], [1, 2, 3, 0, 2, 3]], 0)
+    if not separable:
+        return "general frame"
+    from vcc.units import text
+
+    focus = math.inf if linear[2, 0] == 0 else linear[0, 0] / linear[2, 0]
+    converging = "parallel views" if math.isinf(focus) else f"converging at {text(float(f'{focus:.6g}'))}"
+    return (
+        f"spacing {text(float(f'{abs(linear[0, 0]):.6g}'))}, "
+        f"slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
+    )
+
+
+def to_dtype(values: Any) -> np.dtype[Any]:
+    """The NumPy dtype that corresponds to that of an array of any library."""
+    name = str(values.dtype).rsplit(".", 1)[-1]
+    try:
+        return np.dtype(name)
+    except TypeError:
+        raise InputError(f"samples of type {values.dtype} are not supported: use float32 or uint8") from None
+
+
+def _check_samples(values: Any) -> None:
+    kind = to_dtype(values)
+    if kind.kind not in "uf":
+        raise InputError(
+            f"light-field samples are floating point or unsigned integers, not {kind}: "
+            "convert them, e.g. with values.astype('float32')"
+        )
+    if kind.kind == "u":
+        return  # neither negative nor NaN by construction
+    try:
+        known: NDArray[Any] = to_numpy(values)
+    except Exception:  # under a tracer there are no values to look at yet
+        return
+    lowest, highest = known.min(), known.max()  # a NaN anywhere makes both NaN
+    if not (np.isfinite(lowest) and np.isfinite(highest)):
+        bad = tuple(int(n) for n in np.argwhere(~np.isfinite(known))[0])
+        raise InputError(f"a light field needs finite samples; at index {bad} (v, u, t, s, …) it has {known[bad]}")
+    if lowest < 0:
+        bad = tuple(int(n) for n in np.unravel_index(known.argmin(), known.shape))
+        raise InputError(f"radiance is not negative; at index {bad} (v, u, t, s, …) it is {lowest}")

@@ -1,0 +1,438 @@
+"""From a camera and a light field to a plan: linear optics folded, masks pulled to the samples.
+
+This is the paper's strategy (section 4.2) taken further: with every linear element folded into one matrix,
+the place of a sample on the sensor and on each mask is an affine function of its index, and the transform,
+the masks and the projection become one sum.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.light_field import LightField
+from vcc.patterns import Pattern
+from vcc.plan.footprint import REACH
+from vcc.plan.model import MaskLookup, Plan
+from vcc.plan.parallax_rule import BetweenViews, choose_between_views
+
+if TYPE_CHECKING:
+    from vcc.camera import Camera
+    from vcc.sensor import Sensor
+
+Array = NDArray[np.float64]
+
+TEXTURE_POINTS_PER_FOOTPRINT = 6
+"""Weights are looked up linearly between texture points this fine: the error is below 1/6² of a curvature."""
+LARGEST_TEXTURE = 3072
+"""Points a side of a mask texture: 36 MiB."""
+FINE_DETAIL_IN_VIEW = 0.15
+"""Share of a mask's variance that may vanish inside the cell of a view before cells are divided."""
+FINE_DETAIL_IN_SAMPLE = 0.01
+"""Share of a mask's variance that may vanish inside a sample before samples are divided."""
+LARGEST_REFINEMENT = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """An absorbing element as the samples meet it: place = at_index · (i, j, k, l) + offset, metres.
+
+    Places are counted from the element's middle, which stands at ``decentre`` on the axis' plane.
+    """
+
+    pattern: Pattern
+    label: str
+    decentre: tuple[float, float]
+    at_index: Array
+    offset: Array
+
+    def view_step(self, motion: Array) -> Array:
+        """2×2: metres moved here per view, a point of the scene being followed."""
+        return np.asarray(self.at_index[:, :2] - self.at_index[:, 2:] @ motion)
+
+    @property
+    def sample_step(self) -> Array:
+        """2×2: metres moved here per sample within a view."""
+        return np.asarray(self.at_index[:, 2:])
+
+
+def compile_plan(
+    camera: Camera,
+    light_field: LightField,
+    *,
+    interpolation: str = "linear",
+    between_views: str = "auto",
+    scene_distance: float | None = None,
+    refine: int | str = "auto",
+) -> Plan:
+    """The plan by which an engine makes the picture that ``camera`` records of ``light_field``.
+
+    Args: see `vcc.Camera.capture`.
+
+    Raises:
+        InputError: an option that does not exist, or a frame that the sensor cannot be reached by.
+    """
+    _check_options(interpolation, between_views, refine)
+    sensor = camera.sensor
+    at_sensor = camera.rays_at(sensor.z)
+    frame, samples, swapped = _without_transposition(light_field, at_sensor)
+    pixels_from_metres = sensor.frame.inverse()
+    metres = (at_sensor @ frame).matrix[:2]
+    on_sensor = pixels_from_metres.linear @ metres[:, :4]
+    origin = pixels_from_metres(metres[:, 4])
+    step = _cleaned(on_sensor[:, 2:], samples)
+
+    between = choose_between_views(light_field, frame, on_sensor, between_views, scene_distance)
+    planes, against_sensor = _absorbing_planes(camera, frame, metres)
+    view_planes = [p for p in planes if _depends_on_view_only(p, samples, between.motion)]
+    path_planes = [p for p in planes if p not in view_planes]
+
+    divide = _divide_views(planes, between, refine)
+    fine = _divide_samples(path_planes, between, light_field.shape, refine)
+    rows, row_shift, row_share = _tap_places(light_field.shape[0], divide)
+    columns, column_shift, column_share = _tap_places(light_field.shape[1], divide)
+    index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
+    shift = np.stack(np.broadcast_arrays(column_shift[None, :], row_shift[:, None]), axis=-1)
+
+    weights = row_share[:, None] * column_share[None, :]
+    centre = np.array([(samples[1] - 1) / 2, (samples[0] - 1) / 2])
+    for plane in view_planes:
+        place = _tap_origin(plane.at_index, plane.offset, index, shift, between.motion)
+        place = place + plane.sample_step @ centre
+        width, height = np.abs(plane.view_step(between.motion)).sum(axis=1) / divide
+        weights = weights * plane.pattern.mean(place[..., 0], place[..., 1], width, height)
+    used_rows, used_columns = _used(weights)
+    keep = np.ix_(used_rows, used_columns)
+    index, shift, weights = index[keep], shift[keep], weights[keep]
+
+    tap = _tap_origin(on_sensor, origin, index, shift, between.motion)
+    guard, smear = _smear(between, divide)
+    lookups = tuple(
+        _mask_lookup(plane, index, shift, between.motion, samples, divide, fine) for plane in path_planes
+    )
+    missing, reason = _missing_rays(view_planes, light_field.shape, samples, weights, tap, step, sensor.shape)
+    volume = light_field.sample_volume / light_field.full_scale
+    return Plan(
+        sensor_shape=sensor.shape,
+        guard=guard,
+        interpolation=interpolation,
+        scale=volume / (sensor.pitches[0] * sensor.pitches[1]),
+        view_rows=rows[used_rows],
+        view_columns=columns[used_columns],
+        weights=weights,
+        x=tap[..., 0] + guard,
+        y=tap[..., 1] + guard,
+        step=step,
+        masks=lookups,
+        sensor_transmission=_sensor_transmission(sensor, against_sensor),
+        refine=fine,
+        smear=smear,
+        swap_pixel_axes=swapped,
+        samples=samples,
+        missing_rays=missing,
+        missing_reason=reason,
+        notes=_notes(camera, view_planes, path_planes, against_sensor, between, divide, fine, swapped),
+        expected_ghosting=between.gap_left,
+    )
+
+
+def _check_options(interpolation: str, between_views: str, refine: int | str) -> None:
+    if interpolation not in REACH:
+        raise InputError(f"interpolation is one of {', '.join(map(repr, REACH))}, not {interpolation!r}")
+    if between_views not in ("auto", "none"):
+        raise InputError(f"between_views is 'auto' or 'none', not {between_views!r}")
+    if refine != "auto" and not (isinstance(refine, int) and 1 <= refine <= LARGEST_REFINEMENT):
+        raise InputError(f"refine is 'auto' or a whole number from 1 to {LARGEST_REFINEMENT}, not {refine!r}")
+
+
+def _without_transposition(light_field: LightField, at_sensor: Affine) -> tuple[Affine, tuple[int, int], bool]:
+    """The frame with its pixel axes in the order in which rows of samples land on rows of the sensor."""
+    frame, (nt, ns) = light_field.frame, light_field.shape[2:4]
+    down = (at_sensor @ frame).linear[1]
+    if abs(down[3]) >= abs(down[2]):
+        return frame, (nt, ns), False
+    exchange = Affine(np.eye(5)[[0, 1, 3, 2, 4]])
+    return frame @ exchange, (ns, nt), True
+
+
+def _cleaned(step: Array, samples: tuple[int, int]) -> Array:
+    """Steps whose cross terms are rounding errors, set to zero."""
+    step = step.copy()
+    for row, column in ((0, 1), (1, 0)):
+        if abs(step[row, column]) * max(samples) < 1e-6:
+            step[row, column] = 0.0
+    if step[1, 1] == 0 and step[0, 1] != 0:
+        raise InputError("the light field's pixel rows fall onto one sensor row: such a frame is not supported")
+    return step
+
+
+def _absorbing_planes(camera: Camera, frame: Affine, sensor_place: Array) -> tuple[list[Plane], list[Plane]]:
+    """What absorbs in mid-path, and what lies against the sensor (rewrite rule below).
+
+    Rule: a mask whose every ray meets it where it meets the sensor multiplies the picture. Precondition:
+    the place on the mask is the place on the sensor, shifted at most, for every sample.
+    """
+    in_path, against_sensor = [], []
+    for element in camera.elements:
+        pattern = element.faces().pattern
+        if pattern is None:
+            continue
+        place = (camera.rays_at(element.z, before=True) @ frame).matrix[:2]
+        plane = Plane(pattern, element.label, element.decentre, place[:, :4], place[:, 4] - np.array(element.decentre))
+        same = np.allclose(place, sensor_place, rtol=1e-9, atol=1e-9 * np.abs(sensor_place).max())
+        (against_sensor if same else in_path).append(plane)
+    return in_path, against_sensor
+
+
+def _depends_on_view_only(plane: Plane, samples: tuple[int, int], motion: Array) -> bool:
+    """Whether all samples of a view meet the plane in one place, compared with the cell of a view."""
+    cell = np.abs(plane.view_step(motion)).sum(axis=1)
+    travel = np.abs(plane.sample_step) @ np.array([samples[1], samples[0]])
+    return bool((travel <= 0.02 * cell).all())
+
+
+def _tap_places(views: int, divide: int) -> tuple[NDArray[np.int64], Array, Array]:
+    """Views read, shifts from them in views, and shares, of the taps along one axis.
+
+    Undivided, each view is one tap. Divided, a view's light is spread over a tent that reaches its
+    neighbours, in steps of 1/divide: a place between views is interpolated linearly from both.
+    """
+    if divide == 1:
+        return np.arange(views), np.zeros(views), np.ones(views)
+    shift = (np.arange(-divide, divide) + 0.5) / divide
+    share = (1 - np.abs(shift)) / divide
+    return np.repeat(np.arange(views), 2 * divide), np.tile(shift, views), np.tile(share, views)
+
+
+def _tap_origin(at_index: Array, offset: Array, index: Array, shift: Array, motion: Array) -> Array:
+    """Where sample (0, 0) of each tap falls, (rows, columns, 2); shifts follow the scene's parallax."""
+    view_step = at_index[:, :2] - at_index[:, 2:] @ motion
+    return np.asarray(index @ at_index[:, :2].T + shift @ view_step.T + offset)
+
+
+def _used(weights: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    rows, columns = np.flatnonzero(weights.any(axis=1)), np.flatnonzero(weights.any(axis=0))
+    first = np.zeros(1, dtype=np.int64)
+    return (rows if rows.size else first), (columns if columns.size else first)
+
+
+def _smear(between: BetweenViews, divide: int) -> tuple[int, tuple[float, float]]:
+    """The tent that fills gaps between taps' pictures, and the margin from which it brings in light."""
+    vertical, horizontal = (gap / divide for gap in between.gap_filled)
+    smear = (vertical if vertical > 1 else 0.0, horizontal if horizontal > 1 else 0.0)
+    return (math.ceil(max(smear)) + 1 if any(smear) else 0), smear
+
+
+def _mask_lookup(
+    plane: Plane,
+    index: Array,
+    shift: Array,
+    motion: Array,
+    samples: tuple[int, int],
+    divide: int,
+    fine: int,
+) -> MaskLookup:
+    """The mask averaged over a sample's footprint, as a texture, and where each sample reads it."""
+    place = _tap_origin(plane.at_index, plane.offset, index, shift, motion)
+    step = plane.sample_step
+    view_part = np.abs(plane.view_step(motion)).sum(axis=1) / divide
+    sample_part = np.abs(step).sum(axis=1) / fine
+    # Two boxes in a row spread as one whose width is their root of squares, exact where one is small.
+    footprint = np.hypot(view_part, sample_part)
+    corners = np.array([[k, l] for k in (-2, samples[1] + 1) for l in (-2, samples[0] + 1)]) @ step.T
+    low = (place.reshape(-1, 2)[:, None] + corners).min(axis=(0, 1))
+    high = (place.reshape(-1, 2)[:, None] + corners).max(axis=(0, 1))
+    bound = np.array(plane.pattern.size) / 2 + footprint
+    low, high = np.maximum(low, -bound), np.minimum(high, bound)
+    extent = np.maximum(high - low, 1e-12)
+    spacing = np.maximum(footprint / TEXTURE_POINTS_PER_FOOTPRINT, extent / (LARGEST_TEXTURE - 4))
+    points = np.ceil(extent / spacing).astype(int) + 3
+    start = (low + high) / 2 - (points - 1) / 2 * spacing
+    grid_x = start[0] + np.arange(points[0]) * spacing[0]
+    grid_y = start[1] + np.arange(points[1]) * spacing[1]
+    texture = plane.pattern.mean(grid_x[None, :], grid_y[:, None], footprint[0], footprint[1])
+    return MaskLookup(
+        texture=np.ascontiguousarray(texture, dtype=np.float32),
+        column=(place[..., 0] - start[0]) / spacing[0],
+        row=(place[..., 1] - start[1]) / spacing[1],
+        step=_cleaned_lookup(step / spacing[:, None], samples),
+        label=plane.label,
+    )
+
+
+def _cleaned_lookup(step: Array, samples: tuple[int, int]) -> Array:
+    return np.where(np.abs(step) * max(samples) < 1e-6, 0.0, step)
+
+
+def _detail_lost(plane: Plane, known: Array, added: Array) -> float:
+    """The share of a pattern's variance that averaging over ``added`` takes away after ``known``, metres."""
+    size = np.minimum(np.array(plane.pattern.size), 1.0)
+    if not np.isfinite(plane.pattern.size).all():
+        size = np.full(2, 64 * max(*known, *added))
+    if (added <= 0).all():
+        return 0.0
+    fine = np.maximum(np.maximum(known, added) / 8, size / 512)
+    counts = np.maximum(np.ceil(size / fine).astype(int), 8)
+    x = ((np.arange(counts[0]) + 0.5) / counts[0] - 0.5) * size[0]
+    y = ((np.arange(counts[1]) + 0.5) / counts[1] - 0.5) * size[1]
+    mean = plane.pattern.mean
+    whole = mean(x[None, :], y[:, None], *(size / counts)).var()
+    if whole < 1e-12:
+        return 0.0
+    before = mean(x[None, :], y[:, None], *np.maximum(known, size / counts)).var()
+    after = mean(x[None, :], y[:, None], *np.maximum(np.hypot(known, added), size / counts)).var()
+    return float((before - after) / whole)
+
+
+def _divide_views(planes: list[Plane], between: BetweenViews, refine: int | str) -> int:
+    """Into how many parts a view's cell is divided each way, so that fine masks keep their detail.
+
+    Needed only where a cell's picture is spread over more than a pixel: else what a mask does inside the
+    cell adds up in one place, and the mean over the cell says it all.
+    """
+    if refine != "auto":
+        return 1
+    divide = 1
+    for plane in planes:
+        cell = np.abs(plane.view_step(between.motion)).sum(axis=1)
+        while divide < min(LARGEST_REFINEMENT, max(between.gap_filled)):
+            if _detail_lost(plane, np.zeros(2), cell / divide) < FINE_DETAIL_IN_VIEW:
+                break
+            divide *= 2
+    return divide
+
+
+def _divide_samples(
+    planes: list[Plane], between: BetweenViews, shape: tuple[int, ...], refine: int | str
+) -> int:
+    """Into how many parts a sample is divided each way, so that a mask near the sensor stays sharp.
+
+    A sample's light lands on the pixels as one footprint, mask and all: detail of the mask that the
+    aperture's penumbra leaves and the footprint would blur needs finer samples.
+    """
+    if isinstance(refine, int):
+        return refine
+    fine = 1
+    for plane in planes:
+        penumbra = np.abs(plane.view_step(between.motion)) @ np.array([shape[1], shape[0]])
+        sample = 2 * np.abs(plane.sample_step).sum(axis=1)
+        while fine < LARGEST_REFINEMENT:
+            if _detail_lost(plane, penumbra, sample / fine) < FINE_DETAIL_IN_SAMPLE:
+                break
+            fine *= 2
+    return fine
+
+
+def _sensor_transmission(sensor: Sensor, planes: list[Plane]) -> Array | None:
+    """The mean transmission over each pixel of what lies against the sensor."""
+    if not planes:
+        return None
+    vertical, horizontal = sensor.pitches
+    total = np.ones(sensor.shape)
+    for plane in planes:
+        x = sensor.column_places - plane.decentre[0]
+        y = sensor.row_places - plane.decentre[1]
+        total = total * plane.pattern.mean(x[None, :], y[:, None], horizontal, vertical)
+    return total
+
+
+def _missing_rays(
+    view_planes: list[Plane],
+    shape: tuple[int, ...],
+    samples: tuple[int, int],
+    weights: Array,
+    tap: Array,
+    step: Array,
+    sensor_shape: tuple[int, int],
+) -> tuple[float, str]:
+    """The share of rays that the open aperture sends to the sensor and the light field does not hold."""
+    outside_views = _aperture_outside_views(view_planes, shape)
+    outside_pictures = _sensor_outside_views(samples, weights, tap, step, sensor_shape)
+    missing = 1 - (1 - outside_views) * (1 - outside_pictures)
+    reasons = []
+    if outside_views > 1e-3:
+        reasons.append(f"{outside_views:.1%} of the aperture lies outside the grid of views")
+    if outside_pictures > 1e-3:
+        reasons.append(f"{outside_pictures:.1%} of what the sensor sees lies outside the views' pictures")
+    return (missing if missing > 1e-9 else 0.0), "; ".join(reasons)
+
+
+def _aperture_outside_views(planes: list[Plane], shape: tuple[int, ...]) -> float:
+    bounded = [plane for plane in planes if np.isfinite(plane.pattern.size).all()]
+    if not bounded:
+        return 0.0
+    plane = min(bounded, key=lambda p: p.pattern.size[0] * p.pattern.size[1])
+    points = (np.arange(128) + 0.5) / 128 - 0.5
+    x, y = np.meshgrid(points * plane.pattern.size[0], points * plane.pattern.size[1])
+    to_view = np.linalg.inv(plane.at_index[:, :2])
+    middle = plane.offset + plane.sample_step @ np.array([(shape[3] - 1) / 2, (shape[2] - 1) / 2])
+    view = (np.stack([x, y], axis=-1) - middle) @ to_view.T
+    open_here = np.ones_like(x)
+    for other in planes:
+        here = view @ other.at_index[:, :2].T + other.offset
+        here = here + other.sample_step @ np.array([(shape[3] - 1) / 2, (shape[2] - 1) / 2])
+        open_here = open_here * other.pattern(here[..., 0], here[..., 1])
+    # Half a raster step of grace: an aperture as wide as the grid misses nothing.
+    inside = (np.abs(view - (np.array([shape[1], shape[0]]) - 1) / 2) <= np.array([shape[1], shape[0]]) / 2).all(-1)
+    total = open_here.sum()
+    return float(1 - (open_here * inside).sum() / total) if total > 0 else 0.0
+
+
+def _sensor_outside_views(
+    samples: tuple[int, int], weights: Array, tap: Array, step: Array, sensor_shape: tuple[int, int]
+) -> float:
+    if abs(np.linalg.det(step)) < 1e-9:
+        return 0.0  # every view falls into a point: no pixel asks for a particular sample
+    rows = (np.arange(24) + 0.5) / 24 * sensor_shape[0] - 0.5
+    columns = (np.arange(24) + 0.5) / 24 * sensor_shape[1] - 0.5
+    points = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    used = weights > 0
+    if not used.any():
+        return 1.0
+    index = (points[None] - tap[used][:, None]) @ np.linalg.inv(step).T
+    size = np.array([samples[1], samples[0]])
+    inside = ((index >= -0.5) & (index <= size - 0.5)).all(axis=-1)
+    share = weights[used] / weights[used].sum()
+    return float(1 - (share[:, None] * inside).sum() / len(points))
+
+
+def _notes(
+    camera: Camera,
+    view_planes: list[Plane],
+    path_planes: list[Plane],
+    against_sensor: list[Plane],
+    between: BetweenViews,
+    divide: int,
+    fine: int,
+    swapped: bool,
+) -> tuple[str, ...]:
+    linear = [element.label for element in camera.elements if element.faces().deflection is not None]
+    notes = [
+        f"folded into one matrix: {', '.join(linear) or 'no linear element'}, and the flight to the sensor at "
+        f"z = {camera.sensor.z * 1e3:g} mm"
+    ]
+    if view_planes:
+        notes.append(
+            f"one weight a view, the open share of its cell: {', '.join(plane.label for plane in view_planes)}"
+        )
+    if path_planes:
+        notes.append(
+            f"one weight a sample, its mean over the sample's footprint, pulled from mid-path: "
+            f"{', '.join(plane.label for plane in path_planes)}"
+        )
+    if against_sensor:
+        notes.append(f"multiplied into the picture: {', '.join(plane.label for plane in against_sensor)}")
+    if swapped:
+        notes.append("pixel rows and columns of the views change places: the frame turns them")
+    notes.append(between.reason)
+    if divide > 1:
+        notes.append(f"cells of views divided {divide}×{divide}: a mask is finer than a view's cell")
+    if fine > 1:
+        notes.append(f"samples divided {fine}×{fine}: a mask near the sensor is finer than a sample")
+    return tuple(notes)

@@ -1,0 +1,153 @@
+"""Footprints: how a sample's light falls on the pixels, along one axis.
+
+A sample at pixel coordinate x (pixel m covers m − ½ … m + ½) spreads its light over a footprint φ((·−x)/b)/|b|,
+where b is the step from one sample to the next, in pixels. Pixel m receives the share
+
+    F(m) = Φ((m + ½ − x)/b) − Φ((m − ½ − x)/b),        Φ(a) = ∫₋∞ᵃ φ,
+
+exactly, for any b. Over the pixels the shares sum to one, so no light is lost; over equally spaced samples
+they sum to 1/|b|, so uniform light stays uniform. Nothing is singular at b = 0, where a whole view falls
+into one point. Seen from the sample this is forward evaluation (splatting), seen from the pixel it is
+backward evaluation (interpolating, then averaging over the pixel); the shares are the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+REACH = {"nearest": 0.5, "linear": 1.0, "cubic": 2.0}
+"""Half the width of each interpolation's footprint, in samples."""
+
+SMALLEST_STEP = 1e-7
+"""Steps from sample to sample below this, in pixels, count as this: a ten-millionth of a pixel is a point."""
+
+
+def cumulative(interpolation: str, a: Any, xp: Any = np) -> Any:
+    """Φ(a), the integral of the footprint from −∞ to a, for arrays of any library.
+
+    Args:
+        interpolation: ``"linear"`` (a tent) or ``"cubic"`` (Catmull-Rom, Keys 1981 with a = −½).
+        a: positions in samples from the footprint's middle.
+        xp: the array namespace of ``a``.
+    """
+    r = xp.clip(xp.abs(a), 0.0, REACH[interpolation])
+    if interpolation == "linear":
+        half = r - r * r / 2
+    else:
+        inner = xp.clip(r, 0.0, 1.0)
+        outer = xp.clip(r, 1.0, 2.0)
+        # ∫₀ʳ 1.5x³ − 2.5x² + 1, then ∫₁ʳ −0.5x³ + 2.5x² − 4x + 2
+        half = inner - inner**3 * (5.0 / 6.0) + inner**4 * (3.0 / 8.0)
+        half = half + (_outer(outer) - _outer(1.0))
+    return 0.5 + xp.sign(a) * half
+
+
+def _outer(r: Any) -> Any:
+    return -(r**4) / 8 + r**3 * (5.0 / 6.0) - 2 * r**2 + 2 * r
+
+
+def weight(interpolation: str, distance: Any, xp: Any = np) -> Any:
+    """φ at a distance in samples: how values between samples are interpolated."""
+    r = xp.abs(distance)
+    if interpolation == "nearest":
+        return xp.astype((distance >= -0.5) & (distance < 0.5), xp.float64)
+    if interpolation == "linear":
+        return xp.clip(1 - r, 0.0, 1.0)
+    near = (1.5 * r - 2.5) * r * r + 1
+    far = ((-0.5 * r + 2.5) * r - 4) * r + 2
+    return xp.where(r < 1, near, xp.where(r < 2, far, xp.zeros_like(r)))
+
+
+def shares(interpolation: str, pixel: Any, position: Any, step: float, xp: Any = np) -> Any:
+    """F: the share of a sample's light that each pixel receives, for arrays that broadcast.
+
+    Args:
+        interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+        pixel: pixel indices, as floating point.
+        position: the samples' pixel coordinates.
+        step: pixels from one sample to the next, any sign.
+        xp: the array namespace of the arrays.
+
+    ``"nearest"`` is the paper's: where samples are closer than pixels, each falls into the pixel that holds
+    it (forward); where they are further apart, each pixel takes the sample nearest to its middle (backward).
+    """
+    size = max(abs(step), SMALLEST_STEP)
+    offset = pixel - position
+    if interpolation == "nearest":
+        reach = max(size, 1.0) / 2
+        inside = (offset >= -reach) & (offset < reach)
+        return xp.astype(inside, offset.dtype) / max(size, 1.0)
+    upper = cumulative(interpolation, (offset + 0.5) / size, xp)
+    return upper - cumulative(interpolation, (offset - 0.5) / size, xp)
+
+
+@dataclass(frozen=True)
+class Taps:
+    """Shares as a table by pixel: pixel m gathers ``weights[..., m, n]`` of sample ``first[..., m] + n``.
+
+    Args:
+        first: index of the first sample that reaches each pixel, within the samples there are.
+        count: how many samples reach it, one after another.
+        weights: their shares, zero beyond ``count``.
+    """
+
+    first: NDArray[np.int64]
+    count: NDArray[np.int64]
+    weights: NDArray[np.float32]
+
+
+def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: int) -> Taps:
+    """The table of shares for rows of samples at ``origin + step · index``, in pixels.
+
+    Args:
+        interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+        origin: pixel coordinate of sample 0, any shape; the table has one row for each.
+        step: pixels from one sample to the next.
+        samples: how many samples there are.
+        pixels: how many pixels there are.
+    """
+    size = max(abs(step), SMALLEST_STEP)
+    signed = size if step >= 0 else -size
+    if interpolation == "nearest":
+        reach = max(size, 1.0) / 2
+    else:
+        reach = REACH[interpolation] * size + 0.5
+    pixel = np.arange(pixels, dtype=np.float64)
+    middle = (pixel - np.asarray(origin, dtype=np.float64)[..., None]) / signed
+    low = np.clip(np.ceil(middle - reach / size), 0, samples)
+    high = np.clip(np.floor(middle + reach / size), -1, samples - 1)
+    first = low.astype(np.int64)
+    count = np.maximum(high.astype(np.int64) - first + 1, 0)
+    width = max(int(count.max(initial=0)), 1)
+    index = first[..., None] + np.arange(width)
+    position = np.asarray(origin)[..., None, None] + step * index
+    table = shares(interpolation, pixel[:, None], position, step)
+    table = np.where(np.arange(width) < count[..., None], table, 0.0)
+    first = np.minimum(first, samples - 1)
+    return Taps(first, count, np.ascontiguousarray(table, dtype=np.float32))
+
+
+def refinement_matrix(interpolation: str, samples: int, refine: int) -> tuple[Array, float]:
+    """Each sample split into finer ones: a matrix (fine, samples) and the index of fine sample 0.
+
+    Fine samples stand ``1/refine`` apart, from half a footprint before the first sample to half a footprint
+    after the last; each takes φ(distance)/refine of a sample, so that a sample's light is only spread, and
+    pieces of a light field refine as the whole does.
+
+    Args:
+        interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+        samples: how many samples there are.
+        refine: how many fine samples replace one.
+    """
+    reach = REACH[interpolation]
+    fine = round((samples - 1 + 2 * reach) * refine)
+    start = -reach + 0.5 / refine
+    place = start + np.arange(fine) / refine
+    matrix = weight(interpolation, place[:, None] - np.arange(samples)) / refine
+    return matrix / matrix.sum(axis=0), start

@@ -1,0 +1,149 @@
+"""How to fill the gaps between views: not at all, or along the parallax of the scene.
+
+A view stands for a cell of the aperture. Where the pictures that neighbouring views throw on the sensor lie
+less than about a pixel apart, their plain sum is the integral over the aperture. Further apart, the sum
+shows ghost copies; then each view's light is spread over a tent that reaches its neighbours, along the way
+that a point of the scene takes from one view's picture to the next. For a whole view that way is one
+vector, so the tent is one blur of the finished picture, whatever the views hold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.light_field import LightField
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BetweenViews:
+    """The choice made.
+
+    Args:
+        motion: 2×2; how the point of the scene that is followed moves within a view, (k, l) per (i, j),
+            with the sign turned: it is seen at (k, l) − motion · (i, j).
+        gap_filled: (vertical, horizontal) distance in pixels between neighbouring views' pictures of that
+            point; 0 where nothing is filled.
+        gap_left: the largest gap in pixels that stays, over the distances that the scene has.
+        reason: in words.
+    """
+
+    motion: Array
+    gap_filled: tuple[float, float]
+    gap_left: float
+    reason: str
+
+
+def index_motion(frame: Affine, vergence: float) -> Array:
+    """How a point of the scene moves within a view: 2×2, (k, l) per (i, j), sign turned.
+
+    Args:
+        frame: of the light field.
+        vergence: 1/Z, one over the point's distance before the plane of the light field, 1/m.
+    """
+    linear = frame.linear
+    # Rays from a point keep s − u/Z; solve for the pixel along the views.
+    conserved = linear[2:] - vergence * linear[:2]
+    within, across = conserved[:, 2:], conserved[:, :2]
+    if abs(np.linalg.det(within)) < 1e-12 * np.abs(within).max(initial=0.0) ** 2:
+        return np.zeros((2, 2))
+    return np.asarray(np.linalg.solve(within, across))
+
+
+def choose_between_views(
+    light_field: LightField,
+    frame: Affine,
+    on_sensor: Array,
+    between_views: str,
+    scene_distance: float | None,
+) -> BetweenViews:
+    """Decide by the gaps, in pixels, between neighbouring views' pictures over the scene's distances.
+
+    In focus the gap is 0, so the gap filled is the geometric mean of the smallest and the largest: nothing
+    that is in focus gets blurred, and under strong defocus, where all gaps are alike, all are filled.
+
+    Args:
+        light_field: whose disparities are asked for.
+        frame: its frame, as the plan uses it.
+        on_sensor: 2×4, pixels per index step (i, j, k, l).
+        between_views: ``"auto"`` or ``"none"``.
+        scene_distance: metres before the entrance plane, or None.
+    """
+    if light_field.shape[0] == light_field.shape[1] == 1:
+        return BetweenViews(np.zeros((2, 2)), (0.0, 0.0), 0.0, "a single view: nothing between views")
+    vergences = _vergences(light_field, scene_distance)
+    if vergences is None:
+        motion = _in_focus(on_sensor)
+        steps = np.stack([on_sensor[:, :2] - on_sensor[:, 2:] @ motion])
+        motions = np.stack([motion])
+    else:
+        motions = np.stack([index_motion(frame, vergence) for vergence in vergences])
+        steps = on_sensor[:, :2] - on_sensor[:, 2:] @ motions
+    axis = 0 if light_field.shape[1] > 1 else 1
+    along = steps[:, :, axis]
+    gaps = np.linalg.norm(along, axis=-1)
+    crosses_focus = (along @ along[0] < 0).any()
+    smallest, largest = (0.0 if crosses_focus else gaps.min()), gaps.max()
+    wanted = float(np.sqrt(smallest * largest))
+    chosen = int(np.abs(gaps - wanted).argmin())
+    pixel = max(1.0, float(np.abs(on_sensor[:, 2:]).max()))
+    spread = (
+        f"neighbouring views' pictures lie {smallest:.2g} to {largest:.2g} pixels apart on the sensor"
+        if vergences is not None
+        else "the pictures show no parallax to measure"
+    )
+    if between_views == "none":
+        return BetweenViews(motions[chosen], (0.0, 0.0), largest, f"{spread}; views are not interpolated, as asked")
+    if wanted <= pixel:
+        return BetweenViews(motions[chosen], (0.0, 0.0), largest, f"{spread}; {_advice(largest, pixel)}")
+    step = np.abs(steps[chosen])
+    vertical = float(step[1].sum()) if light_field.shape[0] > 1 or axis == 1 else 0.0
+    horizontal = float(step[0].sum()) if light_field.shape[1] > 1 or axis == 0 else 0.0
+    left = max(largest - wanted, 0.0)
+    return BetweenViews(
+        motions[chosen],
+        (vertical, horizontal),
+        left,
+        f"{spread}; each view is spread over {wanted:.2g} pixels along the scene's parallax to close the gaps",
+    )
+
+
+def _vergences(light_field: LightField, scene_distance: float | None) -> Array | None:
+    if scene_distance is not None:
+        if not scene_distance > 0:
+            raise InputError(f"scene_distance must be greater than 0 m, not {scene_distance}")
+        return np.array([1.0 / scene_distance])
+    disparities = light_field.measured_disparity_range()
+    if disparities is None:
+        return None
+    along_u = light_field.frame.linear[[0, 2]]
+    # distance_of, kept as 1/Z so that infinity needs no special case
+    ends = [
+        (along_u[1, 0] - d * along_u[1, 2]) / (along_u[0, 0] - d * along_u[0, 2])
+        for d in disparities
+        if along_u[0, 0] - d * along_u[0, 2] != 0
+    ]
+    return np.linspace(min(ends), max(ends), 33) if ends else None
+
+
+def _in_focus(on_sensor: Array) -> Array:
+    """The motion of what the camera is focused on: with no better knowledge, nothing is spread."""
+    within = on_sensor[:, 2:]
+    if abs(np.linalg.det(within)) < 1e-12:
+        return np.zeros((2, 2))
+    return np.asarray(np.linalg.solve(within, on_sensor[:, :2]))
+
+
+def _advice(largest: float, pixel: float) -> str:
+    if largest <= 1.5 * pixel:
+        return "less than about a pixel: their plain sum is the integral over the aperture"
+    return (
+        f"what is in focus forbids filling these gaps, so out-of-focus parts show ghost copies: "
+        f"{np.ceil(largest / pixel):.0f} times as many views a side would remove them"
+    )
