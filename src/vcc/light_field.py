@@ -16,6 +16,8 @@ from vcc.sampled import LIGHT_FIELD_AXES, Index, sliced, to_numpy
 
 if TYPE_CHECKING:
     from vcc.image import Image
+    from vcc.optics import Mask
+    from vcc.sensor import Sensor
 
 
 class DisparityRange:
@@ -212,6 +214,59 @@ class LightField:
             affine: an invertible 5×5 map of rays.
         """
         return self._with(self.values, affine @ self.frame)
+
+    def masked(self, mask: Mask, *, memory_limit: int | None = None) -> LightField:
+        """The light field just behind a mask that lies in its plane: the paper's dot product (section 3.2.3).
+
+        Each sample is weighted by the mask's mean over the sample's cell. New float32 samples are made; a
+        camera that only wants the picture needs none of this.
+
+        Args:
+            mask: its z is not looked at: it lies where the light field is.
+            memory_limit: bytes that the new samples may take; None takes `vcc.operators.MEMORY_LIMIT`.
+
+        Raises:
+            InputError: more memory needed than allowed.
+        """
+        from vcc.operators import masked
+
+        return masked(self, mask, memory_limit)
+
+    def resampled(
+        self,
+        frame: Affine,
+        shape: tuple[int, int, int, int],
+        *,
+        interpolation: str = "linear",
+        memory_limit: int | None = None,
+    ) -> LightField:
+        """The light field interpolated on another grid, zero where this one holds nothing.
+
+        This is what the paper does after every element (section 4.2, "the resolution issue"); it loses
+        detail, which a frame does not.
+
+        Args:
+            frame: 5×5, from the new grid's indices to rays at this plane.
+            shape: (v, u, t, s) of the new grid.
+            interpolation: ``"nearest"``, ``"linear"`` (4-D) or ``"cubic"`` (4-D cubic spline, cut at zero).
+            memory_limit: bytes that the new samples may take; None takes `vcc.operators.MEMORY_LIMIT`.
+
+        Raises:
+            InputError: more memory needed than allowed, an unknown interpolation or a wrong shape.
+        """
+        from vcc.operators import resampled
+
+        return resampled(self, frame, shape, interpolation, memory_limit)
+
+    def projected(self, sensor: Sensor) -> Image:
+        """The picture on a sensor in this light field's plane: S of the paper, I(u, v) = ∫∫ L ds dt (eq. 5).
+
+        Args:
+            sensor: its z is not looked at: it lies where the light field is.
+        """
+        from vcc.operators import projected
+
+        return projected(self, sensor)
 
     def measured_disparity_range(self) -> tuple[float, float] | None:
         """(lowest, highest) disparity in pixels per view along u, given or else measured from the pictures.

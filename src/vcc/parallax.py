@@ -1,15 +1,15 @@
 """How the pictures of a light field move from view to view, measured from the pictures themselves.
 
-Disparity is in pixels per view: a feature at pixel column k of one view is found at column k − d of the
-next view to the right (rows: of the next view downwards), so that d > 0 is nearer than the plane on which
-the views converge. A light field whose axes are in order shows disparities of the same sign along both
-view axes; `orientation` says where that is not so. (That *both* axes are reversed cannot be seen in this
-way: it looks like the same scene with near and far exchanged.)
+Disparity is in pixels per view: a feature at pixel column k of one view is found at column k − d of
+the next view to the right (rows: of the next view downwards), so that d > 0 is nearer than the
+plane on which the views converge. A light field whose axes are in order shows disparities of the
+same sign along both view axes; `orientation` says where that is not so. (That *both* axes are
+reversed cannot be seen in this way: it looks like the same scene with near and far exchanged.)
 
-The method is a plane sweep: blocks of the central view are compared with its neighbours at every whole
-shift, then, around the best one, with a view several steps away, where the same disparity is a larger
-shift and so is known more finely. Only a few views near the centre are looked at: plenoptic cameras have
-black ones at the corners.
+The method is a plane sweep: blocks of the central view are compared with its neighbours at every
+whole shift, then, around the best one, with a view several steps away, where the same disparity is
+a larger shift and so is known more finely. Only a few views near the centre are looked at:
+plenoptic cameras have black ones at the corners.
 """
 
 from __future__ import annotations
@@ -66,12 +66,13 @@ class Orientation:
     """Whether the view axes of a light field fit its pictures, as parallax shows it.
 
     Args:
-        verdict: "agrees"; "flipped" (one of the two view axes runs the wrong way); "transposed" (rows and
-            columns of views are exchanged); both of these; or "undetermined" (too little parallax or
-            texture, or a single row or column of views).
+        verdict: "agrees"; "flipped" (one of the two view axes runs the wrong way); "transposed"
+            (rows and columns of views are exchanged); both of these; or "undetermined" (too little
+            parallax or texture, or a single row or column of views).
         score: how clear that is, 0 to 1: the weighted majority of the blocks, minus the minority.
-        along_u: median disparity of the blocks from one column of views to the next, pixels per view;
-            measured along the pictures' rows, or along their columns if transposed. None if not known.
+        along_u: median disparity of the blocks from one column of views to the next, pixels per
+            view; measured along the pictures' rows, or along their columns if transposed. None if
+            not known.
         along_v: likewise from one row of views to the next.
     """
 
@@ -106,8 +107,8 @@ def block_disparities(values: NDArray[Any], axis: Axis) -> BlockDisparities:
 def disparity_range(values: NDArray[Any]) -> tuple[float, float] | None:
     """(lowest, highest) disparity that the pictures show along u, pixels per view.
 
-    From the 2nd to the 98th percentile of the trusted blocks. A light field of one column of views is
-    measured along v. See `block_disparities` for the limits.
+    From the 2nd to the 98th percentile of the trusted blocks. A light field of one column of views
+    is measured along v. See `block_disparities` for the limits.
 
     Args:
         values: shape (v, u, t, s) or (v, u, t, s, channels).
@@ -127,9 +128,9 @@ def disparity_range(values: NDArray[Any]) -> tuple[float, float] | None:
 def orientation(values: NDArray[Any]) -> Orientation:
     """Whether both view axes run the way the pictures say.
 
-    The same blocks are followed along both view axes. Transposed views move the picture vertically from
-    column to column: matching along the other axis of the pictures then explains them better. Flipped
-    ones show opposite signs of disparity along the two axes.
+    The same blocks are followed along both view axes. Transposed views move the picture vertically
+    from column to column: matching along the other axis of the pictures then explains them better.
+    Flipped ones show opposite signs of disparity along the two axes.
 
     Args:
         values: shape (v, u, t, s) or (v, u, t, s, channels).
@@ -171,7 +172,9 @@ class _Measured:
 
 
 def _vote_crossed(straight: list[_Measured], crossed: list[_Measured]) -> tuple[bool, float]:
-    """Whether matching along the other picture axis leaves less unexplained, and by what majority."""
+    """Whether matching along the other picture axis leaves less unexplained, and by what
+    majority.
+    """
     left_straight = straight[0].residual + straight[1].residual + 2 * _NOISE**2
     left_crossed = crossed[0].residual + crossed[1].residual + 2 * _NOISE**2
     # A block that fits one way and not the other votes; the weight is how much better it fits.
@@ -217,11 +220,10 @@ def _measure(values: NDArray[Any], axis: Axis, picture_axis: Literal["s", "t"]) 
     sweep = _Sweep(values[row], picture_axis, tops, lefts, size, middle)
     disparity, confidence, residual = sweep.run(reach)
     grid_rows, grid_columns = np.meshgrid(tops, lefts, indexing="ij")
-    half = (size - 1) / 2
-    return _Measured(
-        BlockDisparities(grid_rows.ravel() + half, grid_columns.ravel() + half, disparity, confidence),
-        residual,
-    )
+    half = np.float64(size - 1) / 2
+    rows: NDArray[np.float64] = grid_rows.ravel() + half
+    columns: NDArray[np.float64] = grid_columns.ravel() + half
+    return _Measured(BlockDisparities(rows, columns, disparity, confidence), residual)
 
 
 def _places(length: int, size: int) -> NDArray[np.intp]:
@@ -289,18 +291,18 @@ class _Sweep:
         view = self._views[index]
         band = view[self._band_rows]
         if band.ndim == 2:
-            return band.astype(np.float32)
-        if band.shape[2] == 3:
-            flat: NDArray[np.float32] = band.astype(np.float32) @ _LUMINANCE
-            return flat
-        mean: NDArray[np.float32] = band.mean(axis=2, dtype=np.float32)
-        return mean
+            luminance: NDArray[np.float32] = band.astype(np.float32)
+        elif band.shape[2] == 3:
+            luminance = band.astype(np.float32) @ _LUMINANCE
+        else:
+            luminance = band.mean(axis=2, dtype=np.float32)
+        return luminance
 
     def _band(self, index: int) -> NDArray[np.float32]:
         # The square root is how photon noise becomes even, and shadows count as highlights do.
         if index not in self._bands:
-            raw = np.minimum(self._raw_band(index) / np.float32(self._scale), 4)
-            self._bands[index] = np.sqrt(raw)
+            bounded = np.clip(self._raw_band(index) / np.float32(self._scale), 0, 4)
+            self._bands[index] = np.sqrt(bounded)
         return self._bands[index]
 
     def _cut(self, band: NDArray[np.float32], shift: int) -> NDArray[np.float32]:
@@ -319,8 +321,8 @@ class _Sweep:
         pixels = np.float32(self._size**2)
         # Less the block's mean: views of a real camera are not equally bright (vignetting).
         mean = np.einsum("aibj->ab", difference) / pixels
-        cost = np.einsum("aibj,aibj->ab", difference, difference) / pixels - mean**2
-        cost = np.maximum(cost, 0)
+        cost: NDArray[np.float32] = np.einsum("aibj,aibj->ab", difference, difference) / pixels
+        cost = np.maximum(cost - mean**2, 0)
         starts = self._lefts - shift
         cost[:, (starts < 0) | (starts > self._width - self._size)] = np.inf
         return cost
@@ -355,7 +357,9 @@ class _Sweep:
     def _refine(
         self, step: int, disparity: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Disparity from views ``step`` away, searched around what is known; and what is left over."""
+        """Disparity from views ``step`` away, searched around what is known; and what is left
+        over.
+        """
         start = np.round(disparity * step).astype(int)
         low = int(np.nanmin(start)) - _FINE_REACH
         high = int(np.nanmax(start)) + _FINE_REACH
@@ -373,7 +377,9 @@ class _Sweep:
 
 
 def _lowest(cost: NDArray[np.float32], best: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Where the parabola through the best cost and its two neighbours is lowest, −½ to ½ of a shift."""
+    """Where the parabola through the best cost and its two neighbours is lowest, −½ to ½ of a
+    shift.
+    """
     last = len(cost) - 1
     columns = np.arange(cost.shape[1])
     before = cost[np.maximum(best - 1, 0), columns].astype(np.float64)

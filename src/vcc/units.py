@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 from typing import Any, Final
 
 from vcc.errors import InputError
@@ -25,15 +26,36 @@ ms: Final = 1e-3
 us: Final = 1e-6
 
 
+_UNITS: Final[dict[str, dict[str, float]]] = {
+    "length": {"m": m, "cm": cm, "mm": mm, "um": um, "µm": um, "μm": um, "nm": nm},
+    "angle": {"rad": rad, "mrad": mrad, "deg": deg, "°": deg},
+    "time": {"s": s, "ms": ms, "us": us, "µs": us, "μs": us},
+}
+"""The units read without pint: the factors of this module, so that "48 um" is 48 * um exactly."""
+_WRITTEN: Final[dict[str, tuple[str, ...]]] = {
+    "length": ("m", "mm", "um", "nm"),
+    "angle": ("rad", "mrad", "deg"),
+    "time": ("s", "ms", "us"),
+}
+_SI_NAMES: Final = {"length": "metre", "angle": "radian", "time": "second"}
+_EXAMPLES: Final = {"length": "50 mm", "angle": "2 deg", "time": "10 ms"}
+_QUANTITY: Final = re.compile(
+    r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*(.*)", re.DOTALL
+)
+_UNIT_NAME: Final = re.compile(r"[^\W\d]+|°")
+
+
 @functools.cache
 def _registry() -> Any:
-    import pint  # 0.3 s to import: only those who read camera files pay for it
+    import pint  # 0.3 s to import: only those who write uncommon units pay for it
 
     return pint.UnitRegistry()
 
 
 def parse(text: object, dimension: str, what: str) -> float:
     """The SI value of a quantity written with its unit, such as ``"50 mm"``.
+
+    Units are those of this module and all that pint knows by name (``"2 inch"``, ``"30 arcmin"``).
 
     Args:
         text: the quantity, a string with a number and a unit.
@@ -43,41 +65,80 @@ def parse(text: object, dimension: str, what: str) -> float:
     Raises:
         InputError: not a string, no unit, an unknown unit, or a unit of another dimension.
     """
-    unit, example = {"length": ("metre", "50 mm"), "angle": ("radian", "2 deg"), "time": ("second", "10 ms")}[
-        dimension
-    ]
+    kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
     if not isinstance(text, str):
-        raise InputError(f'{what} is {text!r}: a {dimension} needs a unit, written as text, e.g. "{example}"')
+        raise InputError(
+            f'{what} is {text!r}: {kind} needs a unit, written as text, e.g. "{example}"'
+        )
+    match = _QUANTITY.fullmatch(text.strip())
+    if match is None:
+        raise InputError(f'{what} is "{text}", which is not {kind}; write it like "{example}"')
+    number, unit = float(match[1]), match[2]
+    if not unit:
+        raise InputError(f'{what} is "{text}": {kind} needs a unit, e.g. "{example}"')
+    factor = _UNITS[dimension].get(unit)
+    if factor is None:
+        factor = _factor_by_pint(unit, dimension, f'{what} is "{text}"')
+    return number * factor
+
+
+def _factor_by_pint(unit: str, dimension: str, what: str) -> float:
+    """The factor to SI of a unit that this module does not define itself."""
+    kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
+    if not _UNIT_NAME.fullmatch(unit):  # pint would take it for arithmetic
+        raise InputError(
+            f'{what}, and "{unit}" is not a unit of {dimension}; write {kind} like "{example}"'
+        )
     import pint
 
     try:
-        quantity = _registry().Quantity(text)
-        if quantity.unitless and dimension != "angle" or text.strip().replace(".", "").isdigit():
-            raise InputError(f'{what} is "{text}": a {dimension} needs a unit, e.g. "{example}"')
-        return float(quantity.to(unit).magnitude)
-    except InputError:
-        raise
-    except pint.UndefinedUnitError as error:
-        raise InputError(f'{what} is "{text}": {error}; write a {dimension} like "{example}"') from None
-    except pint.DimensionalityError:
-        raise InputError(f'{what} is "{text}", which is not a {dimension}; write it like "{example}"') from None
-    except Exception as error:  # pint raises many types on text that is not a quantity at all
-        raise InputError(f'{what} is "{text}", which is not a {dimension} ({error}); e.g. "{example}"') from None
+        return float(_registry().Quantity(1.0, unit).to(_SI_NAMES[dimension]).magnitude)
+    except pint.UndefinedUnitError:
+        raise InputError(
+            f'{what}, and "{unit}" is not a known unit; write {kind} like "{example}"'
+        ) from None
+    except pint.PintError:  # another dimension, or a scale with an offset such as degC
+        raise InputError(f'{what}, which is not {kind}; write it like "{example}"') from None
 
 
 def text(value: float, dimension: str = "length") -> str:
     """A value in SI, written with the unit in which it reads best, such as ``"50 mm"``.
 
-    ``parse(text(value, dimension), dimension, "")`` gives the same float back (17 digits where needed).
+    ``parse(text(value, dimension), dimension, "")`` gives the same float back, bit by bit: where
+    15 digits in the best unit do not do it, the shortest way to write it that does is taken.
+
+    Args:
+        value: metres, radians or seconds.
+        dimension: ``"length"``, ``"angle"`` or ``"time"``.
     """
-    steps = {
-        "length": (("m", 1.0), ("mm", 1e-3), ("um", 1e-6), ("nm", 1e-9)),
-        "angle": (("rad", 1.0), ("mrad", 1e-3)),
-        "time": (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)),
-    }[dimension]
+    names = _WRITTEN[dimension]
+    value = float(value)
     if value == 0 or not math.isfinite(value):
-        return f"{value:g} {steps[0][0]}"
-    for name, factor in steps:
-        if abs(value) >= factor * 0.9999999:
-            break
-    return f"{float(f'{value / factor:.15g}'):.15g} {name}"
+        return f"{value:g} {names[0]}"
+    if dimension != "angle":  # among angles the shortest is the one that was meant: 45 deg, 0.2 rad
+        best = _candidate(value, _best_unit(value, names, dimension), dimension, 15)
+        if best is not None:
+            return best
+    candidates = [
+        _candidate(value, name, dimension, digits) for name in names for digits in (15, 17)
+    ]
+    # In SI, the factor is 1 and 17 digits always give the float back.
+    return min((written for written in candidates if written is not None), key=len)
+
+
+def _best_unit(value: float, names: tuple[str, ...], dimension: str) -> str:
+    """The largest unit in which the number is at least 1."""
+    for name in names:
+        if abs(value) >= _UNITS[dimension][name] * 0.9999999:
+            return name
+    return names[-1]
+
+
+def _candidate(value: float, unit: str, dimension: str, digits: int) -> str | None:
+    """The value in a unit with so many digits; None if that would not give the same float back."""
+    number = f"{value / _UNITS[dimension][unit]:.{digits}g}"
+    return f"{number} {unit}" if float(number) * _UNITS[dimension][unit] == value else None
+
+
+def _article(dimension: str) -> str:
+    return "an" if dimension == "angle" else "a"

@@ -24,7 +24,7 @@ from vcc.plan.model import Plan
 
 Progress = Callable[[int, int], None]
 
-BAND = 64
+BAND = 32
 """Rows of the picture that a thread works on at once: their sums stay in the second-level cache."""
 
 
@@ -133,7 +133,7 @@ class _Separable:
         row_step, column_step = plan.row_step / plan.refine, plan.column_step / plan.refine
         self.down = taps(plan.interpolation, start_y, row_step, fine.rows, rows)
         self.across = taps(plan.interpolation, start_x, column_step, fine.columns, columns)
-        self.down_by_three = _padded_to_three(self.down)
+        self.down_shares, self.across_shares = _in_threes(self.down), _in_threes(self.across)
         self.weights = (plan.weights * plan.scale).astype(np.float32)
 
     def add(
@@ -159,29 +159,21 @@ class _Separable:
     ) -> None:
         """Add one block's samples to the raster rows start … start + BAND."""
         stop = min(start + BAND, len(raster))
-        sums = np.empty((stop - start, block.samples.shape[3]), dtype=np.float32)
-        pick = block.tap_rows
-        for a, column in zip(block.tap_columns, block.view_columns, strict=True):
-            weights = self.weights[pick, a]
-            if not weights.any():
-                continue
-            sums[:] = 0
-            if masks is None:
-                kernels.sum_rows(
-                    block.samples, block.view_rows, column, weights,
-                    self.down.first[pick], self.down_by_three[pick], start, stop, sums,
-                )  # fmt: skip
-            else:
-                kernels.sum_masked_rows(
-                    block.samples, block.view_rows, column, weights,
-                    self.down.first[pick], self.down.count[pick], self.down.weights[pick],
-                    masks, self.mask_start, self.mask_rows, self.mask_row[:, pick], self.mask_row_step,
-                    start, stop, sums,
-                )  # fmt: skip
-            kernels.mix_columns(
-                sums, self.across.first[a], self.across.count[a], self.across.weights[a], self.channels,
-                raster[start:stop],
+        rows, columns = block.tap_rows, block.tap_columns
+        first_row, row_shares = self.down.first[rows], self.down_shares[rows]
+        weights = self.weights[np.ix_(rows, columns)]
+        if masks is None:
+            kernels.add_band(
+                block.samples, block.view_rows, block.view_columns, weights, first_row, row_shares,
+                self.across.first[columns], self.across_shares[columns], self.channels, start, stop, raster,
             )  # fmt: skip
+            return
+        (a,), (view_column,) = columns, block.view_columns
+        kernels.add_masked_band(
+            block.samples, block.view_rows, view_column, weights[:, 0], first_row, row_shares,
+            masks, self.mask_start, self.mask_rows, self.mask_row[:, rows], self.mask_row_step,
+            self.across.first[a], self.across_shares[a], self.channels, start, stop, raster,
+        )  # fmt: skip
 
     @property
     def mask_rows(self) -> NDArray[np.int64]:
@@ -224,8 +216,8 @@ class _Separable:
         return out
 
 
-def _padded_to_three(table: Taps) -> NDArray[np.float32]:
-    """The shares with zeros added until their number is a multiple of three, as `sum_rows` wants them."""
+def _in_threes(table: Taps) -> NDArray[np.float32]:
+    """The shares with zeros added until their number is a multiple of three, as the kernels want them."""
     extra = -table.weights.shape[-1] % 3
     return np.pad(table.weights, [(0, 0)] * (table.weights.ndim - 1) + [(0, extra)])
 

@@ -16,17 +16,9 @@ _inlined = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy
 
 
 @_inlined
-def _add_three(line, r0, r1, r2, a, b, c):  # type: ignore[no-untyped-def]
-    for x in range(line.size):
+def _add_three(line, n, r0, r1, r2, a, b, c):  # type: ignore[no-untyped-def]
+    for x in range(n):
         line[x] += a * np.float32(r0[x]) + b * np.float32(r1[x]) + c * np.float32(r2[x])
-
-
-@_inlined
-def _add_six(line, r0, r1, r2, a, b, c, s0, s1, s2, d, e, f):  # type: ignore[no-untyped-def]
-    for x in range(line.size):
-        line[x] += (a * np.float32(r0[x]) + b * np.float32(r1[x]) + c * np.float32(r2[x])) + (
-            d * np.float32(s0[x]) + e * np.float32(s1[x]) + f * np.float32(s2[x])
-        )
 
 
 @_compiled
@@ -35,59 +27,63 @@ def sum_rows(values, view_rows, column, weights, first, shares, start, stop, sum
 
     values: (v, u, t, n), n = columns × channels; view_rows, weights: (taps,); first: (taps, rows);
     shares: (taps, rows, width), width a multiple of 3, zero where a pixel gathers fewer rows.
+
+    Four views are added at a time, row after row: one pass over the line of sums then serves twelve rows of
+    samples, and each view is read as one run of memory.
     """
-    last = values.shape[2] - 1
+    last, n = values.shape[2] - 1, values.shape[3]
     used = np.flatnonzero(weights)
-    width = shares.shape[2]
-    for y in range(start, stop):
-        line = sums[y - start]
-        for t in range(0, width, 3):
-            n = 0
-            while n < used.size:
-                b = used[n]
-                w = weights[b]
-                l0 = min(first[b, y] + t, last)  # beyond the last row the share is zero
-                l1 = min(l0 + 1, last)
-                l2 = min(l0 + 2, last)
-                j = view_rows[b]
-                if n + 1 < used.size:
-                    b2 = used[n + 1]
-                    w2 = weights[b2]
-                    m0 = min(first[b2, y] + t, last)
-                    m1 = min(m0 + 1, last)
-                    m2 = min(m0 + 2, last)
-                    j2 = view_rows[b2]
-                    _add_six(
-                        line,
-                        values[j, column, l0],
-                        values[j, column, l1],
-                        values[j, column, l2],
-                        w * shares[b, y, t],
-                        w * shares[b, y, t + 1],
-                        w * shares[b, y, t + 2],
-                        values[j2, column, m0],
-                        values[j2, column, m1],
-                        values[j2, column, m2],
-                        w2 * shares[b2, y, t],
-                        w2 * shares[b2, y, t + 1],
-                        w2 * shares[b2, y, t + 2],
+    place = np.empty((4, 3), np.int64)
+    share = np.empty((4, 3), np.float32)
+    j = np.empty(4, np.int64)
+    for group in range(0, used.size, 4):
+        for t in range(0, shares.shape[2], 3):
+            for y in range(start, stop):
+                line = sums[y - start]
+                for g in range(4):
+                    b = used[min(group + g, used.size - 1)]
+                    weight = weights[b] if group + g < used.size else np.float32(0)
+                    j[g] = view_rows[b]
+                    for tap in range(3):
+                        place[g, tap] = min(first[b, y] + t + tap, last)  # beyond the last row the share is zero
+                        share[g, tap] = weight * shares[b, y, t + tap]
+                r0, r1, r2 = (
+                    values[j[0], column, place[0, 0]],
+                    values[j[0], column, place[0, 1]],
+                    values[j[0], column, place[0, 2]],
+                )
+                s0, s1, s2 = (
+                    values[j[1], column, place[1, 0]],
+                    values[j[1], column, place[1, 1]],
+                    values[j[1], column, place[1, 2]],
+                )
+                t0, t1, t2 = (
+                    values[j[2], column, place[2, 0]],
+                    values[j[2], column, place[2, 1]],
+                    values[j[2], column, place[2, 2]],
+                )
+                u0, u1, u2 = (
+                    values[j[3], column, place[3, 0]],
+                    values[j[3], column, place[3, 1]],
+                    values[j[3], column, place[3, 2]],
+                )
+                a0, a1, a2 = share[0, 0], share[0, 1], share[0, 2]
+                b0, b1, b2 = share[1, 0], share[1, 1], share[1, 2]
+                c0, c1, c2 = share[2, 0], share[2, 1], share[2, 2]
+                d0, d1, d2 = share[3, 0], share[3, 1], share[3, 2]
+                for x in range(n):
+                    line[x] += (
+                        (a0 * np.float32(r0[x]) + a1 * np.float32(r1[x]) + a2 * np.float32(r2[x]))
+                        + (b0 * np.float32(s0[x]) + b1 * np.float32(s1[x]) + b2 * np.float32(s2[x]))
+                    ) + (
+                        (c0 * np.float32(t0[x]) + c1 * np.float32(t1[x]) + c2 * np.float32(t2[x]))
+                        + (d0 * np.float32(u0[x]) + d1 * np.float32(u1[x]) + d2 * np.float32(u2[x]))
                     )
-                else:
-                    _add_three(
-                        line,
-                        values[j, column, l0],
-                        values[j, column, l1],
-                        values[j, column, l2],
-                        w * shares[b, y, t],
-                        w * shares[b, y, t + 1],
-                        w * shares[b, y, t + 2],
-                    )
-                n += 2
 
 
 @_compiled
 def sum_masked_rows(  # type: ignore[no-untyped-def]
-    values, view_rows, column, weights, first, count, shares, masks, mask_start, mask_rows, row, row_step,
+    values, view_rows, column, weights, first, shares, masks, mask_start, mask_rows, row, row_step,
     start, stop, sums,
 ):  # fmt: skip
     """As `sum_rows`, each sample times its weight from the masks.
@@ -95,50 +91,51 @@ def sum_masked_rows(  # type: ignore[no-untyped-def]
     masks: (all rows of all masks, n), already sampled at the columns of the samples; mask_start, mask_rows:
     (masks,), where each mask's rows begin and how many there are; row: (masks, taps), mask row of sample
     row 0; row_step: (masks,).
+
+    Weighted rows are kept for as long as neighbouring raster rows gather from them: each is made once.
     """
-    n = values.shape[3]
-    product = np.empty(n, np.float32)
+    last, n = values.shape[2] - 1, values.shape[3]
+    width = shares.shape[2]
+    kept = np.empty((width + 1, n), np.float32)
+    kept_row = np.empty(width + 1, np.int64)
+    place = np.empty(width, np.int64)
     for b in range(weights.size):
         if weights[b] == 0:
             continue
-        # Raster rows in the order in which sample rows meet them: both ends of what a row gathers grow.
-        flipped = first[b, stop - 1] < first[b, start]
-        low, high = values.shape[2], 0
+        kept_row[:] = -1
         for y in range(start, stop):
-            if count[b, y] > 0:
-                low = min(low, first[b, y])
-                high = max(high, first[b, y] + count[b, y])
-        begin = 0
-        for l in range(low, high):  # noqa: E741
-            samples = values[view_rows[b], column, l]
-            lit = _weighted_row(samples, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], product)
-            if not lit:
-                continue
-            place = begin
-            while place < stop - start:
-                y = stop - 1 - place if flipped else start + place
-                tap = l - first[b, y]
-                if count[b, y] == 0 or tap >= count[b, y]:
-                    if place == begin:
-                        begin += 1
-                    place += 1
-                    continue
-                if tap < 0:
-                    break
-                share = shares[b, y, tap]
+            lit = False
+            for t in range(width):
+                l = min(first[b, y] + t, last)  # noqa: E741
+                slot = l % (width + 1)
+                place[t] = slot
+                if shares[b, y, t] != 0:
+                    lit = True
+                    if kept_row[slot] != l:
+                        kept_row[slot] = l
+                        samples = values[view_rows[b], column, l]
+                        _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], kept[slot])
+                elif kept_row[slot] == -1:
+                    kept_row[slot] = -2
+                    kept[slot, :] = 0
+            if lit:
                 line = sums[y - start]
-                for x in range(n):
-                    line[x] += share * product[x]
-                place += 1
+                for t in range(0, width, 3):
+                    _add_three(
+                        line, n,
+                        kept[place[t]], kept[place[t + 1]], kept[place[t + 2]],
+                        shares[b, y, t], shares[b, y, t + 1], shares[b, y, t + 2],
+                    )  # fmt: skip
 
 
 @_inlined
-def _weighted_row(samples, masks, mask_start, mask_rows, row, row_step, b, l, weight, product):  # type: ignore[no-untyped-def]  # noqa: E741
-    """product = weight · samples · masks along one row; False where all is dark."""
+def _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weight, product):  # type: ignore[no-untyped-def]  # noqa: E741
+    """product = weight · samples · masks along one row."""
     for mask in range(row_step.size):
         place = row[mask, b] + row_step[mask] * l
         if not (place > -1 and place < mask_rows[mask]):
-            return False
+            product[:] = 0
+            break
         r = int(np.floor(place))
         after = np.float32(place - r)
         before = np.float32(1) - after
@@ -159,56 +156,94 @@ def _weighted_row(samples, masks, mask_start, mask_rows, row, row_step, b, l, we
         else:
             for x in range(product.size):
                 product[x] *= before * upper[x] + after * lower[x]
-    return True
 
 
 @_compiled
 def sample_mask_columns(texture, column, channels, out):  # type: ignore[no-untyped-def]
     """out[r, k·channels + c] = texture[r] at column[k], linearly, zero outside."""
     rows, columns = texture.shape
+    left = np.empty(column.size, np.int64)
+    before = np.zeros(column.size, np.float32)
+    after = np.zeros(column.size, np.float32)
     for k in range(column.size):
-        place = column[k]
-        if not (place > -1 and place < columns):
-            out[:, k * channels : (k + 1) * channels] = 0
-            continue
-        c = int(np.floor(place))
-        after = np.float32(place - c)
-        before = np.float32(1) - after
-        for r in range(rows):
-            value = np.float32(0)
-            if c >= 0:
-                value += before * texture[r, c]
-            if c + 1 < columns:
-                value += after * texture[r, c + 1]
+        # A border of dark columns around the texture, by weights of zero on columns that exist.
+        c = int(np.floor(min(max(column[k], -1.0), float(columns))))
+        left[k] = min(max(c, 0), max(columns - 2, 0))
+        for n in range(2):
+            if 0 <= c + n < columns:
+                share = np.float32(column[k] - c if n else 1 - (column[k] - c))
+                if c + n == left[k]:
+                    before[k] = share
+                else:
+                    after[k] = share
+    for r in range(rows):
+        line = texture[r]
+        for k in range(column.size):
+            value = before[k] * line[left[k]] + after[k] * line[min(left[k] + 1, columns - 1)]
             for n in range(channels):
                 out[r, k * channels + n] = value
 
 
 @_compiled
-def mix_columns(sums, first, count, shares, channels, raster):  # type: ignore[no-untyped-def]
-    """raster[y, x·channels + c] += Σ share · sums[y, k·channels + c] over the samples that reach column x."""
-    columns = first.size
+def mix_columns(sums, first, shares, channels, raster):  # type: ignore[no-untyped-def]
+    """raster[y, x·channels + c] += Σ share · sums[y, k·channels + c] over the samples that reach column x.
+
+    sums must reach ``width`` samples beyond the last one, with zeros; shares: (columns, width), width a
+    multiple of 3.
+    """
+    columns, width = shares.shape
     for y in range(sums.shape[0]):
         line, out = sums[y], raster[y]
-        if channels == 3:
-            for x in range(columns):
-                red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-                k = 3 * first[x]
-                for t in range(count[x]):
-                    share = shares[x, t]
-                    red += share * line[k]
-                    green += share * line[k + 1]
-                    blue += share * line[k + 2]
-                    k += 3
-                out[3 * x] += red
-                out[3 * x + 1] += green
-                out[3 * x + 2] += blue
-        else:
-            for x in range(columns):
-                for t in range(count[x]):
+        for t in range(0, width, 3):
+            if channels == 3:
+                for x in range(columns):
+                    k = 3 * (first[x] + t)
+                    a, b, c = shares[x, t], shares[x, t + 1], shares[x, t + 2]
+                    out[3 * x] += a * line[k] + b * line[k + 3] + c * line[k + 6]
+                    out[3 * x + 1] += a * line[k + 1] + b * line[k + 4] + c * line[k + 7]
+                    out[3 * x + 2] += a * line[k + 2] + b * line[k + 5] + c * line[k + 8]
+            else:
+                for x in range(columns):
                     k = channels * (first[x] + t)
-                    for c in range(channels):
-                        out[channels * x + c] += shares[x, t] * line[k + c]
+                    a, b, c = shares[x, t], shares[x, t + 1], shares[x, t + 2]
+                    for n in range(channels):
+                        out[channels * x + n] += (
+                            a * line[k + n] + b * line[k + channels + n] + c * line[k + 2 * channels + n]
+                        )
+
+
+@_compiled
+def add_band(  # type: ignore[no-untyped-def]
+    values, view_rows, view_columns, weights, first_row, row_shares, first_column, column_shares, channels,
+    start, stop, raster,
+):  # fmt: skip
+    """Add all views to raster rows start … stop, column of views by column of views.
+
+    weights: (rows of taps, columns of taps); first_row: (rows of taps, raster rows); first_column: (columns
+    of taps, raster columns); shares with one axis more; raster: (rows, columns × channels).
+    """
+    n = values.shape[3]
+    sums = np.empty((stop - start, n + column_shares.shape[2] * channels), np.float32)
+    for a in range(view_columns.size):
+        if not weights[:, a].any():
+            continue
+        sums[:] = 0
+        sum_rows(values, view_rows, view_columns[a], weights[:, a], first_row, row_shares, start, stop, sums)
+        mix_columns(sums, first_column[a], column_shares[a], channels, raster[start:stop])
+
+
+@_compiled
+def add_masked_band(  # type: ignore[no-untyped-def]
+    values, view_rows, column, weights, first_row, row_shares, masks, mask_start, mask_rows, row, row_step,
+    first_column, column_shares, channels, start, stop, raster,
+):  # fmt: skip
+    """As `add_band` for one column of views, each sample times its weight from the masks."""
+    sums = np.zeros((stop - start, values.shape[3] + column_shares.shape[1] * channels), np.float32)
+    sum_masked_rows(
+        values, view_rows, column, weights, first_row, row_shares, masks, mask_start, mask_rows, row, row_step,
+        start, stop, sums,
+    )  # fmt: skip
+    mix_columns(sums, first_column, column_shares, channels, raster[start:stop])
 
 
 @_inlined

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.engines.smear import finish
 from vcc.plan.footprint import refinement_matrix, shares
-from vcc.plan.model import MaskLookup, Plan
+from vcc.plan.model import Plan
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def run(plan: Plan, values: NDArray[Any], progress: Callable[[int, int], None] |
         flux, k, l = _samples_of(plan, view.reshape(*view.shape[:2], *channels))  # noqa: E741
         flux = flux * plan.weights[b, a]
         for mask in plan.masks:
-            flux = flux * _mask_weights(mask, b, a, k, l)[..., None]
+            flux = flux * mask.weights(b, a, k, l)[..., None]
         _spread(plan, raster, flux, b, a, k, l)
     if progress is not None:
         progress(total, total)
@@ -54,20 +54,6 @@ def _samples_of(plan: Plan, view: Array) -> tuple[Array, Array, Array]:
     k = first_k + np.arange(fine.shape[1]) / plan.refine
     l = first_l + np.arange(fine.shape[0]) / plan.refine  # noqa: E741
     return fine, k, l
-
-
-def _mask_weights(mask: MaskLookup, b: int, a: int, k: Array, l: Array) -> Array:  # noqa: E741
-    """T at each sample (l, k): linear interpolation in the texture, zero outside."""
-    column = mask.column[b, a] + mask.step[0, 0] * k[None, :] + mask.step[0, 1] * l[:, None]
-    row = mask.row[b, a] + mask.step[1, 0] * k[None, :] + mask.step[1, 1] * l[:, None]
-    rows, columns = mask.texture.shape
-    padded = np.pad(mask.texture.astype(np.float64), 1)
-    column, row = np.clip(column + 1, 0, columns), np.clip(row + 1, 0, rows)
-    c, r = np.floor(column).astype(int), np.floor(row).astype(int)
-    fc, fr = column - c, row - r
-    above = padded[r, c] * (1 - fc) + padded[r, c + 1] * fc
-    below = padded[r + 1, c] * (1 - fc) + padded[r + 1, c + 1] * fc
-    return np.asarray(above * (1 - fr) + below * fr)
 
 
 def _spread(plan: Plan, raster: Array, flux: Array, b: int, a: int, k: Array, l: Array) -> None:  # noqa: E741

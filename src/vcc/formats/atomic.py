@@ -22,7 +22,8 @@ def atomic_path(path: str | PathLike[str]) -> Iterator[Path]:
             temporary.write_bytes(data)
 
     If the block fails, nothing is left behind and an older file of that name stays as it was. The
-    temporary file is in the same folder (a rename across disks is not atomic) and has the same ending.
+    temporary file is in the same folder (a rename across disks is not atomic) and has the same
+    ending.
 
     Raises:
         InputError: the folder does not exist or cannot be written to, ``path`` is a folder, or the

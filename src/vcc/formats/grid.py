@@ -13,12 +13,17 @@ from vcc.units import mm
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr")
 """The endings of the files that views may be stored in."""
 
+DEFAULT_SPACING = 1 * mm
+"""The view spacing taken where nothing states one, metres."""
+
 _NAMED_AT_MOST = 12
 
 
 @dataclass(frozen=True)
 class Place:
-    """A view as a file name or list gives it: its numbers, whatever they count from, and its file."""
+    """A view as a file name or list gives it: its numbers, whatever they count from, and its
+    file.
+    """
 
     row: int
     column: int
@@ -35,8 +40,8 @@ class Geometry:
         slope_per_pixel: pixel pitch over focal length.
         focus_distance: where the views converge, metres; infinite if parallel.
         disparity_range: (lowest, highest), pixels per view.
-        directions: (+1 or −1 along rows of views, likewise columns): whether the stated camera position
-            grows from one to the next.
+        directions: (+1 or −1 along rows of views, likewise columns): whether the stated camera
+            position grows from one to the next.
         picture_shape: (rows, columns) that the pictures must have.
     """
 
@@ -85,7 +90,8 @@ def arrange(
 ) -> tuple[tuple[Path, ...], ...]:
     """Files as files[row][column], every place of the grid filled once.
 
-    Rows and columns may be counted from any number and in any even step (0, 1, 2 …; 9 … 17; 0, 2, 4 …).
+    Rows and columns may be counted from any number and in any even step (0, 1, 2 …; 9 … 17; 0, 2, 4
+    …).
 
     Args:
         places: the views that there are.
@@ -125,7 +131,8 @@ def _refuse_extra(
     extra = [where for where in at if where[0] not in rows or where[1] not in columns]
     if extra:
         raise InputError(
-            f"{folder} has {len(extra)} views outside its grid of {len(rows)}×{len(columns)} views, "
+            f"{folder} has {len(extra)} views outside its grid of {len(rows)}×{len(columns)} "
+            "views, "
             f"for instance {at[extra[0]].name} at (row {extra[0][0]}, column {extra[0][1]}). "
             "Move them away or correct the size of the grid"
         )
@@ -153,12 +160,3 @@ def _refuse_missing(
         f"{count} are missing, by (row, column): {named}. Incomplete grids cannot be opened yet: "
         "add the missing files, or move a smaller complete grid of them to a folder of its own"
     )
-
-
-def assumed(value: float | None, default: float) -> float:
-    """The value, or the default where there is none."""
-    return default if value is None else value
-
-
-DEFAULT_SPACING = 1 * mm
-"""The view spacing taken where nothing states one, metres."""

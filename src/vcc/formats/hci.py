@@ -1,4 +1,6 @@
-"""The 4D light-field benchmark of HCI (Honauer et al. 2016): ``input_CamNNN.png`` and ``parameters.cfg``."""
+"""The 4D light-field benchmark of HCI (Honauer et al. 2016): ``input_CamNNN.png`` and
+``parameters.cfg``.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +19,14 @@ _NAME = re.compile(r"input_Cam(\d+)", re.IGNORECASE)
 
 
 def find(folder: Path) -> ViewGrid | None:
-    """The grid of the folder's ``input_CamNNN`` pictures, NNN = row × columns + column; None without any.
+    """The grid of the folder's ``input_CamNNN`` pictures, NNN = row × columns + column; None
+    without any.
 
     ``parameters.cfg`` states the grid and the cameras. Without it the grid must be square.
 
     Raises:
-        InputError: a ``parameters.cfg`` that cannot be understood, a number of views that is no square
-            (without one), or a grid that `vcc.formats.grid.arrange` refuses.
+        InputError: a ``parameters.cfg`` that cannot be understood, a number of views that is no
+            square (without one), or a grid that `vcc.formats.grid.arrange` refuses.
     """
     numbered = {
         file: int(match[1]) for file in pictures_in(folder) if (match := _NAME.fullmatch(file.stem))
@@ -69,7 +72,9 @@ def read_geometry(folder: Path) -> Geometry | None:
     def positive(section: str, key: str) -> float:
         value = _number(settings, section, key, folder)
         if not value > 0:
-            raise InputError(f"{folder / PARAMETERS}: {key} is {value:g}, and must be greater than 0")
+            raise InputError(
+                f"{folder / PARAMETERS}: {key} is {value:g}, and must be greater than 0"
+            )
         return value
 
     width = positive("intrinsics", "image_resolution_x_px")
@@ -79,7 +84,9 @@ def read_geometry(folder: Path) -> Geometry | None:
     focal_length = positive("intrinsics", "focal_length_mm") * mm
     focus = _number(settings, "extrinsics", "focus_distance_m", folder)
     if focus < 0:
-        raise InputError(f"{folder / PARAMETERS}: focus_distance_m is {focus:g}, and must be 0 or more")
+        raise InputError(
+            f"{folder / PARAMETERS}: focus_distance_m is {focus:g}, and must be 0 or more"
+        )
     low = _number(settings, "meta", "disp_min", folder, needed=False)
     high = _number(settings, "meta", "disp_max", folder, needed=False)
     return Geometry(
@@ -118,7 +125,9 @@ def _number(
     if text is None:
         if not needed:
             return math.nan
-        raise InputError(f"{folder / PARAMETERS} does not state {key} in its section [{section}]. Add it")
+        raise InputError(
+            f"{folder / PARAMETERS} does not state {key} in its section [{section}]. Add it"
+        )
     try:
         value = float(text)
     except ValueError:
@@ -135,7 +144,8 @@ def _square(numbers: list[int], folder: Path) -> tuple[int, int]:
         side = math.isqrt(max(numbers) + 1)
         if side * side != max(numbers) + 1:
             raise InputError(
-                f"{folder} holds {len(numbers)} views input_CamNNN, which is not a square grid, and no "
+                f"{folder} holds {len(numbers)} views input_CamNNN, which is not a square grid, "
+                "and no "
                 f"{PARAMETERS} that states num_cams_x and num_cams_y. Add that file or a views.csv"
             )
     return side, side

@@ -1,4 +1,6 @@
-"""Single pictures: reading what is stored in a file, and writing an image for people or for programs."""
+"""Single pictures: reading what is stored in a file, and writing an image for people or for
+programs.
+"""
 
 from __future__ import annotations
 
@@ -34,16 +36,17 @@ def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
 
     PNG and JPEG of 8 bits and PNG of 16, TIFF, BMP, OpenEXR, and NumPy's .npy. Palettes become the
     colours that they stand for, and PNGs of 1, 2 or 4 bits are widened to 8 (1-bit: 0 and 255). A
-    channel of opacity (alpha) that is opaque everywhere is dropped; any other is refused, because what
-    lies behind is not known. OpenEXR gives the channels R, G, B, or the only one that there is.
+    channel of opacity (alpha) that is opaque everywhere is dropped; any other is refused, because
+    what lies behind is not known. OpenEXR gives the channels R, G, B, or the only one that there
+    is.
 
     Returns:
-        The samples, shape (rows, columns) or (rows, columns, channels), uint8, uint16 or float32, and
-        their number of bits: 8, 16 or 32.
+        The samples, shape (rows, columns) or (rows, columns, channels), uint8, uint16 or float32,
+        and their number of bits: 8, 16 or 32.
 
     Raises:
-        InputError: no such file, an ending that is not known, a truncated or damaged file, a picture
-            that is not of one of these types, or one that is not opaque.
+        InputError: no such file, an ending that is not known, a truncated or damaged file, a
+            picture that is not of one of these types, or one that is not opaque.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -69,23 +72,22 @@ def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
 def read_grey(path: str | PathLike[str]) -> NDArray[np.float64]:
     """A mask file as transmission: the mean of the channels, 0 to 1, shape (rows, columns).
 
-    A mask's file states how much light passes, so its samples are taken as they are, *not* as sRGB: an
-    8-bit 128 is a transmission of 128/255 = 0.502. Integers are fractions of full scale; floating-point
-    values are the transmission itself.
+    A mask's file states how much light passes, so its samples are taken as they are, *not* as sRGB:
+    an 8-bit 128 is a transmission of 128/255 = 0.502. Integers are fractions of full scale;
+    floating-point values are the transmission itself.
 
     Raises:
         InputError: what `read_picture` refuses, or a floating-point value outside 0…1.
     """
     samples, bits = read_picture(path)
-    values = samples.astype(np.float64)
-    if samples.ndim == 3:
+    values = samples.astype(np.float64) / (2**bits - 1 if bits < 32 else 1)
+    if values.ndim == 3:
         values = values.mean(axis=2)
-    if bits < 32:
-        return values / (2**bits - 1)
     low, high = float(values.min()), float(values.max())
     if not (low >= 0 and high <= 1):
         raise InputError(
-            f"{path} holds values from {low:g} to {high:g}: a transmission is between 0 and 1. Scale it"
+            f"{path} holds values from {low:g} to {high:g}: a transmission is between 0 and 1. "
+            "Scale it"
         )
     return values
 
@@ -96,9 +98,10 @@ class SavedPicture:
 
     Args:
         path: the file.
-        exposure: the factor between the image's values and what was stored (before the sRGB curve); pass
-            it to `save_image` for another picture, and the two can be compared.
-        clipped: the share of the pixels, 0 to 1, in which a channel was brighter than the file can hold.
+        exposure: the factor between the image's values and what was stored (before the sRGB curve);
+            pass it to `save_image` for another picture, and the two can be compared.
+        clipped: the share of the pixels, 0 to 1, in which a channel was brighter than the file can
+            hold.
         description: one line for people.
     """
 
@@ -128,26 +131,29 @@ def save_image(
     Args:
         image: what to write; its values may be of any array library.
         path: where to.
-        exposure: the factor that brings the image's values to the range 0…1 of an sRGB file. "auto" takes
-            1 over the 99.5th percentile of the luminance: the brightest 0.5 % of the pixels may clip. It is
-            returned, so that a second picture can be written with the same.
-        upright: turn a real image (which lies upside down on the sensor) so that people see it upright.
+        exposure: the factor that brings the image's values to the range 0…1 of an sRGB file. "auto"
+            takes 1 over the 99.5th percentile of the luminance: the brightest 0.5 % of the pixels
+            may clip. It is returned, so that a second picture can be written with the same.
+        upright: turn a real image (which lies upside down on the sensor) so that people see it
+            upright.
         bits: bits per sample for PNG and TIFF.
 
     Returns:
-        The path, the exposure used, the share of clipped pixels, and all that in words. The file appears
-        whole or not at all.
+        The path, the exposure used, the share of clipped pixels, and all that in words. The file
+        appears whole or not at all.
 
     Raises:
-        InputError: an unknown ending, a folder that does not exist or cannot be written to, an exposure
-            that is not a finite number above 0 (or not 1, for .exr and .npy), bits that the format does not
-            have, values that are not finite, or a number of channels that the format cannot show.
+        InputError: an unknown ending, a folder that does not exist or cannot be written to, an
+            exposure that is not a finite number above 0 (or not 1, for .exr and .npy), bits that
+            the format does not have, values that are not finite, or a number of channels that the
+            format cannot show.
     """
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in WRITE_ENDINGS:
         raise InputError(
-            f'a picture cannot be written as "{path.name}": end the name in {", ".join(WRITE_ENDINGS)}'
+            f'a picture cannot be written as "{path.name}": end the name in '
+            f"{', '.join(WRITE_ENDINGS)}"
         )
     values = (image.upright() if upright else image).to_numpy()
     if values.ndim == 3 and values.shape[2] == 1:
@@ -158,7 +164,8 @@ def save_image(
 
 
 def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
-    """The exposure that "auto" stands for: 1 over the 99.5th percentile of the luminance (1 if black).
+    """The exposure that "auto" stands for: 1 over the 99.5th percentile of the luminance (1 if
+    black).
 
     Args:
         values: linear, shape (rows, columns) or (rows, columns, 3).
@@ -179,7 +186,8 @@ def _save_linear(
 ) -> SavedPicture:
     if exposure not in ("auto", 1):
         raise InputError(
-            f"exposure={exposure} has no place in {path.name}: {ending} files hold the values untouched. "
+            f"exposure={exposure} has no place in {path.name}: {ending} files hold the values "
+            "untouched. "
             "Leave it out, or write a .png or .tif"
         )
     if bits not in (None, 32):
@@ -209,7 +217,8 @@ def _save_display(
         raise InputError(f"{ending} files are written with 8 or 16 bits per sample, not {bits}")
     if values.ndim == 3 and values.shape[2] != 3:
         raise InputError(
-            f"an image of {values.shape[2]} channels cannot be shown as {ending}, which has 1 or 3: "
+            f"an image of {values.shape[2]} channels cannot be shown as {ending}, which has 1 or "
+            "3: "
             "write it as .npy or .exr, or choose channels, e.g. image[..., :3]"
         )
     finite = np.isfinite(values)
@@ -222,7 +231,7 @@ def _save_display(
     automatic = exposure == "auto"
     factor = auto_exposure(values) if automatic else _checked_exposure(exposure)
     exposed = values * np.float32(factor)
-    clipped = _share_beyond(exposed > 1)
+    clipped = _share_beyond(exposed > 1 + 0.5 / (2**bits - 1))  # what rounds to white is not lost
     negative = _share_beyond(exposed < 0)
     codes = transfer.encode(exposed, bits)
     with atomic_path(path) as temporary:
@@ -277,9 +286,7 @@ def _write_exr(values: NDArray[np.float32], path: Path) -> None:
         channels = {"Y": np.ascontiguousarray(values)}
     else:
         names = "RGB" if values.shape[2] == 3 else [f"C{n}" for n in range(values.shape[2])]
-        channels = {
-            name: np.ascontiguousarray(values[..., n]) for n, name in enumerate(names)
-        }
+        channels = {name: np.ascontiguousarray(values[..., n]) for n, name in enumerate(names)}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with OpenEXR.File(header, channels) as file:
         file.write(str(path))
@@ -398,7 +405,8 @@ def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
         samples = samples.astype(np.float32, copy=False)
     if samples.dtype not in (np.uint8, np.uint16, np.float32):
         raise InputError(
-            f"{path} holds samples of type {samples.dtype}; uint8, uint16 and floating point can be read"
+            f"{path} holds samples of type {samples.dtype}; uint8, uint16 and floating point can "
+            "be read"
         )
     if samples.ndim not in (2, 3) or 0 in samples.shape:
         raise InputError(

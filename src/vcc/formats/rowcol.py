@@ -1,4 +1,6 @@
-"""Views whose names end in a row and a column: ``lf_1_1.png``, ``2067_01_09.png``, ``view_r00_c02.jpg``."""
+"""Views whose names end in a row and a column: ``lf_1_1.png``, ``2067_01_09.png``,
+``view_r00_c02.jpg``.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,14 @@ _NAME = re.compile(r"(?P<before>.*?)(?P<row>\d+)(?P<between>[^\d.]{1,8})(?P<colu
 
 
 def find(folder: Path) -> ViewGrid | None:
-    """The grid of the pictures whose names end in two numbers, row then column; None if there are none.
+    """The grid of the pictures whose names end in two numbers, row then column; None if there are
+    none.
 
     Counted from any number and in any even step. Pictures of other names are left alone.
 
     Raises:
-        InputError: several such sets in the folder, or a grid that `vcc.formats.grid.arrange` refuses.
+        InputError: several such sets in the folder, or a grid that `vcc.formats.grid.arrange`
+            refuses.
     """
     sets: dict[str, list[Place]] = defaultdict(list)
     for file in pictures_in(folder):
@@ -32,7 +36,8 @@ def find(folder: Path) -> ViewGrid | None:
     if len(several) > 1:
         named = ", ".join(f'"{name}" ({len(places)} files)' for name, places in several.items())
         raise InputError(
-            f"{folder} holds {len(several)} sets of pictures with a row and a column in their names: {named}. "
+            f"{folder} holds {len(several)} sets of pictures with a row and a column in their "
+            f"names: {named}. "
             "Leave one of them in the folder, or list the views in a views.csv"
         )
     return ViewGrid("names with row and column", arrange(next(iter(several.values())), folder))

@@ -1,4 +1,6 @@
-"""Names of the Stanford light-field archive's gantry: ``out_RR_CC_V_U.png`` (row, column, camera v and u)."""
+"""Names of the Stanford light-field archive's gantry: ``out_RR_CC_V_U.png`` (row, column, camera v
+and u).
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ def find(folder: Path) -> ViewGrid | None:
     """The grid of the pictures that have gantry names; None if there are none.
 
     The names state camera positions without a unit: their ratio is known, and they are taken as
-    millimetres. Whether they grow with row and column tells which axis to suspect if one is flipped.
+    millimetres. Whether they grow with row and column tells which axis to suspect if one is
+    flipped.
 
     Raises:
         InputError: a grid that `vcc.formats.grid.arrange` refuses.

@@ -49,7 +49,8 @@ def from_linear(linear: ArrayLike) -> NDArray[np.float32]:
 
 @functools.cache
 def table(bits: int) -> NDArray[np.float32]:
-    """Linear light, 0 to 1, of each of the 2^bits sRGB code values: 256 or 65536 entries, read-only.
+    """Linear light, 0 to 1, of each of the 2^bits sRGB code values: 256 or 65536 entries,
+    read-only.
 
     Raises:
         InputError: bits other than 8 or 16.
@@ -62,7 +63,8 @@ def table(bits: int) -> NDArray[np.float32]:
 
 
 def decode(samples: NDArray[Any], out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-    """Linear light of stored sRGB samples; floating-point samples are linear already and only copied.
+    """Linear light of stored sRGB samples; floating-point samples are linear already and only
+    copied.
 
     Args:
         samples: uint8, uint16 or floating point, any shape.
@@ -79,24 +81,28 @@ def decode(samples: NDArray[Any], out: NDArray[np.float32] | None = None) -> NDA
     if samples.dtype.kind == "f":
         out[...] = samples
     elif samples.dtype in (np.uint8, np.uint16):
-        # Every code is inside the table, so "clip" changes nothing; it spares NumPy a buffered copy.
+        # Every code is inside the table, so "clip" changes nothing; it spares NumPy a buffered
+        # copy.
         np.take(table(samples.dtype.itemsize * 8), samples, out=out, mode="clip")
     else:
         raise InputError(f"sRGB samples are uint8, uint16 or floating point, not {samples.dtype}")
     return out
 
 
-def encode(linear: NDArray[np.floating[Any]], bits: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
+def encode(linear: NDArray[np.floating[Any]], bits: int) -> NDArray[Any]:
     """Stored sRGB samples of linear light, clipped to 0…1 and rounded.
 
     Args:
         linear: any shape, 1 = full scale.
         bits: 8 or 16.
 
+    Returns:
+        uint8 or uint16, the same shape.
+
     Raises:
         InputError: bits other than 8 or 16.
     """
     if bits not in (8, 16):
         raise InputError(f"stored sRGB samples have 8 or 16 bits, not {bits}")
-    codes = np.rint(from_linear(np.clip(linear, 0, 1)) * (2**bits - 1))
-    return codes.astype(np.uint8) if bits == 8 else codes.astype(np.uint16)
+    codes: NDArray[Any] = np.rint(from_linear(np.clip(linear, 0, 1)) * (2**bits - 1))
+    return codes.astype(f"uint{bits}")

@@ -1,4 +1,6 @@
-"""A list of views, ``views.csv``: header ``row,col,file`` (or ``row,column,file``), a line for each view."""
+"""A list of views, ``views.csv``: header ``row,col,file`` (or ``row,column,file``), a line for
+each view.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ def find(folder: Path) -> ViewGrid | None:
     column_name = "column" if "column" in header else "col"
     if not {"row", column_name, "file"} <= set(header):
         raise InputError(
-            f'{table} has the header "{",".join(header)}"; it needs "row,col,file" (or "row,column,file")'
+            f'{table} has the header "{",".join(header)}"; it needs "row,col,file" (or '
+            '"row,column,file")'
         )
     order = [header.index(name) for name in ("row", column_name, "file")]
     places = [_place(line, order, f"{table}, line {number}") for number, line in numbered[1:]]
@@ -43,7 +46,8 @@ def find(folder: Path) -> ViewGrid | None:
     for place in places:
         if not place.file.is_file():
             raise InputError(
-                f"{table} lists {place.file.name} for (row {place.row}, column {place.column}), and there "
+                f"{table} lists {place.file.name} for (row {place.row}, column {place.column}), "
+                "and there "
                 f"is no such file in {folder}. Add it or correct the list"
             )
     return ViewGrid("list of views (views.csv)", arrange(places, folder))
@@ -55,5 +59,6 @@ def _place(line: list[str], order: list[int], where: str) -> Place:
         return Place(int(row), int(column), Path(file))
     except (IndexError, ValueError):
         raise InputError(
-            f'{where} is "{",".join(line)}"; it needs a whole row number, a whole column number and a file'
+            f'{where} is "{",".join(line)}"; it needs a whole row number, a whole column number '
+            "and a file"
         ) from None

@@ -8,7 +8,6 @@ the masks and the projection become one sum.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,10 +16,10 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.light_field import LightField
-from vcc.patterns import Pattern
 from vcc.plan.footprint import REACH
-from vcc.plan.model import MaskLookup, Plan
+from vcc.plan.model import Plan
 from vcc.plan.parallax_rule import BetweenViews, choose_between_views
+from vcc.plan.planes import Plane, depends_on_view_only, detail_lost, mask_lookup, tap_origin
 
 if TYPE_CHECKING:
     from vcc.camera import Camera
@@ -28,38 +27,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-TEXTURE_POINTS_PER_FOOTPRINT = 6
-"""Weights are looked up linearly between texture points this fine: the error is below 1/6² of a curvature."""
-LARGEST_TEXTURE = 3072
-"""Points a side of a mask texture: 36 MiB."""
 FINE_DETAIL_IN_VIEW = 0.15
 """Share of a mask's variance that may vanish inside the cell of a view before cells are divided."""
 FINE_DETAIL_IN_SAMPLE = 0.01
 """Share of a mask's variance that may vanish inside a sample before samples are divided."""
 LARGEST_REFINEMENT = 8
-
-
-@dataclass(frozen=True, eq=False)
-class Plane:
-    """An absorbing element as the samples meet it: place = at_index · (i, j, k, l) + offset, metres.
-
-    Places are counted from the element's middle, which stands at ``decentre`` on the axis' plane.
-    """
-
-    pattern: Pattern
-    label: str
-    decentre: tuple[float, float]
-    at_index: Array
-    offset: Array
-
-    def view_step(self, motion: Array) -> Array:
-        """2×2: metres moved here per view, a point of the scene being followed."""
-        return np.asarray(self.at_index[:, :2] - self.at_index[:, 2:] @ motion)
-
-    @property
-    def sample_step(self) -> Array:
-        """2×2: metres moved here per sample within a view."""
-        return np.asarray(self.at_index[:, 2:])
 
 
 def compile_plan(
@@ -90,7 +62,7 @@ def compile_plan(
 
     between = choose_between_views(light_field, frame, on_sensor, between_views, scene_distance)
     planes, against_sensor = _absorbing_planes(camera, frame, metres)
-    view_planes = [p for p in planes if _depends_on_view_only(p, samples, between.motion)]
+    view_planes = [p for p in planes if depends_on_view_only(p, samples, between.motion)]
     path_planes = [p for p in planes if p not in view_planes]
 
     divide = _divide_views(planes, between, refine)
@@ -103,7 +75,7 @@ def compile_plan(
     weights = row_share[:, None] * column_share[None, :]
     centre = np.array([(samples[1] - 1) / 2, (samples[0] - 1) / 2])
     for plane in view_planes:
-        place = _tap_origin(plane.at_index, plane.offset, index, shift, between.motion)
+        place = tap_origin(plane.at_index, plane.offset, index, shift, between.motion)
         place = place + plane.sample_step @ centre
         width, height = np.abs(plane.view_step(between.motion)).sum(axis=1) / divide
         weights = weights * plane.pattern.mean(place[..., 0], place[..., 1], width, height)
@@ -111,10 +83,10 @@ def compile_plan(
     keep = np.ix_(used_rows, used_columns)
     index, shift, weights = index[keep], shift[keep], weights[keep]
 
-    tap = _tap_origin(on_sensor, origin, index, shift, between.motion)
+    tap = tap_origin(on_sensor, origin, index, shift, between.motion)
     guard, smear = _smear(between, divide)
     lookups = tuple(
-        _mask_lookup(plane, index, shift, between.motion, samples, divide, fine) for plane in path_planes
+        mask_lookup(plane, index, shift, between.motion, samples, divide, fine) for plane in path_planes
     )
     missing, reason = _missing_rays(view_planes, light_field.shape, samples, weights, tap, step, sensor.shape)
     volume = light_field.sample_volume / light_field.full_scale
@@ -190,13 +162,6 @@ def _absorbing_planes(camera: Camera, frame: Affine, sensor_place: Array) -> tup
     return in_path, against_sensor
 
 
-def _depends_on_view_only(plane: Plane, samples: tuple[int, int], motion: Array) -> bool:
-    """Whether all samples of a view meet the plane in one place, compared with the cell of a view."""
-    cell = np.abs(plane.view_step(motion)).sum(axis=1)
-    travel = np.abs(plane.sample_step) @ np.array([samples[1], samples[0]])
-    return bool((travel <= 0.02 * cell).all())
-
-
 def _tap_places(views: int, divide: int) -> tuple[NDArray[np.int64], Array, Array]:
     """Views read, shifts from them in views, and shares, of the taps along one axis.
 
@@ -208,12 +173,6 @@ def _tap_places(views: int, divide: int) -> tuple[NDArray[np.int64], Array, Arra
     shift = (np.arange(-divide, divide) + 0.5) / divide
     share = (1 - np.abs(shift)) / divide
     return np.repeat(np.arange(views), 2 * divide), np.tile(shift, views), np.tile(share, views)
-
-
-def _tap_origin(at_index: Array, offset: Array, index: Array, shift: Array, motion: Array) -> Array:
-    """Where sample (0, 0) of each tap falls, (rows, columns, 2); shifts follow the scene's parallax."""
-    view_step = at_index[:, :2] - at_index[:, 2:] @ motion
-    return np.asarray(index @ at_index[:, :2].T + shift @ view_step.T + offset)
 
 
 def _used(weights: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -229,67 +188,6 @@ def _smear(between: BetweenViews, divide: int) -> tuple[int, tuple[float, float]
     return (math.ceil(max(smear)) + 1 if any(smear) else 0), smear
 
 
-def _mask_lookup(
-    plane: Plane,
-    index: Array,
-    shift: Array,
-    motion: Array,
-    samples: tuple[int, int],
-    divide: int,
-    fine: int,
-) -> MaskLookup:
-    """The mask averaged over a sample's footprint, as a texture, and where each sample reads it."""
-    place = _tap_origin(plane.at_index, plane.offset, index, shift, motion)
-    step = plane.sample_step
-    view_part = np.abs(plane.view_step(motion)).sum(axis=1) / divide
-    sample_part = np.abs(step).sum(axis=1) / fine
-    # Two boxes in a row spread as one whose width is their root of squares, exact where one is small.
-    footprint = np.hypot(view_part, sample_part)
-    corners = np.array([[k, l] for k in (-2, samples[1] + 1) for l in (-2, samples[0] + 1)]) @ step.T
-    low = (place.reshape(-1, 2)[:, None] + corners).min(axis=(0, 1))
-    high = (place.reshape(-1, 2)[:, None] + corners).max(axis=(0, 1))
-    bound = np.array(plane.pattern.size) / 2 + footprint
-    low, high = np.maximum(low, -bound), np.minimum(high, bound)
-    extent = np.maximum(high - low, 1e-12)
-    spacing = np.maximum(footprint / TEXTURE_POINTS_PER_FOOTPRINT, extent / (LARGEST_TEXTURE - 4))
-    points = np.ceil(extent / spacing).astype(int) + 3
-    start = (low + high) / 2 - (points - 1) / 2 * spacing
-    grid_x = start[0] + np.arange(points[0]) * spacing[0]
-    grid_y = start[1] + np.arange(points[1]) * spacing[1]
-    texture = plane.pattern.mean(grid_x[None, :], grid_y[:, None], footprint[0], footprint[1])
-    return MaskLookup(
-        texture=np.ascontiguousarray(texture, dtype=np.float32),
-        column=(place[..., 0] - start[0]) / spacing[0],
-        row=(place[..., 1] - start[1]) / spacing[1],
-        step=_cleaned_lookup(step / spacing[:, None], samples),
-        label=plane.label,
-    )
-
-
-def _cleaned_lookup(step: Array, samples: tuple[int, int]) -> Array:
-    return np.where(np.abs(step) * max(samples) < 1e-6, 0.0, step)
-
-
-def _detail_lost(plane: Plane, known: Array, added: Array) -> float:
-    """The share of a pattern's variance that averaging over ``added`` takes away after ``known``, metres."""
-    size = np.minimum(np.array(plane.pattern.size), 1.0)
-    if not np.isfinite(plane.pattern.size).all():
-        size = np.full(2, 64 * max(*known, *added))
-    if (added <= 0).all():
-        return 0.0
-    fine = np.maximum(np.maximum(known, added) / 8, size / 512)
-    counts = np.maximum(np.ceil(size / fine).astype(int), 8)
-    x = ((np.arange(counts[0]) + 0.5) / counts[0] - 0.5) * size[0]
-    y = ((np.arange(counts[1]) + 0.5) / counts[1] - 0.5) * size[1]
-    mean = plane.pattern.mean
-    whole = mean(x[None, :], y[:, None], *(size / counts)).var()
-    if whole < 1e-12:
-        return 0.0
-    before = mean(x[None, :], y[:, None], *np.maximum(known, size / counts)).var()
-    after = mean(x[None, :], y[:, None], *np.maximum(np.hypot(known, added), size / counts)).var()
-    return float((before - after) / whole)
-
-
 def _divide_views(planes: list[Plane], between: BetweenViews, refine: int | str) -> int:
     """Into how many parts a view's cell is divided each way, so that fine masks keep their detail.
 
@@ -302,7 +200,7 @@ def _divide_views(planes: list[Plane], between: BetweenViews, refine: int | str)
     for plane in planes:
         cell = np.abs(plane.view_step(between.motion)).sum(axis=1)
         while divide < min(LARGEST_REFINEMENT, max(between.gap_filled)):
-            if _detail_lost(plane, np.zeros(2), cell / divide) < FINE_DETAIL_IN_VIEW:
+            if detail_lost(plane, np.zeros(2), cell / divide) < FINE_DETAIL_IN_VIEW:
                 break
             divide *= 2
     return divide
@@ -323,7 +221,7 @@ def _divide_samples(
         penumbra = np.abs(plane.view_step(between.motion)) @ np.array([shape[1], shape[0]])
         sample = 2 * np.abs(plane.sample_step).sum(axis=1)
         while fine < LARGEST_REFINEMENT:
-            if _detail_lost(plane, penumbra, sample / fine) < FINE_DETAIL_IN_SAMPLE:
+            if detail_lost(plane, penumbra, sample / fine) < FINE_DETAIL_IN_SAMPLE:
                 break
             fine *= 2
     return fine
@@ -387,19 +285,31 @@ def _aperture_outside_views(planes: list[Plane], shape: tuple[int, ...]) -> floa
 def _sensor_outside_views(
     samples: tuple[int, int], weights: Array, tap: Array, step: Array, sensor_shape: tuple[int, int]
 ) -> float:
+    """The share of pixels and open views that meet outside the views' pictures, on a grid of sensor points."""
+    total = weights.sum()
+    if total <= 0:
+        return 1.0
     if abs(np.linalg.det(step)) < 1e-9:
         return 0.0  # every view falls into a point: no pixel asks for a particular sample
+    if not (step[0, 1] or step[1, 0] or np.ptp(tap[..., 0], axis=0).any() or np.ptp(tap[..., 1], axis=1).any()):
+        across = _covered_share(tap[0, :, 0], step[0, 0], samples[1], sensor_shape[1])
+        down = _covered_share(tap[:, 0, 1], step[1, 1], samples[0], sensor_shape[0])
+        return float(1 - down @ weights @ across / total)
     rows = (np.arange(24) + 0.5) / 24 * sensor_shape[0] - 0.5
     columns = (np.arange(24) + 0.5) / 24 * sensor_shape[1] - 0.5
     points = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
     used = weights > 0
-    if not used.any():
-        return 1.0
     index = (points[None] - tap[used][:, None]) @ np.linalg.inv(step).T
     size = np.array([samples[1], samples[0]])
     inside = ((index >= -0.5) & (index <= size - 0.5)).all(axis=-1)
-    share = weights[used] / weights[used].sum()
-    return float(1 - (share[:, None] * inside).sum() / len(points))
+    return float(1 - (weights[used][:, None] * inside).sum() / (total * len(points)))
+
+
+def _covered_share(first: Array, step: float, samples: int, pixels: int) -> Array:
+    """The share of the sensor's extent that each view's picture covers, along one axis."""
+    ends = np.stack([first - step / 2, first + step * (samples - 0.5)])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    return np.clip(np.minimum(high, pixels - 0.5) - np.maximum(low, -0.5), 0, None) / pixels
 
 
 def _notes(

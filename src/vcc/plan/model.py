@@ -38,6 +38,19 @@ class MaskLookup:
     step: Array
     label: str
 
+    def weights(self, b: int, a: int, k: Array, l: Array) -> Array:  # noqa: E741
+        """T at the samples with column indices k and row indices l of view tap (b, a): shape (l, k)."""
+        column = self.column[b, a] + self.step[0, 0] * k[None, :] + self.step[0, 1] * l[:, None]
+        row = self.row[b, a] + self.step[1, 0] * k[None, :] + self.step[1, 1] * l[:, None]
+        rows, columns = self.texture.shape
+        dark_border = np.pad(self.texture.astype(np.float64), 1)
+        column, row = np.clip(column + 1, 0, columns), np.clip(row + 1, 0, rows)
+        c, r = np.floor(column).astype(int), np.floor(row).astype(int)
+        after_c, after_r = column - c, row - r
+        above = dark_border[r, c] * (1 - after_c) + dark_border[r, c + 1] * after_c
+        below = dark_border[r + 1, c] * (1 - after_c) + dark_border[r + 1, c + 1] * after_c
+        return np.asarray(above * (1 - after_r) + below * after_r)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan:

@@ -1,0 +1,158 @@
+"""The paper's operators on a light field itself, for those who want the field and not only the picture.
+
+𝕋 (`LightField.transformed`) is exact and lazy. The others here make new samples: `resampled` puts the field
+on another grid, `masked` is the dot product (·), `projected` the sensor (S). A camera's picture needs none of
+them; they cost what 4-D data cost, so the size is computed first and refused above a limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.patterns import Pattern
+from vcc.plan.planes import Plane, depends_on_view_only, mask_lookup, tap_origin
+from vcc.sampled import LIGHT_FIELD_AXES, to_numpy
+
+if TYPE_CHECKING:
+    from vcc.image import Image
+    from vcc.light_field import LightField
+    from vcc.optics import Mask
+    from vcc.sensor import Sensor
+
+MEMORY_LIMIT = 4 * 2**30
+"""Bytes that an operator may allocate for new samples where the caller sets no limit of their own."""
+
+SPLINE_ORDER = {"nearest": 0, "linear": 1, "cubic": 3}
+
+
+def masked_at(
+    light_field: LightField,
+    planes: list[tuple[Pattern, tuple[float, float], Affine]],
+    memory_limit: int | None = None,
+) -> LightField:
+    """The light field times what patterns at several planes let pass; its own plane and frame stay.
+
+    Args:
+        light_field: at some plane.
+        planes: for each pattern: the pattern, the place (x, y) of its middle in metres, and the map of rays
+            from the light field's plane to the pattern's.
+        memory_limit: bytes; None takes `MEMORY_LIMIT`.
+
+    Raises:
+        InputError: more memory needed than allowed.
+    """
+    if not planes:
+        return light_field
+    check_memory(light_field.shape, memory_limit, "the masked light field")
+    values = to_numpy(light_field.values)
+    result = np.empty(values.shape, dtype=np.float32)
+    tables = [_weight_table(light_field, *plane) for plane in planes]
+    nv, nu, nt, ns = values.shape[:4]
+    k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)  # noqa: E741
+    for j, i in np.ndindex(nv, nu):
+        weight: Any = 1.0 / light_field.full_scale
+        for table in tables:
+            weight = weight * (table[j, i] if isinstance(table, np.ndarray) else table.weights(j, i, k, l))
+        if values.ndim == 5 and np.ndim(weight):
+            weight = weight[..., None]
+        result[j, i] = values[j, i] * weight
+    return light_field.replaced(result)
+
+
+def _weight_table(
+    light_field: LightField, pattern: Pattern, decentre: tuple[float, float], rays: Affine
+) -> Any:
+    """One weight for each view where the pattern tells views apart only, else a lookup for samples."""
+    nv, nu, nt, ns = light_field.shape[:4]
+    place = (rays @ light_field.frame).matrix[:2]
+    plane = Plane(pattern, "pattern", decentre, place[:, :4], place[:, 4] - np.array(decentre))
+    index = np.stack(np.meshgrid(np.arange(float(nu)), np.arange(float(nv))), axis=-1)
+    still = np.zeros((2, 2))
+    if depends_on_view_only(plane, (nt, ns), still):
+        middle = tap_origin(plane.at_index, plane.offset, index, np.zeros_like(index), still)
+        middle = middle + plane.sample_step @ np.array([(ns - 1) / 2, (nt - 1) / 2])
+        width, height = np.abs(plane.view_step(still)).sum(axis=1)
+        return pattern.mean(middle[..., 0], middle[..., 1], width, height)
+    return mask_lookup(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
+
+
+def masked(light_field: LightField, mask: Mask, memory_limit: int | None = None) -> LightField:
+    """The paper's dot product L · K; see `vcc.LightField.masked`."""
+    pattern = mask.faces().pattern
+    assert pattern is not None
+    return masked_at(light_field, [(pattern, mask.decentre, Affine.identity())], memory_limit)
+
+
+def resampled(
+    light_field: LightField,
+    frame: Affine,
+    shape: tuple[int, int, int, int],
+    interpolation: str = "linear",
+    memory_limit: int | None = None,
+) -> LightField:
+    """The light field on another grid; see `vcc.LightField.resampled`."""
+    from scipy.ndimage import affine_transform
+
+    if interpolation not in SPLINE_ORDER:
+        raise InputError(f"interpolation is one of {', '.join(map(repr, SPLINE_ORDER))}, not {interpolation!r}")
+    if len(shape) != 4 or min(shape) < 1:
+        raise InputError(f"a grid has the shape (v, u, t, s), each at least 1, not {shape}")
+    check_memory((*shape, light_field.channels or 1), memory_limit, "the resampled light field")
+    old_from_new = light_field.frame.inverse() @ frame
+    axes = list(np.argsort(LIGHT_FIELD_AXES))
+    matrix, offset = old_from_new.linear[np.ix_(axes, axes)], old_from_new.offset[axes]
+    values = to_numpy(light_field.values)
+    values = values.reshape(*values.shape[:4], -1)
+    result = np.empty((*shape, values.shape[4]), dtype=np.float32)
+    for channel in range(values.shape[4]):
+        samples = values[..., channel].astype(np.float32) / np.float32(light_field.full_scale)
+        result[..., channel] = affine_transform(
+            samples,
+            matrix,
+            offset,
+            output_shape=shape,
+            order=SPLINE_ORDER[interpolation],
+            mode="constant",
+            output=np.float32,
+        )
+    np.maximum(result, 0, out=result)  # a spline may undershoot; radiance does not
+    final: NDArray[np.float32] = result if light_field.channels is not None else result[..., 0]
+    return replace(
+        light_field, values=final, frame=frame, disparity_range=None, _shared_disparity=None, _disparity_factor=1.0
+    )
+
+
+def projected(light_field: LightField, sensor: Sensor) -> Image:
+    """The picture on a sensor that lies in the light field's own plane; see `vcc.LightField.projected`."""
+    from vcc.camera import Camera
+
+    return Camera([], replace(sensor, z=0.0)).capture(light_field)
+
+
+def check_memory(shape: tuple[int, ...], limit: int | None, what: str) -> None:
+    """Refuse to allocate float32 samples of this shape above a limit.
+
+    Raises:
+        InputError: with the bytes needed, the bytes allowed and what to do.
+    """
+    allowed = MEMORY_LIMIT if limit is None else limit
+    needed = 4 * int(np.prod([int(n) for n in shape], dtype=object))
+    if needed > allowed:
+        raise InputError(
+            f"{what} of shape {'×'.join(map(str, shape))} needs {_bytes(needed)}, and {_bytes(allowed)} are "
+            "allowed: work on a piece (lf[:, :, ::4, ::4]), choose a coarser grid, or pass memory_limit= in bytes"
+        )
+
+
+def _bytes(number: float) -> str:
+    for unit in ("bytes", "KiB", "MiB"):
+        if number < 1024:
+            return f"{number:.4g} {unit}"
+        number /= 1024
+    return f"{number:.4g} GiB"

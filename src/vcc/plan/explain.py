@@ -1,0 +1,163 @@
+"""A plan in words: what was folded, what was pulled to the sensor, which sampling was chosen, what it costs."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vcc.light_field import LightField, describe_geometry, to_dtype
+from vcc.plan.model import Plan
+from vcc.units import text
+
+if TYPE_CHECKING:
+    from vcc.camera import Camera
+
+
+class Explanation(str):
+    """Text that shows itself plainly in a notebook or at the prompt."""
+
+    __slots__ = ("expected_seconds", "plan")
+    plan: Plan
+    expected_seconds: float | None
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def explain(camera: Camera, light_field: LightField, **options: Any) -> Explanation:
+    """The plan of a camera for a light field in words; see `vcc.Camera.explain`.
+
+    The time is foretold by running a slice of the plan on the light field and scaling it up.
+    """
+    engine = options.pop("engine", None)
+    options.pop("progress", None)
+    plan = camera.compile(light_field, **options)
+    seconds = expected_seconds(plan, light_field, engine)
+    result = Explanation(
+        "\n\n".join(
+            [
+                _what(camera, light_field),
+                "How the picture is made\n" + "\n".join(f"  {note}" for note in plan.notes),
+                _sampling(plan),
+                _cost(plan, light_field, seconds),
+                _warnings(plan),
+            ]
+        )
+    )
+    result.plan, result.expected_seconds = plan, seconds
+    return result
+
+
+def _what(camera: Camera, light_field: LightField) -> str:
+    nv, nu, nt, ns = light_field.shape[:4]
+    lines = [
+        f"Light field: {nv}×{nu} views of {nt}×{ns} pixels, "
+        f"{light_field.channels or 1} channel{'s' if (light_field.channels or 1) > 1 else ''}, "
+        f"{to_dtype(light_field.values)}; {describe_geometry(light_field)}"
+    ]
+    lines += [
+        f"  z = {text(element.z):>9}  {element.kind}"
+        + (f' "{element.name}"' if element.name else "")
+        + (f", {element.described()}" if element.described() else "")
+        for element in camera.elements
+    ]
+    rows, columns = camera.sensor.shape
+    vertical, horizontal = camera.sensor.pitches
+    pitch = text(vertical) if vertical == horizontal else f"{text(vertical)} × {text(horizontal)}"
+    lines.append(f"  z = {text(camera.sensor.z):>9}  sensor, {rows}×{columns} pixels of {pitch}")
+    return "\n".join(lines)
+
+
+def _sampling(plan: Plan) -> str:
+    step = max(abs(plan.row_step), abs(plan.column_step))
+    relation = (
+        "the sensor is no finer than the samples' footprints: shares laid out forward, by sample"
+        if plan.direction == "forward"
+        else "the sensor is finer than the samples' footprints: shares laid out backward, by pixel"
+    )
+    lines = [
+        f"  a step from sample to sample is {step:.3g} pixels on the sensor; {relation}",
+        f"  interpolation within a view: {plan.interpolation}"
+        + ("" if plan.separable else "; the frame shears the pixel grid, which takes the slower general path"),
+    ]
+    if any(plan.smear):
+        lines.append(
+            f"  gaps between views closed by a tent of {plan.smear[0]:.3g} × {plan.smear[1]:.3g} pixels half width"
+        )
+    return "Sampling\n" + "\n".join(lines)
+
+
+def _cost(plan: Plan, light_field: LightField, seconds: float | None) -> str:
+    views = len(np.unique(plan.view_rows)) * len(np.unique(plan.view_columns))
+    view_bytes = np.prod(light_field.shape[2:]) * to_dtype(light_field.values).itemsize
+    lines = [
+        f"  {plan.taps_used} view taps, {plan.samples_touched * (light_field.channels or 1) / 1e6:.0f} million "
+        "sample values",
+        f"  {min(views, plan.taps_used) * view_bytes / 1e6:.0f} MB of the light field read",
+        f"  about {expected_memory(plan, light_field) / 1e6:.0f} MB of memory beside it",
+    ]
+    if seconds is not None:
+        lines.append(f"  about {seconds:.2g} s expected (a slice was timed on this machine)")
+    return "Cost\n" + "\n".join(lines)
+
+
+def _warnings(plan: Plan) -> str:
+    lines = []
+    if plan.missing_rays > 1e-3:
+        lines.append(f"  {plan.missing_rays:.1%} of the rays asked for are missing: {plan.missing_reason}")
+    if plan.expected_ghosting > 1.5 * max(1.0, abs(plan.row_step)):
+        lines.append(
+            f"  ghosting: views' pictures of some depths stay {plan.expected_ghosting:.2g} pixels apart; "
+            "the light field has too few views for this defocus"
+        )
+    return "Warnings\n" + ("\n".join(lines) if lines else "  none")
+
+
+def expected_memory(plan: Plan, light_field: LightField) -> int:
+    """Bytes that a run of the plan takes beside the light field and the picture, estimated."""
+    import os
+
+    from vcc.engines.numba_cpu import BAND
+
+    channels = light_field.channels or 1
+    line = 4 * channels * plan.samples[1] * plan.refine
+    raster = 4 * channels * plan.raster_shape[0] * plan.raster_shape[1]
+    bands = (os.cpu_count() or 1) * BAND * line
+    textures = sum(mask.texture.nbytes + len(mask.texture) * line for mask in plan.masks)
+    views = 3 * plan.samples[0] * plan.refine * line if plan.refine > 1 else 0
+    return int(2 * raster + bands + textures + views)
+
+
+def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) -> float | None:
+    """How long a run of the plan will take: some columns of view taps are run and timed, then scaled up.
+
+    None where the samples cannot be run (an array under a tracer).
+    """
+    from vcc.engines import run_plan
+
+    total = plan.taps_used
+    if total == 0:
+        return 0.0
+    used = np.count_nonzero(plan.weights, axis=0)
+    order = np.argsort(-used)
+    columns = np.sort(order[: max(1, len(used) // 16)])
+    piece = replace(
+        plan,
+        view_columns=plan.view_columns[columns],
+        weights=plan.weights[:, columns],
+        x=plan.x[:, columns],
+        y=plan.y[:, columns],
+        masks=tuple(replace(m, column=m.column[:, columns], row=m.row[:, columns]) for m in plan.masks),
+    )
+    timings = []
+    try:
+        for _ in range(3):  # the first run may compile
+            start = time.perf_counter()
+            run_plan(piece, light_field.values, engine=engine)
+            timings.append(time.perf_counter() - start)
+    except Exception:  # an array under a tracer has no values to run
+        return None
+    return min(timings) * total / piece.taps_used

@@ -1,0 +1,115 @@
+"""Absorbing elements as the samples of a light field meet them: where, over what footprint, with what weight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.patterns import Pattern
+from vcc.plan.model import MaskLookup
+
+Array = NDArray[np.float64]
+
+TEXTURE_POINTS_PER_FOOTPRINT = 6
+"""Weights are looked up linearly between texture points this fine: the error is below 1/6² of a curvature."""
+LARGEST_TEXTURE = 3072
+"""Points a side of a mask texture: 36 MiB."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """An absorbing element as the samples meet it: place = at_index · (i, j, k, l) + offset, metres.
+
+    Places are counted from the element's middle, which stands at ``decentre`` on the axis' plane.
+    """
+
+    pattern: Pattern
+    label: str
+    decentre: tuple[float, float]
+    at_index: Array
+    offset: Array
+
+    def view_step(self, motion: Array) -> Array:
+        """2×2: metres moved here per view, a point of the scene being followed."""
+        return np.asarray(self.at_index[:, :2] - self.at_index[:, 2:] @ motion)
+
+    @property
+    def sample_step(self) -> Array:
+        """2×2: metres moved here per sample within a view."""
+        return np.asarray(self.at_index[:, 2:])
+
+
+def depends_on_view_only(plane: Plane, samples: tuple[int, int], motion: Array) -> bool:
+    """Whether all samples of a view meet the plane in one place, compared with the cell of a view."""
+    cell = np.abs(plane.view_step(motion)).sum(axis=1)
+    travel = np.abs(plane.sample_step) @ np.array([samples[1], samples[0]])
+    return bool((travel <= 0.02 * cell).all())
+
+
+def tap_origin(at_index: Array, offset: Array, index: Array, shift: Array, motion: Array) -> Array:
+    """Where sample (0, 0) of each tap falls, (rows, columns, 2); shifts follow the scene's parallax."""
+    view_step = at_index[:, :2] - at_index[:, 2:] @ motion
+    return np.asarray(index @ at_index[:, :2].T + shift @ view_step.T + offset)
+
+
+def mask_lookup(
+    plane: Plane,
+    index: Array,
+    shift: Array,
+    motion: Array,
+    samples: tuple[int, int],
+    divide: int,
+    fine: int,
+) -> MaskLookup:
+    """The mask averaged over a sample's footprint, as a texture, and where each sample reads it."""
+    place = tap_origin(plane.at_index, plane.offset, index, shift, motion)
+    step = plane.sample_step
+    view_part = np.abs(plane.view_step(motion)).sum(axis=1) / divide
+    sample_part = np.abs(step).sum(axis=1) / fine
+    # Two boxes in a row spread as one whose width is their root of squares, exact where one is small.
+    footprint = np.hypot(view_part, sample_part)
+    corners = np.array([[k, l] for k in (-2, samples[1] + 1) for l in (-2, samples[0] + 1)]) @ step.T
+    low = (place.reshape(-1, 2)[:, None] + corners).min(axis=(0, 1))
+    high = (place.reshape(-1, 2)[:, None] + corners).max(axis=(0, 1))
+    bound = np.array(plane.pattern.size) / 2 + footprint
+    low, high = np.maximum(low, -bound), np.minimum(high, bound)
+    extent = np.maximum(high - low, 1e-12)
+    spacing = np.maximum(footprint / TEXTURE_POINTS_PER_FOOTPRINT, extent / (LARGEST_TEXTURE - 4))
+    points = np.ceil(extent / spacing).astype(int) + 3
+    start = (low + high) / 2 - (points - 1) / 2 * spacing
+    grid_x = start[0] + np.arange(points[0]) * spacing[0]
+    grid_y = start[1] + np.arange(points[1]) * spacing[1]
+    texture = plane.pattern.mean(grid_x[None, :], grid_y[:, None], footprint[0], footprint[1])
+    return MaskLookup(
+        texture=np.ascontiguousarray(texture, dtype=np.float32),
+        column=(place[..., 0] - start[0]) / spacing[0],
+        row=(place[..., 1] - start[1]) / spacing[1],
+        step=_cleaned_lookup(step / spacing[:, None], samples),
+        label=plane.label,
+    )
+
+
+def _cleaned_lookup(step: Array, samples: tuple[int, int]) -> Array:
+    return np.where(np.abs(step) * max(samples) < 1e-6, 0.0, step)
+
+
+def detail_lost(plane: Plane, known: Array, added: Array) -> float:
+    """The share of a pattern's variance that averaging over ``added`` takes away after ``known``, metres."""
+    size = np.minimum(np.array(plane.pattern.size), 1.0)
+    if not np.isfinite(plane.pattern.size).all():
+        size = np.full(2, 64 * max(*known, *added))
+    if (added <= 0).all():
+        return 0.0
+    fine = np.maximum(np.maximum(known, added) / 8, size / 512)
+    counts = np.maximum(np.ceil(size / fine).astype(int), 8)
+    x = ((np.arange(counts[0]) + 0.5) / counts[0] - 0.5) * size[0]
+    y = ((np.arange(counts[1]) + 0.5) / counts[1] - 0.5) * size[1]
+    mean = plane.pattern.mean
+    whole = mean(x[None, :], y[:, None], *(size / counts)).var()
+    if whole < 1e-12:
+        return 0.0
+    before = mean(x[None, :], y[:, None], *np.maximum(known, size / counts)).var()
+    after = mean(x[None, :], y[:, None], *np.maximum(np.hypot(known, added), size / counts)).var()
+    return float((before - after) / whole)

@@ -1,0 +1,110 @@
+"""Quantities with units: what is read, what is refused, and that writing is exact."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+
+from vcc import InputError
+from vcc.units import deg, mm, parse, text, um
+
+
+@pytest.mark.parametrize(
+    ("written", "dimension", "value"),
+    [
+        ("50 mm", "length", 50 * mm),
+        ("48um", "length", 48 * um),
+        ("48 µm", "length", 48 * um),
+        ("48 μm", "length", 48 * um),
+        (" -1.5e1 cm ", "length", -0.15),
+        (".5 m", "length", 0.5),
+        ("inf m", "length", math.inf),
+        ("2 inch", "length", 0.0508),
+        ("3 millimetres", "length", 3 * mm),
+        ("2 deg", "angle", 2 * deg),
+        ("2°", "angle", 2 * deg),
+        ("60 arcmin", "angle", 1 * deg),
+        ("10 ms", "time", 0.01),
+        ("1 minute", "time", 60),
+    ],
+)
+def test_reads_a_quantity(written, dimension, value):
+    assert parse(written, dimension, "it") == pytest.approx(value, rel=1e-15)
+
+
+def test_common_units_are_read_as_code_writes_them():
+    for number in range(1, 1000):
+        assert parse(f"{number} um", "length", "it") == number * um
+        assert parse(f"{number} mm", "length", "it") == number * mm
+
+
+@pytest.mark.parametrize(
+    ("written", "dimension", "message"),
+    [
+        (50, "length", 'f is 50: a length needs a unit, written as text, e.g. "50 mm"'),
+        (0.5, "angle", 'f is 0.5: an angle needs a unit, written as text, e.g. "2 deg"'),
+        (None, "length", "f is None: a length needs a unit"),
+        ("50", "length", 'f is "50": a length needs a unit, e.g. "50 mm"'),
+        ("0.5", "angle", 'f is "0.5": an angle needs a unit'),
+        ("50 s", "length", 'f is "50 s", which is not a length; write it like "50 mm"'),
+        ("50 degC", "length", 'f is "50 degC", which is not a length'),
+        ("50 mm^2", "length", '"mm\\^2" is not a unit of length'),
+        ("50 mmm", "length", '"mmm" is not a known unit; write a length like "50 mm"'),
+        ("9**9**9 m", "length", "not a unit of length"),
+        ("", "length", 'f is "", which is not a length'),
+        ("mm", "length", "which is not a length"),
+        ("fifty mm", "length", "which is not a length"),
+        ("nan mm", "length", "which is not a length"),
+    ],
+)
+def test_refuses_what_is_no_quantity(written, dimension, message):
+    with pytest.raises(InputError, match=message):
+        parse(written, dimension, "f")
+
+
+@pytest.mark.parametrize(
+    ("value", "dimension", "written"),
+    [
+        (50 * mm, "length", "50 mm"),
+        (0.05, "length", "50 mm"),
+        (1.2, "length", "1.2 m"),
+        (48 * um, "length", "48 um"),
+        (-3 * mm, "length", "-3 mm"),
+        (550e-9, "length", "550 nm"),
+        (0, "length", "0 m"),
+        (math.inf, "length", "inf m"),
+        (math.pi / 4, "angle", "45 deg"),
+        (20 * deg, "angle", "20 deg"),
+        (0.2, "angle", "0.2 rad"),
+        (0.002, "angle", "2 mrad"),
+        (0.01, "time", "10 ms"),
+    ],
+)
+def test_writes_the_unit_that_reads_best(value, dimension, written):
+    assert text(value, dimension) == written
+
+
+def test_what_code_writes_stays_short():
+    for number in range(1, 1000):
+        assert text(number * um) == f"{number} um"
+        assert text(number * mm) == f"{number} mm"
+
+
+@given(some.floats(allow_nan=False), some.sampled_from(["length", "angle", "time"]))
+def test_writing_gives_the_same_float_back(value, dimension):
+    assert parse(text(value, dimension), dimension, "it") == value
+
+
+def test_writing_takes_numpy_numbers():
+    assert text(np.float32(0.5)) == "500 mm"
+
+
+def test_reading_common_units_does_not_load_pint():
+    import subprocess
+    import sys
+
+    code = "import sys; from vcc.units import parse; parse('5 mm', 'length', ''); "
+    code += "assert 'pint' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
