@@ -24,8 +24,10 @@ from vcc.plan.model import Plan
 
 Progress = Callable[[int, int], None]
 
-BAND = 32
+BAND = 16
 """Rows of the picture that a thread works on at once: their sums stay in the second-level cache."""
+MASKED_BAND = 64
+"""Likewise with masks: more rows, so that rows weighted for the band's ends are seldom made twice."""
 
 
 def run(plan: Plan, values: NDArray[Any], progress: Progress | None = None) -> NDArray[Any]:
@@ -148,7 +150,7 @@ class _Separable:
         by_column = masked or progress is not None
         for block in _blocks(self.plan, values, self.fine, by_column):
             masks = self.mask_columns(int(block.tap_columns[0]), pool) if masked else None
-            starts = range(0, len(raster), BAND)
+            starts = range(0, len(raster), MASKED_BAND if masked else BAND)
             list(pool.map(lambda start, block=block, masks=masks: self.band(block, masks, start, raster), starts))  # type: ignore[misc]
             if progress is not None:
                 done += np.count_nonzero(self.weights[np.ix_(block.tap_rows, block.tap_columns)])
@@ -157,8 +159,8 @@ class _Separable:
     def band(
         self, block: _Block, masks: NDArray[np.float32] | None, start: int, raster: NDArray[np.float32]
     ) -> None:
-        """Add one block's samples to the raster rows start … start + BAND."""
-        stop = min(start + BAND, len(raster))
+        """Add one block's samples to a band of raster rows."""
+        stop = min(start + (BAND if masks is None else MASKED_BAND), len(raster))
         rows, columns = block.tap_rows, block.tap_columns
         first_row, row_shares = self.down.first[rows], self.down_shares[rows]
         weights = self.weights[np.ix_(rows, columns)]
@@ -205,13 +207,13 @@ class _Separable:
             number, begin = mask_and_start
             mask = self.plan.masks[number]
             place = mask.column[0, a] + mask.step[0, 0] * index
-            end = min(begin + 256, len(mask.texture))
+            end = min(begin + 100, len(mask.texture))
             offset = self.mask_start[number]
             kernels.sample_mask_columns(
                 mask.texture[begin:end], place, self.channels, out[offset + begin : offset + end]
             )
 
-        pieces = [(n, begin) for n in range(len(self.plan.masks)) for begin in range(0, self.mask_rows[n], 256)]
+        pieces = [(n, begin) for n in range(len(self.plan.masks)) for begin in range(0, self.mask_rows[n], 100)]
         list(pool.map(sample, pieces))
         return out
 

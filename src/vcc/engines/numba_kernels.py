@@ -15,12 +15,6 @@ _compiled = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="nump
 _inlined = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy", inline="always")
 
 
-@_inlined
-def _add_three(line, n, r0, r1, r2, a, b, c):  # type: ignore[no-untyped-def]
-    for x in range(n):
-        line[x] += a * np.float32(r0[x]) + b * np.float32(r1[x]) + c * np.float32(r2[x])
-
-
 @_compiled
 def sum_rows(values, view_rows, column, weights, first, shares, start, stop, sums):  # type: ignore[no-untyped-def]
     """Add to sums[y − start] the rows of all views of one column that fall on raster row y.
@@ -96,36 +90,25 @@ def sum_masked_rows(  # type: ignore[no-untyped-def]
     """
     last, n = values.shape[2] - 1, values.shape[3]
     width = shares.shape[2]
-    kept = np.empty((width + 1, n), np.float32)
+    kept = np.zeros((width + 1, n), np.float32)
     kept_row = np.empty(width + 1, np.int64)
-    place = np.empty(width, np.int64)
-    for b in range(weights.size):
-        if weights[b] == 0:
-            continue
+    slot = np.empty(width, np.int64)
+    for b in np.flatnonzero(weights):
         kept_row[:] = -1
         for y in range(start, stop):
-            lit = False
             for t in range(width):
                 l = min(first[b, y] + t, last)  # noqa: E741
-                slot = l % (width + 1)
-                place[t] = slot
-                if shares[b, y, t] != 0:
-                    lit = True
-                    if kept_row[slot] != l:
-                        kept_row[slot] = l
-                        samples = values[view_rows[b], column, l]
-                        _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], kept[slot])
-                elif kept_row[slot] == -1:
-                    kept_row[slot] = -2
-                    kept[slot, :] = 0
-            if lit:
-                line = sums[y - start]
-                for t in range(0, width, 3):
-                    _add_three(
-                        line, n,
-                        kept[place[t]], kept[place[t + 1]], kept[place[t + 2]],
-                        shares[b, y, t], shares[b, y, t + 1], shares[b, y, t + 2],
-                    )  # fmt: skip
+                slot[t] = l % (width + 1)
+                if shares[b, y, t] != 0 and kept_row[slot[t]] != l:
+                    kept_row[slot[t]] = l
+                    samples = values[view_rows[b], column, l]
+                    _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], kept[slot[t]])
+            line = sums[y - start]
+            for t in range(0, width, 3):
+                r0, r1, r2 = kept[slot[t]], kept[slot[t + 1]], kept[slot[t + 2]]
+                a0, a1, a2 = shares[b, y, t], shares[b, y, t + 1], shares[b, y, t + 2]
+                for x in range(n):
+                    line[x] += a0 * r0[x] + a1 * r1[x] + a2 * r2[x]
 
 
 @_inlined

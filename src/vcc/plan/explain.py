@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -138,13 +139,25 @@ def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) ->
     """
     from vcc.engines import run_plan
 
-    total = plan.taps_used
-    if total == 0:
+    if plan.taps_used == 0:
         return 0.0
     used = np.count_nonzero(plan.weights, axis=0)
-    order = np.argsort(-used)
-    columns = np.sort(order[: max(1, len(used) // 16)])
-    piece = replace(
+    columns = np.sort(np.argsort(-used)[: max(1, len(used) // 16)])
+    piece = _columns_of(plan, columns)
+    nothing = replace(piece, weights=np.zeros_like(piece.weights))  # what a run costs whatever it adds up
+    try:
+        whole, fixed = (
+            min(_timed(lambda p=p: run_plan(p, light_field.values, engine=engine)) for _ in range(3))  # type: ignore[misc]
+            for p in (piece, nothing)
+        )
+    except Exception:  # an array under a tracer has no values to run
+        return None
+    return fixed + max(whole - fixed, 0.0) * plan.taps_used / piece.taps_used
+
+
+def _columns_of(plan: Plan, columns: np.ndarray[Any, Any]) -> Plan:
+    """The plan with some of its columns of view taps only."""
+    return replace(
         plan,
         view_columns=plan.view_columns[columns],
         weights=plan.weights[:, columns],
@@ -152,12 +165,9 @@ def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) ->
         y=plan.y[:, columns],
         masks=tuple(replace(m, column=m.column[:, columns], row=m.row[:, columns]) for m in plan.masks),
     )
-    timings = []
-    try:
-        for _ in range(3):  # the first run may compile
-            start = time.perf_counter()
-            run_plan(piece, light_field.values, engine=engine)
-            timings.append(time.perf_counter() - start)
-    except Exception:  # an array under a tracer has no values to run
-        return None
-    return min(timings) * total / piece.taps_used
+
+
+def _timed(step: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    step()
+    return time.perf_counter() - start

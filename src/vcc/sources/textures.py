@@ -1,0 +1,339 @@
+"""What a plane of a scene looks like: radiance and opacity as functions of position.
+
+A texture is any function of positions (x, y) in metres (x right, y down, from the plane's middle; arrays that
+broadcast against each other) that returns radiance, shape (...) for grey or (..., 3), or (..., 4) with opacity
+last and the radiance already multiplied by it. All of it is procedural: this package ships no pictures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.errors import InputError
+
+Array = NDArray[Any]
+Texture = Callable[[Array, Array], Array]
+Colour = Sequence[float] | Array
+"""Red, green and blue radiance, linear, 0 to 1."""
+
+
+def radiance_and_opacity(texture: Texture, x: Array, y: Array) -> Array:
+    """What a texture returns, as (..., 4): red, green and blue times opacity, and opacity.
+
+    Args:
+        texture: see the head of this module.
+        x: positions, metres.
+        y: positions, metres, which broadcast against x.
+
+    Raises:
+        InputError: the texture returned another shape.
+    """
+    shape = np.broadcast_shapes(np.shape(x), np.shape(y))
+    values = np.asarray(texture(x, y))
+    if values.shape == (*shape, 4):
+        return values
+    if values.ndim <= len(shape):  # grey, or one number for all
+        values = np.broadcast_to(values, shape)[..., None]
+    if values.ndim != len(shape) + 1 or values.shape[-1] not in (1, 3):
+        name = getattr(texture, "__name__", type(texture).__name__)
+        raise InputError(
+            f"texture {name} returned shape {values.shape} for positions of shape {shape}: "
+            "return that shape, or add an axis of 3 colours or of 4 (with opacity)"
+        )
+    result = np.ones((*shape, 4), dtype=values.dtype if values.dtype.kind == "f" else np.float64)
+    result[..., :3] = values
+    return result
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """The same colour everywhere, opaque.
+
+    Args:
+        colour: linear radiance (red, green, blue).
+    """
+
+    colour: tuple[float, float, float] = (0.5, 0.5, 0.5)
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """The colour at each position, (..., 3)."""
+        shape = np.broadcast_shapes(np.shape(x), np.shape(y))
+        return np.broadcast_to(np.asarray(self.colour, dtype=np.float64), (*shape, 3))
+
+
+@dataclass(frozen=True)
+class Waves:
+    """A smooth texture: plane waves in many directions, none finer than a given period.
+
+    Channel c is ½ + ½·contrast·mean over the waves of cos(2π(fx·x + fy·y) + phase). It has no detail finer
+    than ``finest``, so sampling theory holds on it, and images of it have closed forms.
+
+    Args:
+        finest: the shortest period, metres; the longest is eight times that.
+        waves: how many for each channel.
+        contrast: 0 to 1.
+        seed: of the random directions, periods and phases.
+    """
+
+    finest: float
+    waves: int = 8
+    contrast: float = 1.0
+    seed: int = 0
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """The sum of waves at each position, (..., 3)."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        channels = [self._channel(x, y, c) for c in range(3)]
+        return np.stack(channels, axis=-1)
+
+    def _channel(self, x: Array, y: Array, channel: int) -> Array:
+        random = np.random.default_rng([self.seed, channel])
+        frequency = 8.0 ** -random.random(self.waves) / self.finest
+        angle, phase = 2 * math.pi * random.random((2, self.waves))
+        total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
+        for f, a, p in zip(frequency, angle, phase, strict=True):
+            total += np.cos(2 * math.pi * f * (x * math.cos(a) + y * math.sin(a)) + p)
+        return 0.5 + total * (self.contrast / (2 * self.waves))
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A round spot of light with a Gaussian profile, opaque in its middle and clear around.
+
+    Args:
+        radius: standard deviation of the profile, metres.
+        colour: linear radiance (red, green, blue) of the middle.
+        middle: place (x, y), metres.
+    """
+
+    radius: float
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    middle: tuple[float, float] = (0.0, 0.0)
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Colour times opacity and opacity at each position, (..., 4)."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        across = np.exp(-((x - self.middle[0]) ** 2) / (2 * self.radius**2))
+        profile = across * np.exp(-((y - self.middle[1]) ** 2) / (2 * self.radius**2))
+        return np.asarray(profile[..., None] * np.array([*self.colour, 1.0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """An array of samples on a sheet, interpolated linearly, clear outside.
+
+    Args:
+        values: linear radiance 0 to 1, shape (rows, columns), (rows, columns, 3), or (rows, columns, 4) with
+            opacity last and colour already multiplied by it; row 0 at the top.
+        width: of the sheet, metres; its height keeps the samples square.
+
+    Raises:
+        InputError: another shape, negative or not finite values, or a width of zero or less.
+    """
+
+    values: ArrayLike
+    width: float
+
+    def __post_init__(self) -> None:
+        values = np.asarray(self.values, dtype=np.float64)
+        if values.ndim == 2:
+            values = np.repeat(values[..., None], 3, axis=-1)
+        if values.ndim != 3 or values.shape[2] not in (3, 4) or 0 in values.shape:
+            raise InputError(f"a picture has (rows, columns) and 1, 3 or 4 channels, not shape {values.shape}")
+        if not np.isfinite(values).all() or values.min() < 0:
+            raise InputError("a picture on a plane needs finite radiance of 0 or more")
+        if not (self.width > 0 and math.isfinite(self.width)):
+            raise InputError(f"the width of a picture must be greater than 0 m, not {self.width}")
+        if values.shape[2] == 3:
+            values = np.concatenate([values, np.ones_like(values[..., :1])], axis=-1)
+        object.__setattr__(self, "values", values)
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Colour times opacity and opacity at each position, (..., 4)."""
+        from scipy.ndimage import map_coordinates
+
+        values = np.asarray(self.values)
+        rows, columns = values.shape[:2]
+        pitch = self.width / columns
+        column, row = np.broadcast_arrays(
+            np.asarray(x, float) / pitch + (columns - 1) / 2, np.asarray(y, float) / pitch + (rows - 1) / 2
+        )
+        inside = (np.abs(column - (columns - 1) / 2) <= columns / 2) & (np.abs(row - (rows - 1) / 2) <= rows / 2)
+        channels = [map_coordinates(values[..., c], [row, column], order=1, mode="nearest") for c in range(4)]
+        return np.stack(channels, axis=-1) * inside[..., None]
+
+
+class Painting:
+    """Shapes laid over one another at given positions: what handsome procedural textures are made of.
+
+    Positions on a grid (x along the last axis, y along the one before) are recognised: a shape is then only
+    evaluated inside its bounds.
+
+    Args:
+        x: positions, metres.
+        y: positions, metres, which broadcast against x.
+    """
+
+    def __init__(self, x: ArrayLike, y: ArrayLike) -> None:
+        self.x, self.y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        self.shape = np.broadcast_shapes(self.x.shape, self.y.shape)
+        self.values: Array = np.zeros((*self.shape, 4), dtype=np.float32)
+        self._grid = self.x.ndim == self.y.ndim == 2 and self.x.shape[0] == 1 and self.y.shape[1] == 1
+
+    def paint(
+        self,
+        bounds: tuple[float, float, float, float],
+        shape: Callable[[Array, Array], tuple[ArrayLike, Colour]],
+    ) -> None:
+        """Lay a shape over what is there.
+
+        Args:
+            bounds: (left, top, right, bottom) in metres outside which the shape is clear.
+            shape: from positions x, y to its opacity (...), 0 to 1, and colour, (3,) or (..., 3).
+        """
+        left, top, right, bottom = bounds
+        inside_x, inside_y = (self.x >= left) & (self.x <= right), (self.y >= top) & (self.y <= bottom)
+        if self._grid:
+            columns, rows = _span(inside_x[0]), _span(inside_y[:, 0])
+            if columns is None or rows is None:
+                return
+            x, y = self.x[:, columns], self.y[rows]
+            self._over((rows, columns), *shape(x, y), (y.shape[0], x.shape[1]))
+            return
+        where = inside_x & inside_y
+        if where.any():
+            x, y = np.broadcast_to(self.x, self.shape)[where], np.broadcast_to(self.y, self.shape)[where]
+            self._over(where, *shape(x, y), x.shape)
+
+    def _over(self, where: Any, opacity: ArrayLike, colour: Colour, shape: tuple[int, ...]) -> None:
+        opacity = np.broadcast_to(np.asarray(opacity, dtype=np.float32), shape)[..., None]
+        piece = self.values[where] * (1 - opacity)
+        piece[..., :3] += opacity * np.asarray(colour, dtype=np.float32)
+        piece[..., 3:] += opacity
+        self.values[where] = piece
+
+    def rectangle(
+        self, bounds: tuple[float, float, float, float], colour: Colour, edge: float, opacity: float = 1.0
+    ) -> None:
+        """Lay a rectangle over what is there.
+
+        Args:
+            bounds: (left, top, right, bottom), metres.
+            colour: linear radiance.
+            edge: width of its soft edge, metres.
+            opacity: 0 to 1.
+        """
+        left, top, right, bottom = bounds
+
+        def shape(x: Array, y: Array) -> tuple[Array, Colour]:
+            across = soft(np.minimum(x - left, right - x), edge)
+            return opacity * across * soft(np.minimum(y - top, bottom - y), edge), colour
+
+        self.paint((left - edge, top - edge, right + edge, bottom + edge), shape)
+
+    def disc(self, middle: tuple[float, float], radius: float, colour: Colour, edge: float) -> None:
+        """Lay a disc over what is there.
+
+        Args:
+            middle: (x, y), metres.
+            radius: metres.
+            colour: linear radiance.
+            edge: width of its soft edge, metres.
+        """
+        reach = radius + edge
+
+        def shape(x: Array, y: Array) -> tuple[Array, Colour]:
+            return soft(radius - np.hypot(x - middle[0], y - middle[1]), edge), colour
+
+        self.paint((middle[0] - reach, middle[1] - reach, middle[0] + reach, middle[1] + reach), shape)
+
+    def star(self, middle: tuple[float, float], radius: float, spokes: int, colour: Colour, edge: float) -> None:
+        """Lay a Siemens star over what is there: the finer the detail a camera keeps, the smaller its grey heart.
+
+        Args:
+            middle: (x, y), metres.
+            radius: metres.
+            spokes: how many dark spokes.
+            colour: linear radiance of the spokes.
+            edge: width of their soft edges, metres.
+        """
+
+        def shape(x: Array, y: Array) -> tuple[Array, Colour]:
+            x, y = x - middle[0], y - middle[1]
+            r = np.hypot(x, y)
+            # distance from a spoke's edge, measured along the circle
+            along = np.sin(spokes * np.arctan2(y, x)) * r / spokes
+            return soft(along, edge) * soft(radius - r, edge), colour
+
+        reach = radius + edge
+        self.paint((middle[0] - reach, middle[1] - reach, middle[0] + reach, middle[1] + reach), shape)
+
+    def text(self, text: str, left_top: tuple[float, float], dot: float, colour: Colour) -> None:
+        """Lay letters and digits over what is there, five by seven dots each.
+
+        Args:
+            text: capital letters, digits, spaces and hyphens.
+            left_top: (x, y) of the first letter's corner, metres.
+            dot: size of a dot, metres; letters are six dots apart.
+            colour: linear radiance.
+        """
+        dots = glyphs(text)
+        rows, columns = dots.shape
+
+        def shape(x: Array, y: Array) -> tuple[Array, Colour]:
+            column = np.clip(np.floor((x - left_top[0]) / dot).astype(int), 0, columns - 1)
+            row = np.clip(np.floor((y - left_top[1]) / dot).astype(int), 0, rows - 1)
+            return dots[row, column], colour
+
+        self.paint((left_top[0], left_top[1], left_top[0] + columns * dot, left_top[1] + rows * dot), shape)
+
+
+def soft(distance: Array, edge: float) -> Array:
+    """Opacity near an edge: 0 outside, 1 inside, linear over ``edge`` metres.
+
+    Args:
+        distance: from the edge, positive inside, metres.
+        edge: metres.
+    """
+    return np.clip(distance / edge + 0.5, 0.0, 1.0)
+
+
+def glyphs(text: str) -> NDArray[np.float32]:
+    """Text as dots, shape (7, 6 · letters), 1 where a letter is.
+
+    Raises:
+        InputError: a character other than capital letters, digits, space and hyphen.
+    """
+    dots = np.zeros((7, 6 * len(text)), dtype=np.float32)
+    for place, character in enumerate(text):
+        if character not in _GLYPHS:
+            raise InputError(f"there is no glyph for {character!r}: use capital letters, digits, space and hyphen")
+        for column, bits in enumerate(bytes.fromhex(_GLYPHS[character])):
+            dots[:, 6 * place + column] = [bits >> row & 1 for row in range(7)]
+    return dots
+
+
+def _span(inside: Array) -> slice | None:
+    """The slice that holds all true entries; positions may run either way."""
+    found = np.flatnonzero(inside)
+    return slice(int(found[0]), int(found[-1]) + 1) if found.size else None
+
+
+# Five columns for each character, the lowest bit at the top.
+_GLYPHS = {
+    " ": "0000000000", "-": "0808080808",
+    "0": "3e5149453e", "1": "00427f4000", "2": "4261514946", "3": "2141454b31", "4": "1814127f10",
+    "5": "2745454539", "6": "3c4a494930", "7": "0171090503", "8": "3649494936", "9": "064949291e",
+    "A": "7e1111117e", "B": "7f49494936", "C": "3e41414122", "D": "7f4141221c", "E": "7f49494941",
+    "F": "7f09090901", "G": "3e4149497a", "H": "7f0808087f", "I": "00417f4100", "J": "2040413f01",
+    "K": "7f08142241", "L": "7f40404040", "M": "7f020c027f", "N": "7f0408107f", "O": "3e4141413e",
+    "P": "7f09090906", "Q": "3e4151215e", "R": "7f09192946", "S": "4649494931", "T": "01017f0101",
+    "U": "3f4040403f", "V": "1f2040201f", "W": "3f4038403f", "X": "6314081463", "Y": "0708700807",
+    "Z": "6151494543",
+}  # fmt: skip
