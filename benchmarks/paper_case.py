@@ -146,7 +146,7 @@ def with_torch(field: vcc.LightField, camera: vcc.Camera) -> Step | None:
         total = torch.zeros(1, 3, rows, columns)
         for j, i in np.ndindex(*field.shape[:2]):
             k = (column - x[j, i]) / step * 2 / (columns - 1) - 1
-            l = (row - y[j, i]) / step * 2 / (rows - 1) - 1  # noqa: E741
+            l = (row - y[j, i]) / step * 2 / (rows - 1) - 1
             grid = torch.stack(torch.meshgrid(l, k, indexing="ij")[::-1], -1)[None].float()
             view = values[j, i].permute(2, 0, 1)[None].float()
             total += torch.nn.functional.grid_sample(view, grid, align_corners=True)
@@ -166,7 +166,11 @@ def main_table(runs: int) -> None:
             lambda: conventional.capture(field, between_views="none", refine=1),
             lambda: masked.capture(field, between_views="none", refine=1),
         ),
-        ("OpenCV warpAffine + accumulate", with_opencv(field, conventional, False), with_opencv(field, masked, True)),
+        (
+            "OpenCV warpAffine + accumulate",
+            with_opencv(field, conventional, False),
+            with_opencv(field, masked, True),
+        ),
         ("NumPy, view by view", with_numpy(field, conventional), None),
         ("PyTorch grid_sample, view by view", with_torch(field, conventional), None),
     ]
@@ -196,7 +200,10 @@ def growth(runs: int) -> None:
         for camera in cameras(pixels):
             taken = seconds(lambda c=camera, f=field: c.capture(f, between_views="none", refine=1), runs)  # type: ignore[misc]
             cells += [f"{taken:.4f} s", f"{taken / field.values.size * 1e9:.3f}"]
-        print(f"| {views} | {pixels} | {field.values.nbytes / 1e6:.0f} | {' | '.join(cells)} |", flush=True)
+        print(
+            f"| {views} | {pixels} | {field.values.nbytes / 1e6:.0f} | {' | '.join(cells)} |",
+            flush=True,
+        )
     print()
 
 
@@ -205,13 +212,14 @@ def refinement() -> None:
     field = light_field(20, 500)
     rng = np.random.default_rng(2)
     coded = vcc.Mask(rng.random((11, 11)).round(), width=16 * mm)
+    fine = vcc.Mask(rng.random((500, 500)).round(), width=26 * mm, z=51.5 * mm)
     lens = vcc.Lens(50 * mm, diameter=16 * mm)
     shape, pitch = (500, 500), 48 * um
     cases = [
         ("in focus", [lens], 52 * mm),
         ("strong defocus: gaps between views closed", [lens], 60 * mm),
         ("strong defocus, coded aperture: cells divided", [vcc.Lens(50 * mm), coded], 60 * mm),
-        ("fine mask 0.5 mm before the sensor: samples divided", [lens, vcc.Mask(rng.random((500, 500)).round(), width=26 * mm, z=51.5 * mm)], 52 * mm),
+        ("fine mask 0.5 mm before the sensor: samples divided", [lens, fine], 52 * mm),
     ]  # fmt: skip
     print("| case | view taps | samples divided | foretold | taken | taken / foretold |")
     print("|---|---|---|---|---|---|")
@@ -273,7 +281,9 @@ def first_calls() -> None:
                 )
                 for _ in range(2)
             ]  # fmt: skip
-        print(f"| {'conventional' if kind == 'plain' else 'mask in mid-path'} | {times[0]:.2f} s | {times[1]:.2f} s |")
+        print(
+            f"| {'conventional' if kind == 'plain' else 'mask in mid-path'} | {times[0]:.2f} s | {times[1]:.2f} s |"
+        )
     print()
     for kind in ("plain", "mask"):
         out = subprocess.run(
@@ -290,7 +300,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=9, help="runs of each of our steps (default 9)")
     runs = parser.parse_args().runs
-    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, ")
+    print(
+        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, "
+    )
     print(f"NumPy {np.__version__}, Numba {numba.__version__}\n")
     main_table(runs)
     growth(max(runs // 2, 3))

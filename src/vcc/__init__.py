@@ -44,7 +44,7 @@ _HOMES = {
 }
 _MODULES = {"patterns", "plot", "sources", "units"}
 
-__all__ = [*sorted(_HOMES), *sorted(_MODULES)]  # noqa: PLE0604
+__all__ = [*sorted(_HOMES), *sorted(_MODULES)]
 
 
 def __getattr__(name: str) -> Any:

@@ -182,7 +182,12 @@ class Camera:
         return explain(self, light_field, **options)
 
     def light_field_at(
-        self, light_field: LightField, z: float, *, before: bool = False, memory_limit: int | None = None
+        self,
+        light_field: LightField,
+        z: float,
+        *,
+        before: bool = False,
+        memory_limit: int | None = None,
     ) -> LightField:
         """The light field at a plane inside the camera: all linear optics folded, all masks on the way applied.
 

@@ -417,7 +417,7 @@ class _Writer:
         if isinstance(value, np.generic):
             value = value.item()
         if unit is not None:
-            return units.text(value, unit)
+            return units.text(value, unit, exact=True)
         if isinstance(value, bool | int | float | str):
             return value
         raise InputError(

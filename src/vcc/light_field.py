@@ -307,7 +307,9 @@ class LightField:
             InputError: another grid of samples, or what `LightField` refuses.
         """
         if tuple(values.shape)[:4] != self.shape[:4]:
-            raise InputError(f"samples of shape {tuple(values.shape)} do not fit a light field of shape {self.shape}")
+            raise InputError(
+                f"samples of shape {tuple(values.shape)} do not fit a light field of shape {self.shape}"
+            )
         return replace(self, values=values, _checked=False)
 
     def _with(self, values: Any, frame: Affine, disparity_factor: float = 1.0) -> LightField:
@@ -319,7 +321,9 @@ class LightField:
         )
 
     def _measure_disparity(self) -> tuple[float, float] | None:
-        from vcc.parallax import disparity_range  # late: light fields come before what looks at them
+        from vcc.parallax import (
+            disparity_range,
+        )  # late: light fields come before what looks at them
 
         try:
             views = to_numpy(self.values)
@@ -343,8 +347,7 @@ def describe_geometry(light_field: LightField) -> str:
     focus = math.inf if linear[2, 0] == 0 else linear[0, 0] / linear[2, 0]
     converging = "parallel views" if math.isinf(focus) else f"converging at {text(float(f'{focus:.6g}'))}"
     return (
-        f"spacing {text(float(f'{abs(linear[0, 0]):.6g}'))}, "
-        f"slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
+        f"spacing {text(float(f'{abs(linear[0, 0]):.6g}'))}, slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
     )
 
 

@@ -54,7 +54,7 @@ def masked_at(
     result = np.empty(values.shape, dtype=np.float32)
     tables = [_weight_table(light_field, *plane) for plane in planes]
     nv, nu, nt, ns = values.shape[:4]
-    k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)  # noqa: E741
+    k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
     for j, i in np.ndindex(nv, nu):
         weight: Any = 1.0 / light_field.full_scale
         for table in tables:
@@ -65,9 +65,7 @@ def masked_at(
     return light_field.replaced(result)
 
 
-def _weight_table(
-    light_field: LightField, pattern: Pattern, decentre: tuple[float, float], rays: Affine
-) -> Any:
+def _weight_table(light_field: LightField, pattern: Pattern, decentre: tuple[float, float], rays: Affine) -> Any:
     """One weight for each view where the pattern tells views apart only, else a lookup for samples."""
     nv, nu, nt, ns = light_field.shape[:4]
     place = (rays @ light_field.frame).matrix[:2]
@@ -124,7 +122,12 @@ def resampled(
     np.maximum(result, 0, out=result)  # a spline may undershoot; radiance does not
     final: NDArray[np.float32] = result if light_field.channels is not None else result[..., 0]
     return replace(
-        light_field, values=final, frame=frame, disparity_range=None, _shared_disparity=None, _disparity_factor=1.0
+        light_field,
+        values=final,
+        frame=frame,
+        disparity_range=None,
+        _shared_disparity=None,
+        _disparity_factor=1.0,
     )
 
 

@@ -258,9 +258,7 @@ class _Sweep:
         self._scale = float(np.percentile(centre, 99)) or 1.0
         self._blocks = self._cut(self._band(middle), 0)
 
-    def run(
-        self, reach: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def run(self, reach: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Disparity, confidence and residual of each block, in row-major order of the picture."""
         shifts = np.arange(-reach, reach + 1)
         cost = np.stack([self._cost(1, int(d)) for d in shifts])
@@ -337,17 +335,13 @@ class _Sweep:
         middle = float(self._band(self._middle).mean())
         for step in range(_FARTHEST_STEP, 1, -1):
             neighbours = self._neighbours(step)
-            if neighbours and all(
-                float(self._band(index).mean()) > 0.8 * middle for index, _ in neighbours
-            ):
+            if neighbours and all(float(self._band(index).mean()) > 0.8 * middle for index, _ in neighbours):
                 return step
         return 1
 
     def _cost(self, step: int, shift: int) -> NDArray[np.float32]:
         """Mean over the views ``step`` away of the difference at a whole shift, per block."""
-        sides = np.stack(
-            [self._difference(self._band(i), sign * shift) for i, sign in self._neighbours(step)]
-        )
+        sides = np.stack([self._difference(self._band(i), sign * shift) for i, sign in self._neighbours(step)])
         there = np.isfinite(sides)
         count = there.sum(axis=0)
         total = np.where(there, sides, 0).sum(axis=0)

@@ -69,7 +69,7 @@ class Pattern(abc.ABC):
     def _mean_of_points(self, x: Array, y: Array, width: float, height: float) -> Array:
         steps = (np.arange(4) + 0.5) / 4 - 0.5
         points = [self(x + a * width, y + b * height) for a in steps for b in steps]
-        return np.mean(np.broadcast_arrays(*points), axis=0)
+        return np.asarray(np.mean(np.broadcast_arrays(*points), axis=0))
 
 
 def _raster_points(extent: float, cell: float) -> int | None:
@@ -123,13 +123,17 @@ class Circle(Pattern):
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """One inside the circle, zero outside."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        return (x * x + y * y <= self.diameter**2 / 4).astype(np.float64)
+        return np.asarray(x * x + y * y <= self.diameter**2 / 4, dtype=np.float64)
 
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
         """The share of each rectangle that lies inside the circle, in closed form."""
         floor = self.diameter * 1e-5
         return _mean_from_integral(
-            self._integral, np.asarray(x, float), np.asarray(y, float), max(width, floor), max(height, floor)
+            self._integral,
+            np.asarray(x, float),
+            np.asarray(y, float),
+            max(width, floor),
+            max(height, floor),
         )
 
     def _integral(self, x: Array, y: Array) -> Array:
@@ -242,11 +246,11 @@ class Cells(Pattern):
         """Mean transmission over rectangles, exact (differences of the array's integral)."""
         width, height = max(width, self.width * 1e-5), max(height, self.size[1] * 1e-5)
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        if _is_grid(x, y):  # x along the last axis, y along the one before: two small products do it
+        if _is_grid(x, y):  # then two small products do it
             overlap_x = self._overlaps(x.reshape(-1), width, 1)
             overlap_y = self._overlaps(y.reshape(-1), height, 0)
             content = overlap_y @ self.values @ overlap_x.T
-            return content.reshape(np.broadcast_shapes(x.shape, y.shape))
+            return np.asarray(content.reshape(np.broadcast_shapes(x.shape, y.shape)))
         return _mean_from_integral(self._integral, x, y, width, height)
 
     def _index(self, x: Array, y: Array) -> tuple[Array, Array]:
@@ -313,14 +317,12 @@ class CosineSum(Pattern):
         phase: radians, added to every first harmonic (n times to the n-th).
     """
 
-    period: tuple[float, float] = field(metadata={"unit": "length"})
+    period: float | tuple[float, float] = field(metadata={"unit": "length"})
     harmonics: int = 1
     phase: float = field(default=0.0, metadata={"unit": "angle"})
 
     def __post_init__(self) -> None:
-        if isinstance(self.period, int | float):
-            object.__setattr__(self, "period", (float(self.period), float(self.period)))
-        for period in self.period:
+        for period in self.periods:
             _positive(self, "period", period, finite=False)
         if self.harmonics < 1:
             raise InputError(f"a sum of cosines has 1 harmonic or more, not {self.harmonics}")
@@ -331,9 +333,16 @@ class CosineSum(Pattern):
 
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
         """The mean over rectangles in closed form: each cosine shrinks by sinc(n·width/period)."""
-        return self._axis(np.asarray(x, float), self.period[0], width) * self._axis(
-            np.asarray(y, float), self.period[1], height
+        return self._axis(np.asarray(x, float), self.periods[0], width) * self._axis(
+            np.asarray(y, float), self.periods[1], height
         )
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """The period along (x, y), metres."""
+        if isinstance(self.period, tuple | list):
+            return float(self.period[0]), float(self.period[1])
+        return float(self.period), float(self.period)
 
     def _axis(self, x: Array, period: float, width: float) -> Array:
         if math.isinf(period):
@@ -445,7 +454,7 @@ def mura(prime: int) -> NDArray[np.float64]:
     cells = (sign[:, None] * sign[None, :] == 1).astype(np.float64)
     cells[0, :] = 0.0
     cells[1:, 0] = 1.0
-    return cells
+    return np.asarray(cells)
 
 
 def _is_grid(x: Array, y: Array) -> bool:

@@ -37,7 +37,7 @@ def sliced(
     Raises:
         InputError: an integer or array index (it would lose an axis), too many slices, or nothing left.
     """
-    parts = list(index) if isinstance(index, tuple) else [index]
+    parts: list[Any] = list(index) if isinstance(index, tuple) else [index]
     if parts.count(Ellipsis) > 1:
         raise InputError(f"{what} takes at most one ellipsis as an index")
     if Ellipsis in parts:

@@ -69,10 +69,10 @@ class Sensor:
     def column_places(self) -> NDArray[np.float64]:
         """x of the middle of each column of pixels, metres."""
         columns = np.arange(self.shape[1]) - (self.shape[1] - 1) / 2
-        return columns * self.pitches[1] + self.decentre[0]
+        return np.asarray(columns * self.pitches[1] + self.decentre[0], dtype=np.float64)
 
     @property
     def row_places(self) -> NDArray[np.float64]:
         """y of the middle of each row of pixels, metres."""
         rows = np.arange(self.shape[0]) - (self.shape[0] - 1) / 2
-        return rows * self.pitches[0] + self.decentre[1]
+        return np.asarray(rows * self.pitches[0] + self.decentre[1], dtype=np.float64)

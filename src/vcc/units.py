@@ -39,9 +39,7 @@ _WRITTEN: Final[dict[str, tuple[str, ...]]] = {
 }
 _SI_NAMES: Final = {"length": "metre", "angle": "radian", "time": "second"}
 _EXAMPLES: Final = {"length": "50 mm", "angle": "2 deg", "time": "10 ms"}
-_QUANTITY: Final = re.compile(
-    r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*(.*)", re.DOTALL
-)
+_QUANTITY: Final = re.compile(r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*(.*)", re.DOTALL)
 _UNIT_NAME: Final = re.compile(r"[^\W\d]+|°")
 
 
@@ -67,9 +65,7 @@ def parse(text: object, dimension: str, what: str) -> float:
     """
     kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
     if not isinstance(text, str):
-        raise InputError(
-            f'{what} is {text!r}: {kind} needs a unit, written as text, e.g. "{example}"'
-        )
+        raise InputError(f'{what} is {text!r}: {kind} needs a unit, written as text, e.g. "{example}"')
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:
         raise InputError(f'{what} is "{text}", which is not {kind}; write it like "{example}"')
@@ -86,44 +82,41 @@ def _factor_by_pint(unit: str, dimension: str, what: str) -> float:
     """The factor to SI of a unit that this module does not define itself."""
     kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
     if not _UNIT_NAME.fullmatch(unit):  # pint would take it for arithmetic
-        raise InputError(
-            f'{what}, and "{unit}" is not a unit of {dimension}; write {kind} like "{example}"'
-        )
+        raise InputError(f'{what}, and "{unit}" is not a unit of {dimension}; write {kind} like "{example}"')
     import pint
 
     try:
         return float(_registry().Quantity(1.0, unit).to(_SI_NAMES[dimension]).magnitude)
     except pint.UndefinedUnitError:
-        raise InputError(
-            f'{what}, and "{unit}" is not a known unit; write {kind} like "{example}"'
-        ) from None
+        raise InputError(f'{what}, and "{unit}" is not a known unit; write {kind} like "{example}"') from None
     except pint.PintError:  # another dimension, or a scale with an offset such as degC
         raise InputError(f'{what}, which is not {kind}; write it like "{example}"') from None
 
 
-def text(value: float, dimension: str = "length") -> str:
+def text(value: float, dimension: str = "length", *, exact: bool = False) -> str:
     """A value in SI, written with the unit in which it reads best, such as ``"50 mm"``.
-
-    ``parse(text(value, dimension), dimension, "")`` gives the same float back, bit by bit: where
-    15 digits in the best unit do not do it, the shortest way to write it that does is taken.
 
     Args:
         value: metres, radians or seconds.
         dimension: ``"length"``, ``"angle"`` or ``"time"``.
+        exact: whether ``parse(text(value, dimension, exact=True), dimension, "")`` must give the same
+            float back, bit by bit, as files need it; else 15 digits do, which hide rounding.
     """
     names = _WRITTEN[dimension]
     value = float(value)
     if value == 0 or not math.isfinite(value):
         return f"{value:g} {names[0]}"
-    if dimension != "angle":  # among angles the shortest is the one that was meant: 45 deg, 0.2 rad
-        best = _candidate(value, _best_unit(value, names, dimension), dimension, 15)
-        if best is not None:
-            return best
-    candidates = [
-        _candidate(value, name, dimension, digits) for name in names for digits in (15, 17)
-    ]
-    # In SI, the factor is 1 and 17 digits always give the float back.
-    return min((written for written in candidates if written is not None), key=len)
+    best = _best_unit(value, names, dimension)
+    ordered = [best, *(name for name in names if name != best)]
+    if dimension == "angle":  # the shortest is the one that was meant: 45 deg, 0.2 rad
+        ordered.sort(key=lambda name: len(_written(value, name, dimension, 15)))
+    if not exact:
+        return _written(value, ordered[0], dimension, 15)
+    # In SI the factor is 1, and 17 digits always give the float back.
+    candidates = [_written(value, name, dimension, n) for n in (15, 17) for name in ordered]
+    faithful = [each for each in candidates if parse(each, dimension, "it") == value]
+    short = [each for each in faithful if "e" not in each]
+    return faithful[0] if faithful[0] == candidates[0] else min(short or faithful, key=len)
 
 
 def _best_unit(value: float, names: tuple[str, ...], dimension: str) -> str:
@@ -134,10 +127,8 @@ def _best_unit(value: float, names: tuple[str, ...], dimension: str) -> str:
     return names[-1]
 
 
-def _candidate(value: float, unit: str, dimension: str, digits: int) -> str | None:
-    """The value in a unit with so many digits; None if that would not give the same float back."""
-    number = f"{value / _UNITS[dimension][unit]:.{digits}g}"
-    return f"{number} {unit}" if float(number) * _UNITS[dimension][unit] == value else None
+def _written(value: float, unit: str, dimension: str, digits: int) -> str:
+    return f"{value / _UNITS[dimension][unit]:.{digits}g} {unit}"
 
 
 def _article(dimension: str) -> str:

@@ -15,9 +15,7 @@ from scipy import ndimage
 Views = NDArray[np.uint8]
 
 
-def moving_texture(
-    rows: int, columns: int, disparity: float = 1.0, size: tuple[int, int] = (48, 64)
-) -> Views:
+def moving_texture(rows: int, columns: int, disparity: float = 1.0, size: tuple[int, int] = (48, 64)) -> Views:
     """A textured plane: shape (rows, columns, *size, 3); a feature at k is at k − d one view on."""
     height, width = size
     margin = int(np.ceil(abs(disparity) * max(rows, columns))) + 2

@@ -27,9 +27,7 @@ def image(values: np.ndarray, inverted: bool = True) -> Image:
 
 def png_file(width: int, bits: int, kind: int, line: bytes, palette: bytes = b"") -> bytes:
     def chunk(name: bytes, data: bytes) -> bytes:
-        return (
-            struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-        )
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
     header = struct.pack(">IIBBBBB", width, 1, bits, kind, 0, 0, 0)
     colours = chunk(b"PLTE", palette) if palette else b""
@@ -60,9 +58,7 @@ def test_samples_come_back_as_stored(samples: np.ndarray, ending: str, tmp_path:
 
 def test_tiff_of_separate_planes_and_white_as_zero(tmp_path: Path) -> None:
     path = tmp_path / "a.tif"
-    tifffile.imwrite(
-        path, np.moveaxis(COLOUR8, -1, 0).copy(), photometric="rgb", planarconfig="separate"
-    )
+    tifffile.imwrite(path, np.moveaxis(COLOUR8, -1, 0).copy(), photometric="rgb", planarconfig="separate")
     np.testing.assert_array_equal(read_picture(path)[0], COLOUR8)
     tifffile.imwrite(path, COLOUR8[..., 0].copy(), photometric="miniswhite")
     np.testing.assert_array_equal(read_picture(path)[0], 255 - COLOUR8[..., 0])
@@ -153,9 +149,7 @@ def test_the_saved_picture_is_upright_srgb(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_picture(tmp_path / "a.png")[0], read[::-1, ::-1])
 
 
-@pytest.mark.parametrize(
-    ("ending", "bits", "stored"), [(".png", 16, 16), (".tif", None, 16), (".tiff", 8, 8)]
-)
+@pytest.mark.parametrize(("ending", "bits", "stored"), [(".png", 16, 16), (".tif", None, 16), (".tiff", 8, 8)])
 def test_bits(ending: str, bits: int | None, stored: int, tmp_path: Path) -> None:
     values = RANDOM.random((4, 6, 3), dtype=np.float32)
     path = tmp_path / f"a{ending}"

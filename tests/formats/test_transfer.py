@@ -9,12 +9,8 @@ from vcc.formats import transfer
 
 def test_values_of_the_standard() -> None:
     # IEC 61966-2-1: mid grey 0.5 is 0.2140 in linear light; the straight part has a slope of 12.92.
-    np.testing.assert_allclose(
-        transfer.to_linear([0, 0.04045, 0.5, 1]), [0, 0.0031308, 0.2140411, 1], atol=2e-7
-    )
-    np.testing.assert_allclose(
-        transfer.from_linear([0, 0.001, 0.2140411, 1]), [0, 0.01292, 0.5, 1], atol=1e-6
-    )
+    np.testing.assert_allclose(transfer.to_linear([0, 0.04045, 0.5, 1]), [0, 0.0031308, 0.2140411, 1], atol=2e-7)
+    np.testing.assert_allclose(transfer.from_linear([0, 0.001, 0.2140411, 1]), [0, 0.01292, 0.5, 1], atol=1e-6)
 
 
 @pytest.mark.parametrize("bits", [8, 16])

@@ -129,9 +129,7 @@ def test_what_is_assumed_is_said(views: Views, folder_of: Write) -> None:
 
 def test_progress_is_told(views: Views, folder_of: Write) -> None:
     seen: list[tuple[int, int]] = []
-    open_light_field(
-        folder_of(views, generic), progress=lambda done, total: seen.append((done, total)), **GIVEN
-    )
+    open_light_field(folder_of(views, generic), progress=lambda done, total: seen.append((done, total)), **GIVEN)
     assert seen == [(n, 12) for n in range(1, 13)]
 
 
@@ -207,9 +205,7 @@ def test_hci_order_and_parallel_cameras(views: Views, folder_of: Write) -> None:
 
 def test_hci_without_parameters_must_be_square(square_views: Views, folder_of: Write) -> None:
     folder = folder_of(square_views, hci_name(3))
-    np.testing.assert_array_equal(
-        open_light_field(folder, transfer="linear", **GIVEN).values, square_views
-    )
+    np.testing.assert_array_equal(open_light_field(folder, transfer="linear", **GIVEN).values, square_views)
     (folder / "input_Cam004.png").unlink()
     with pytest.raises(InputError, match=r"8 of the 9 views .*1 are missing.*\(1, 1\)"):
         read_geometry(folder)
@@ -239,9 +235,7 @@ def test_hci_too_few_and_too_many(square_views: Views, folder_of: Write) -> None
         ("[intrinsics]", "intrinsics", "cannot be read"),
     ],
 )
-def test_bad_hci_parameters(
-    old: str, new: str, message: str, square_views: Views, folder_of: Write
-) -> None:
+def test_bad_hci_parameters(old: str, new: str, message: str, square_views: Views, folder_of: Write) -> None:
     folder = folder_of(square_views, hci_name(3))
     write_cfg(folder, rows=3, columns=3)
     path = folder / "parameters.cfg"
@@ -308,9 +302,7 @@ def test_flipped_columns_are_put_right(views: Views, folder_of: Write) -> None:
 
 
 @pytest.mark.parametrize("fixture", ["views", "square_views"])
-def test_exchanged_axes_are_put_right(
-    fixture: str, folder_of: Write, request: pytest.FixtureRequest
-) -> None:
+def test_exchanged_axes_are_put_right(fixture: str, folder_of: Write, request: pytest.FixtureRequest) -> None:
     views = request.getfixturevalue(fixture)
     folder = folder_of(views.swapaxes(0, 1)[:, ::-1], generic)
     with pytest.warns(ResultWarning, match="exchanged; parallax has opposite signs"):
@@ -328,13 +320,9 @@ def test_exchanged_axes_are_put_right(
         ("transpose", lambda v: v.swapaxes(0, 1)),
     ],
 )
-def test_forced_orientation(
-    choice: str, expected: Callable, views: Views, folder_of: Write
-) -> None:
+def test_forced_orientation(choice: str, expected: Callable, views: Views, folder_of: Write) -> None:
     folder = folder_of(views, generic)
-    field = open_light_field(
-        folder, transfer="linear", orientation=choice, **(GIVEN | {"focus_distance": 1.0})
-    )
+    field = open_light_field(folder, transfer="linear", orientation=choice, **(GIVEN | {"focus_distance": 1.0}))
     np.testing.assert_array_equal(field.values, expected(views))
 
 
@@ -370,9 +358,7 @@ def test_missing_views_are_named(views: Views, folder_of: Write) -> None:
     folder = folder_of(views, generic)
     (folder / "view_00_01.png").unlink()
     (folder / "view_02_03.png").unlink()
-    with refused(
-        r"10 of the 12 views of its 3×4 grid; 2 are missing.*\(0, 1\), \(2, 3\)\. Incompl"
-    ):
+    with refused(r"10 of the 12 views of its 3×4 grid; 2 are missing.*\(0, 1\), \(2, 3\)\. Incompl"):
         open_light_field(folder)
 
 
@@ -396,9 +382,7 @@ def test_two_sets_in_one_folder(views: Views, folder_of: Write) -> None:
 def test_pictures_that_are_not_alike(other: NDArray, views: Views, folder_of: Write) -> None:
     folder = folder_of(views, generic)
     (folder / "view_01_02.png").write_bytes(png(other))
-    with refused(
-        r"view_01_02\.png and view_00_00\.png .*not alike: .*64×48 pixels, 3 channels, uint8"
-    ):
+    with refused(r"view_01_02\.png and view_00_00\.png .*not alike: .*64×48 pixels, 3 channels, uint8"):
         open_light_field(folder, **GIVEN)
 
 

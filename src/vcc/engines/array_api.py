@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.engines.smear import tent_matrix
 from vcc.light_field import to_dtype
-from vcc.plan.footprint import REACH, SMALLEST_STEP, refinement_matrix, shares
+from vcc.plan.footprint import SMALLEST_STEP, reach_in_pixels, refinement_matrix, shares
 from vcc.plan.model import MaskLookup, Plan
 
 
@@ -50,6 +50,7 @@ class _Run:
             raster = part if raster is None else raster + part
         if progress is not None:
             progress(total, total)
+        assert raster is not None  # a plan has at least one column of taps
         raster = raster * plan.scale
         if plan.guard:
             down = self.constant(tent_matrix(plan.smear[0], plan.sensor_shape[0], plan.guard))
@@ -71,7 +72,7 @@ class _Run:
         plan, xp = self.plan, self.xp
         view = self.values[int(plan.view_rows[b]), int(plan.view_columns[a]), ...]
         view = xp.reshape(xp.astype(view, self.float), (*plan.samples, self.channels))
-        l, k = (np.arange(n, dtype=np.float64) for n in plan.samples)  # noqa: E741
+        l, k = (np.arange(n, dtype=np.float64) for n in plan.samples)
         if plan.refine > 1:
             down, first_l = refinement_matrix(plan.interpolation, plan.samples[0], plan.refine)
             across, first_k = refinement_matrix(plan.interpolation, plan.samples[1], plan.refine)
@@ -79,13 +80,13 @@ class _Run:
             view = self.rows_mixed(self.constant(across), xp.permute_dims(view, (1, 0, 2)))
             view = xp.permute_dims(view, (1, 0, 2))
             k = first_k + np.arange(across.shape[0]) / plan.refine
-            l = first_l + np.arange(down.shape[0]) / plan.refine  # noqa: E741
+            l = first_l + np.arange(down.shape[0]) / plan.refine
         view = view * float(plan.weights[b, a])
         for mask in plan.masks:
             view = view * self.mask_weights(mask, b, a, k, l)[:, :, None]
         return view, k, l
 
-    def mask_weights(self, mask: MaskLookup, b: int, a: int, k: Any, l: Any) -> Any:  # noqa: E741
+    def mask_weights(self, mask: MaskLookup, b: int, a: int, k: Any, l: Any) -> Any:
         xp = self.xp
         column = mask.column[b, a] + mask.step[0, 0] * k[None, :] + mask.step[0, 1] * l[:, None]
         row = mask.row[b, a] + mask.step[1, 0] * k[None, :] + mask.step[1, 1] * l[:, None]
@@ -111,7 +112,7 @@ class _Run:
         for b in range(len(plan.view_rows)):
             if plan.weights[b, a] == 0:
                 continue
-            view, k, l = self.weighted_view(b, a)  # noqa: E741
+            view, k, l = self.weighted_view(b, a)
             y = plan.y[b, a] + plan.row_step * l
             down = shares(plan.interpolation, pixels[0], y[None, :], plan.row_step / plan.refine)
             part = self.rows_mixed(self.constant(down), view)
@@ -132,7 +133,7 @@ class _Run:
         for b in range(len(plan.view_rows)):
             if plan.weights[b, a] == 0:
                 continue
-            view, k, l = self.weighted_view(b, a)  # noqa: E741
+            view, k, l = self.weighted_view(b, a)
             # Down: raster row y of sample column k gathers samples near l(y, k).
             start_y = plan.y[b, a] + plan.step[1, 0] * k + plan.row_step * l[0]
             lines = self.gathered(view, row[:, None], start_y[None, :], plan.row_step / plan.refine)
@@ -155,9 +156,7 @@ class _Run:
         xp = self.xp
         samples, width, _ = block.shape
         size = max(abs(step), SMALLEST_STEP)
-        reach = max(size, 1.0) / 2 if self.plan.interpolation == "nearest" else (
-            REACH[self.plan.interpolation] * size + 0.5
-        )
+        reach = reach_in_pixels(self.plan.interpolation, size)
         middle = (pixel - start) / (size if step >= 0 else -size)
         first = np.clip(np.ceil(middle - reach / size), 0, samples - 1).astype(np.int64)
         last = np.clip(np.floor(middle + reach / size), 0, samples - 1).astype(np.int64)

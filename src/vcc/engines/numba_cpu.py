@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -115,7 +116,11 @@ def _blocks(plan: Plan, values: NDArray[Any], fine: _FineGrid, by_column: bool) 
         i = plan.view_columns[a]
         if readable:
             yield _Block(
-                values.reshape(nv, nu, nt, -1), all_rows, all_columns[a : a + 1], plan.view_rows, np.array([i])
+                values.reshape(nv, nu, nt, -1),
+                all_rows,
+                all_columns[a : a + 1],
+                plan.view_rows,
+                np.array([i]),
             )
             continue
         kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
@@ -151,13 +156,13 @@ class _Separable:
         for block in _blocks(self.plan, values, self.fine, by_column):
             masks = self.mask_columns(int(block.tap_columns[0]), pool) if masked else None
             starts = range(0, len(raster), MASKED_BAND if masked else BAND)
-            list(pool.map(lambda start, block=block, masks=masks: self.band(block, masks, start, raster), starts))  # type: ignore[misc]
+            list(pool.map(partial(self.band, block, masks, raster), starts))
             if progress is not None:
-                done += np.count_nonzero(self.weights[np.ix_(block.tap_rows, block.tap_columns)])
+                done += int(np.count_nonzero(self.weights[np.ix_(block.tap_rows, block.tap_columns)]))
                 progress(done, total)
 
     def band(
-        self, block: _Block, masks: NDArray[np.float32] | None, start: int, raster: NDArray[np.float32]
+        self, block: _Block, masks: NDArray[np.float32] | None, raster: NDArray[np.float32], start: int
     ) -> None:
         """Add one block's samples to a band of raster rows."""
         stop = min(start + (BAND if masks is None else MASKED_BAND), len(raster))

@@ -97,12 +97,23 @@ def sum_masked_rows(  # type: ignore[no-untyped-def]
         kept_row[:] = -1
         for y in range(start, stop):
             for t in range(width):
-                l = min(first[b, y] + t, last)  # noqa: E741
+                l = min(first[b, y] + t, last)
                 slot[t] = l % (width + 1)
                 if shares[b, y, t] != 0 and kept_row[slot[t]] != l:
                     kept_row[slot[t]] = l
                     samples = values[view_rows[b], column, l]
-                    _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], kept[slot[t]])
+                    _weigh(
+                        samples,
+                        masks,
+                        mask_start,
+                        mask_rows,
+                        row,
+                        row_step,
+                        b,
+                        l,
+                        weights[b],
+                        kept[slot[t]],
+                    )
             line = sums[y - start]
             for t in range(0, width, 3):
                 r0, r1, r2 = kept[slot[t]], kept[slot[t + 1]], kept[slot[t + 2]]
@@ -112,7 +123,7 @@ def sum_masked_rows(  # type: ignore[no-untyped-def]
 
 
 @_inlined
-def _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weight, product):  # type: ignore[no-untyped-def]  # noqa: E741
+def _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weight, product):  # type: ignore[no-untyped-def]
     """product = weight · samples · masks along one row."""
     for mask in range(row_step.size):
         place = row[mask, b] + row_step[mask] * l
@@ -211,7 +222,17 @@ def add_band(  # type: ignore[no-untyped-def]
         if not weights[:, a].any():
             continue
         sums[:] = 0
-        sum_rows(values, view_rows, view_columns[a], weights[:, a], first_row, row_shares, start, stop, sums)
+        sum_rows(
+            values,
+            view_rows,
+            view_columns[a],
+            weights[:, a],
+            first_row,
+            row_shares,
+            start,
+            stop,
+            sums,
+        )
         mix_columns(sums, first_column[a], column_shares[a], channels, raster[start:stop])
 
 
@@ -294,7 +315,7 @@ def sheared_view(  # type: ignore[no-untyped-def]
             high = min(int(np.floor(middle + reach_y / height)), nt - 1)
             for m in range(low, high + 1):
                 share = weight * _share(interpolation, y - y_start - fine_row_step * m, height)
-                l = first_l + m / refine  # noqa: E741
+                l = first_l + m / refine
                 for mask in range(mask_place.shape[0]):
                     column = mask_place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
                     row = mask_place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l

@@ -33,7 +33,7 @@ def run(plan: Plan, values: NDArray[Any], progress: Callable[[int, int], None] |
         if plan.weights[b, a] == 0:
             continue
         view = values[plan.view_rows[b], plan.view_columns[a]].astype(np.float64)
-        flux, k, l = _samples_of(plan, view.reshape(*view.shape[:2], *channels))  # noqa: E741
+        flux, k, l = _samples_of(plan, view.reshape(*view.shape[:2], *channels))
         flux = flux * plan.weights[b, a]
         for mask in plan.masks:
             flux = flux * mask.weights(b, a, k, l)[..., None]
@@ -52,11 +52,11 @@ def _samples_of(plan: Plan, view: Array) -> tuple[Array, Array, Array]:
     across, first_k = refinement_matrix(plan.interpolation, view.shape[1], plan.refine)
     fine = np.einsum("al,bk,lkc->abc", down, across, view, optimize=True)
     k = first_k + np.arange(fine.shape[1]) / plan.refine
-    l = first_l + np.arange(fine.shape[0]) / plan.refine  # noqa: E741
+    l = first_l + np.arange(fine.shape[0]) / plan.refine
     return fine, k, l
 
 
-def _spread(plan: Plan, raster: Array, flux: Array, b: int, a: int, k: Array, l: Array) -> None:  # noqa: E741
+def _spread(plan: Plan, raster: Array, flux: Array, b: int, a: int, k: Array, l: Array) -> None:
     """Add each sample's light to the pixels under its footprint."""
     rows, columns = plan.raster_shape
     fine = plan.refine

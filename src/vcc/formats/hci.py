@@ -28,9 +28,7 @@ def find(folder: Path) -> ViewGrid | None:
         InputError: a ``parameters.cfg`` that cannot be understood, a number of views that is no
             square (without one), or a grid that `vcc.formats.grid.arrange` refuses.
     """
-    numbered = {
-        file: int(match[1]) for file in pictures_in(folder) if (match := _NAME.fullmatch(file.stem))
-    }
+    numbered = {file: int(match[1]) for file in pictures_in(folder) if (match := _NAME.fullmatch(file.stem))}
     if not numbered:
         return None
     stated = read_grid_shape(folder)
@@ -72,9 +70,7 @@ def read_geometry(folder: Path) -> Geometry | None:
     def positive(section: str, key: str) -> float:
         value = _number(settings, section, key, folder)
         if not value > 0:
-            raise InputError(
-                f"{folder / PARAMETERS}: {key} is {value:g}, and must be greater than 0"
-            )
+            raise InputError(f"{folder / PARAMETERS}: {key} is {value:g}, and must be greater than 0")
         return value
 
     width = positive("intrinsics", "image_resolution_x_px")
@@ -84,9 +80,7 @@ def read_geometry(folder: Path) -> Geometry | None:
     focal_length = positive("intrinsics", "focal_length_mm") * mm
     focus = _number(settings, "extrinsics", "focus_distance_m", folder)
     if focus < 0:
-        raise InputError(
-            f"{folder / PARAMETERS}: focus_distance_m is {focus:g}, and must be 0 or more"
-        )
+        raise InputError(f"{folder / PARAMETERS}: focus_distance_m is {focus:g}, and must be 0 or more")
     low = _number(settings, "meta", "disp_min", folder, needed=False)
     high = _number(settings, "meta", "disp_max", folder, needed=False)
     return Geometry(
@@ -106,9 +100,7 @@ def _settings(folder: Path) -> configparser.ConfigParser | None:
     try:
         settings.read_string(path.read_text(encoding="utf-8"))
     except (configparser.Error, UnicodeDecodeError) as error:
-        raise InputError(
-            f"{path} cannot be read as an HCI camera file: {' '.join(str(error).split())}"
-        ) from None
+        raise InputError(f"{path} cannot be read as an HCI camera file: {' '.join(str(error).split())}") from None
     return settings
 
 
@@ -125,9 +117,7 @@ def _number(
     if text is None:
         if not needed:
             return math.nan
-        raise InputError(
-            f"{folder / PARAMETERS} does not state {key} in its section [{section}]. Add it"
-        )
+        raise InputError(f"{folder / PARAMETERS} does not state {key} in its section [{section}]. Add it")
     try:
         value = float(text)
     except ValueError:

@@ -86,8 +86,7 @@ def read_grey(path: str | PathLike[str]) -> NDArray[np.float64]:
     low, high = float(values.min()), float(values.max())
     if not (low >= 0 and high <= 1):
         raise InputError(
-            f"{path} holds values from {low:g} to {high:g}: a transmission is between 0 and 1. "
-            "Scale it"
+            f"{path} holds values from {low:g} to {high:g}: a transmission is between 0 and 1. Scale it"
         )
     return values
 
@@ -152,8 +151,7 @@ def save_image(
     ending = path.suffix.lower()
     if ending not in WRITE_ENDINGS:
         raise InputError(
-            f'a picture cannot be written as "{path.name}": end the name in '
-            f"{', '.join(WRITE_ENDINGS)}"
+            f'a picture cannot be written as "{path.name}": end the name in {", ".join(WRITE_ENDINGS)}'
         )
     values = (image.upright() if upright else image).to_numpy()
     if values.ndim == 3 and values.shape[2] == 1:
@@ -199,9 +197,7 @@ def _save_linear(
         else:
             _write_exr(values, temporary)
     size = _size(values)
-    return SavedPicture(
-        path, 1.0, 0.0, f"{path}: {size}, linear float32, values untouched (exposure 1)"
-    )
+    return SavedPicture(path, 1.0, 0.0, f"{path}: {size}, linear float32, values untouched (exposure 1)")
 
 
 def _save_display(
@@ -225,8 +221,7 @@ def _save_display(
     if not finite.all():
         where = tuple(int(n) for n in np.argwhere(~finite)[0])
         raise InputError(
-            f"the image has {values[where]} at index {where}, which {ending} cannot hold; "
-            ".npy and .exr can"
+            f"the image has {values[where]} at index {where}, which {ending} cannot hold; .npy and .exr can"
         )
     automatic = exposure == "auto"
     factor = auto_exposure(values) if automatic else _checked_exposure(exposure)
@@ -405,8 +400,7 @@ def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
         samples = samples.astype(np.float32, copy=False)
     if samples.dtype not in (np.uint8, np.uint16, np.float32):
         raise InputError(
-            f"{path} holds samples of type {samples.dtype}; uint8, uint16 and floating point can "
-            "be read"
+            f"{path} holds samples of type {samples.dtype}; uint8, uint16 and floating point can be read"
         )
     if samples.ndim not in (2, 3) or 0 in samples.shape:
         raise InputError(

@@ -164,9 +164,7 @@ def open_light_field(
         "slope_per_pixel": info.slope_per_pixel if slope_per_pixel is None else slope_per_pixel,
         "focus_distance": info.focus_distance if focus_distance is None else focus_distance,
     }
-    LightField.from_views(
-        np.zeros((1, 1, 1, 1), np.uint8), **geometry
-    )  # refuse before the long reading
+    LightField.from_views(np.zeros((1, 1, 1, 1), np.uint8), **geometry)  # refuse before the long reading
     values = _read_views(info, transfer, progress)
     values, moved = _rearranged(values, info, orientation)
     if "transpose" in moved.steps and spacing is None:
@@ -204,10 +202,7 @@ def _find_grid(folder: Path) -> ViewGrid:
     if not folder.exists():
         raise InputError(f"there is no folder {folder}")
     if not folder.is_dir():
-        raise InputError(
-            f"{folder} is a file; a light field is opened from a folder with a picture for each "
-            "view"
-        )
+        raise InputError(f"{folder} is a file; a light field is opened from a folder with a picture for each view")
     for find in (views_csv.find, hci.find, stanford.find, rowcol.find):
         grid = find(folder)
         if grid is not None:
@@ -239,9 +234,7 @@ def _with_parameters(grid: ViewGrid, folder: Path) -> ViewGrid:
     return replace(grid, geometry=hci.read_geometry(folder) or grid.geometry)
 
 
-def _read_views(
-    info: FolderInfo, transfer: Transfer, progress: Callable[[int, int], None] | None
-) -> NDArray[Any]:
+def _read_views(info: FolderInfo, transfer: Transfer, progress: Callable[[int, int], None] | None) -> NDArray[Any]:
     """All pictures in one array, shape (v, u, t, s[, channel]), float32 or as stored."""
     stored = {8: np.uint8, 16: np.uint16, 32: np.float32}[info.bits]
     kind = np.float32 if transfer == "srgb" else stored
@@ -397,8 +390,7 @@ def _assumed_remark(info: FolderInfo, assumed: list[str]) -> str:
     texts = {
         "spacing": _spacing_text(info),
         "slope_per_pixel": (
-            f"slope_per_pixel={info.slope_per_pixel:.6g} (a focal length as long as the picture is "
-            "wide)"
+            f"slope_per_pixel={info.slope_per_pixel:.6g} (a focal length as long as the picture is wide)"
         ),
         "focus_distance": "focus_distance=inf (parallel views)",
     }

@@ -42,9 +42,7 @@ def from_linear(linear: ArrayLike) -> NDArray[np.float32]:
     """
     light = np.asarray(linear, dtype=np.float32)
     power = np.float32(1.055) * np.maximum(light, np.float32(0.0031308)) ** np.float32(1 / 2.4)
-    return np.where(
-        light <= np.float32(0.0031308), light * np.float32(12.92), power - np.float32(0.055)
-    )
+    return np.where(light <= np.float32(0.0031308), light * np.float32(12.92), power - np.float32(0.055))
 
 
 @functools.cache

@@ -37,8 +37,7 @@ def find(folder: Path) -> ViewGrid | None:
     column_name = "column" if "column" in header else "col"
     if not {"row", column_name, "file"} <= set(header):
         raise InputError(
-            f'{table} has the header "{",".join(header)}"; it needs "row,col,file" (or '
-            '"row,column,file")'
+            f'{table} has the header "{",".join(header)}"; it needs "row,col,file" (or "row,column,file")'
         )
     order = [header.index(name) for name in ("row", column_name, "file")]
     places = [_place(line, order, f"{table}, line {number}") for number, line in numbered[1:]]
@@ -59,6 +58,5 @@ def _place(line: list[str], order: list[int], where: str) -> Place:
         return Place(int(row), int(column), Path(file))
     except (IndexError, ValueError):
         raise InputError(
-            f'{where} is "{",".join(line)}"; it needs a whole row number, a whole column number '
-            "and a file"
+            f'{where} is "{",".join(line)}"; it needs a whole row number, a whole column number and a file'
         ) from None

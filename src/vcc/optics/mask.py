@@ -49,7 +49,7 @@ class Mask(Element):
 
     def _as_pattern(self) -> Pattern:
         given: Any = self.pattern
-        if isinstance(given, Cells) or isinstance(given, Pattern) or callable(given):
+        if isinstance(given, Pattern) or callable(given):
             return as_pattern(given)
         if self.width is None:
             raise InputError(f"{self.label} is an array of cells: give its width in metres, e.g. width=30 * mm")

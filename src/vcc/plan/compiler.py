@@ -150,13 +150,20 @@ def _absorbing_planes(camera: Camera, frame: Affine, sensor_place: Array) -> tup
     Rule: a mask whose every ray meets it where it meets the sensor multiplies the picture. Precondition:
     the place on the mask is the place on the sensor, shifted at most, for every sample.
     """
-    in_path, against_sensor = [], []
+    in_path: list[Plane] = []
+    against_sensor: list[Plane] = []
     for element in camera.elements:
         pattern = element.faces().pattern
         if pattern is None:
             continue
         place = (camera.rays_at(element.z, before=True) @ frame).matrix[:2]
-        plane = Plane(pattern, element.label, element.decentre, place[:, :4], place[:, 4] - np.array(element.decentre))
+        plane = Plane(
+            pattern,
+            element.label,
+            element.decentre,
+            place[:, :4],
+            place[:, 4] - np.array(element.decentre),
+        )
         same = np.allclose(place, sensor_place, rtol=1e-9, atol=1e-9 * np.abs(sensor_place).max())
         (against_sensor if same else in_path).append(plane)
     return in_path, against_sensor
@@ -206,9 +213,7 @@ def _divide_views(planes: list[Plane], between: BetweenViews, refine: int | str)
     return divide
 
 
-def _divide_samples(
-    planes: list[Plane], between: BetweenViews, shape: tuple[int, ...], refine: int | str
-) -> int:
+def _divide_samples(planes: list[Plane], between: BetweenViews, shape: tuple[int, ...], refine: int | str) -> int:
     """Into how many parts a sample is divided each way, so that a mask near the sensor stays sharp.
 
     A sample's light lands on the pixels as one footprint, mask and all: detail of the mask that the
@@ -277,7 +282,9 @@ def _aperture_outside_views(planes: list[Plane], shape: tuple[int, ...]) -> floa
         here = here + other.sample_step @ np.array([(shape[3] - 1) / 2, (shape[2] - 1) / 2])
         open_here = open_here * other.pattern(here[..., 0], here[..., 1])
     # Half a raster step of grace: an aperture as wide as the grid misses nothing.
-    inside = (np.abs(view - (np.array([shape[1], shape[0]]) - 1) / 2) <= np.array([shape[1], shape[0]]) / 2).all(-1)
+    inside = (np.abs(view - (np.array([shape[1], shape[0]]) - 1) / 2) <= np.array([shape[1], shape[0]]) / 2).all(
+        -1
+    )
     total = open_here.sum()
     return float(1 - (open_here * inside).sum() / total) if total > 0 else 0.0
 
@@ -309,7 +316,8 @@ def _covered_share(first: Array, step: float, samples: int, pixels: int) -> Arra
     """The share of the sensor's extent that each view's picture covers, along one axis."""
     ends = np.stack([first - step / 2, first + step * (samples - 0.5)])
     low, high = ends.min(axis=0), ends.max(axis=0)
-    return np.clip(np.minimum(high, pixels - 0.5) - np.maximum(low, -0.5), 0, None) / pixels
+    covered = np.minimum(high, pixels - 0.5) - np.maximum(low, -0.5)
+    return np.asarray(np.clip(covered, 0, None) / pixels)
 
 
 def _notes(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,16 +61,21 @@ def _what(camera: Camera, light_field: LightField) -> str:
         f"{to_dtype(light_field.values)}; {describe_geometry(light_field)}"
     ]
     lines += [
-        f"  z = {text(element.z):>9}  {element.kind}"
+        f"  z = {_short(element.z):>9}  {element.kind}"
         + (f' "{element.name}"' if element.name else "")
         + (f", {element.described()}" if element.described() else "")
         for element in camera.elements
     ]
     rows, columns = camera.sensor.shape
     vertical, horizontal = camera.sensor.pitches
-    pitch = text(vertical) if vertical == horizontal else f"{text(vertical)} × {text(horizontal)}"
-    lines.append(f"  z = {text(camera.sensor.z):>9}  sensor, {rows}×{columns} pixels of {pitch}")
+    pitch = _short(vertical) if vertical == horizontal else f"{_short(vertical)} × {_short(horizontal)}"
+    lines.append(f"  z = {_short(camera.sensor.z):>9}  sensor, {rows}×{columns} pixels of {pitch}")
     return "\n".join(lines)
+
+
+def _short(length: float) -> str:
+    """A length for people to read: six digits are more than any of them will build."""
+    return text(float(f"{length:.6g}"))
 
 
 def _sampling(plan: Plan) -> str:
@@ -144,12 +150,15 @@ def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) ->
     used = np.count_nonzero(plan.weights, axis=0)
     columns = np.sort(np.argsort(-used)[: max(1, len(used) // 16)])
     piece = _columns_of(plan, columns)
-    nothing = replace(piece, weights=np.zeros_like(piece.weights))  # what a run costs whatever it adds up
+    # What a run costs whatever it adds up.
+    nothing = replace(piece, weights=np.zeros_like(piece.weights))
+
+    def least_seconds(plan: Plan) -> float:
+        step = partial(run_plan, plan, light_field.values, engine=engine)
+        return min(_timed(step) for _ in range(3))  # the first run may compile
+
     try:
-        whole, fixed = (
-            min(_timed(lambda p=p: run_plan(p, light_field.values, engine=engine)) for _ in range(3))  # type: ignore[misc]
-            for p in (piece, nothing)
-        )
+        whole, fixed = least_seconds(piece), least_seconds(nothing)
     except Exception:  # an array under a tracer has no values to run
         return None
     return fixed + max(whole - fixed, 0.0) * plan.taps_used / piece.taps_used

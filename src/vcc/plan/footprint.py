@@ -87,6 +87,16 @@ def shares(interpolation: str, pixel: Any, position: Any, step: float, xp: Any =
     return upper - cumulative(interpolation, (offset - 0.5) / size, xp)
 
 
+def reach_in_pixels(interpolation: str, size: float) -> float:
+    """How far from a sample, in pixels, a pixel's middle can lie and still receive a share.
+
+    Args:
+        interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+        size: pixels from one sample to the next, greater than 0.
+    """
+    return max(size, 1.0) / 2 if interpolation == "nearest" else REACH[interpolation] * size + 0.5
+
+
 @dataclass(frozen=True)
 class Taps:
     """Shares as a table by pixel: pixel m gathers ``weights[..., m, n]`` of sample ``first[..., m] + n``.
@@ -114,10 +124,7 @@ def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: i
     """
     size = max(abs(step), SMALLEST_STEP)
     signed = size if step >= 0 else -size
-    if interpolation == "nearest":
-        reach = max(size, 1.0) / 2
-    else:
-        reach = REACH[interpolation] * size + 0.5
+    reach = reach_in_pixels(interpolation, size)
     pixel = np.arange(pixels, dtype=np.float64)
     middle = (pixel - np.asarray(origin, dtype=np.float64)[..., None]) / signed
     low = np.clip(np.ceil(middle - reach / size), 0, samples)

@@ -38,7 +38,7 @@ class MaskLookup:
     step: Array
     label: str
 
-    def weights(self, b: int, a: int, k: Array, l: Array) -> Array:  # noqa: E741
+    def weights(self, b: int, a: int, k: Array, l: Array) -> Array:
         """T at the samples with column indices k and row indices l of view tap (b, a): shape (l, k)."""
         column = self.column[b, a] + self.step[0, 0] * k[None, :] + self.step[0, 1] * l[:, None]
         row = self.row[b, a] + self.step[1, 0] * k[None, :] + self.step[1, 1] * l[:, None]

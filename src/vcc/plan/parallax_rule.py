@@ -99,7 +99,9 @@ def choose_between_views(
         else "the pictures show no parallax to measure"
     )
     if between_views == "none":
-        return BetweenViews(motions[chosen], (0.0, 0.0), largest, f"{spread}; views are not interpolated, as asked")
+        return BetweenViews(
+            motions[chosen], (0.0, 0.0), largest, f"{spread}; views are not interpolated, as asked"
+        )
     if wanted <= pixel:
         return BetweenViews(motions[chosen], (0.0, 0.0), largest, f"{spread}; {_advice(largest, pixel)}")
     step = np.abs(steps[chosen])

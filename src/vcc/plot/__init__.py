@@ -1,0 +1,10 @@
+"""Pictures that explain: a camera from the side, and light fields in phase space.
+
+All functions draw on Matplotlib axes, given or new, and return them; `savefig` of their ``figure``
+writes a file. New figures belong to nobody but the caller: pyplot and its global state are not used.
+"""
+
+from vcc.plot.camera_plot import focused_distance, plot_camera
+from vcc.plot.phase_space import plot_phase_space, plot_phase_space_stages
+
+__all__ = ["focused_distance", "plot_camera", "plot_phase_space", "plot_phase_space_stages"]

@@ -29,7 +29,7 @@ def views_of_row(  # type: ignore[no-untyped-def]
     through = np.empty(columns, np.float32)
     rounding = np.float32(0.5) if top < np.inf else np.float32(0)
     one = np.float32(1)
-    for l in range(rows):  # noqa: E741
+    for l in range(rows):
         for p in range(planes):
             w = row_share[p]
             above = rasters[p, first_row[p] + phases * l].reshape(-1)

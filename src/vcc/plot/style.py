@@ -1,0 +1,45 @@
+"""What all pictures share: size of type, a palette that colour-blind readers tell apart, new axes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
+"""Of the palette of Okabe and Ito (2008), which people with any colour vision tell apart."""
+GLASS, GLASS_EDGE = "#CFE6F5", "#4A7A9C"
+INK, QUIET = "#222222", "#777777"
+NOTHING = "#DDDDDD"
+"""Where a light field holds no samples: neither black nor white."""
+
+TITLE, TEXT, SMALL = 12, 11, 10
+"""Points; readable at 100 dots per inch."""
+
+
+def new_axes(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:
+    """Axes on a new figure that no global state knows of.
+
+    Args:
+        width: of the figure, inches.
+        height: inches.
+        rows: of axes.
+        columns: of axes.
+        options: as `matplotlib.figure.Figure.subplots` takes them.
+
+    Returns:
+        Axes, or a (rows, columns) array of them if ``squeeze=False`` is given.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=100, layout="constrained")
+    return figure.subplots(rows, columns, **options)
+
+
+def tidy(axes: Axes, horizontal: str, vertical: str) -> None:
+    """Label the axes, and take away what carries no information."""
+    axes.set_xlabel(horizontal, fontsize=TEXT, color=INK)
+    axes.set_ylabel(vertical, fontsize=TEXT, color=INK)
+    axes.tick_params(labelsize=SMALL, colors=INK)
+    axes.spines[["top", "right"]].set_visible(False)
