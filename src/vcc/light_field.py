@@ -65,6 +65,7 @@ class LightField:
     disparity_range: tuple[float, float] | None = None
     _shared_disparity: DisparityRange | None = field(default=None, repr=False)
     _disparity_factor: float = field(default=1.0, repr=False)
+    _whole_views: tuple[float, float] | None = field(default=None, repr=False)
     _checked: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -88,6 +89,8 @@ class LightField:
         if not self._checked:
             _check_samples(self.values)
             object.__setattr__(self, "_checked", True)
+        if self._whole_views is None:
+            object.__setattr__(self, "_whole_views", (float(shape[0]), float(shape[1])))
         if self._shared_disparity is None:
             object.__setattr__(self, "_shared_disparity", DisparityRange(self._measure_disparity))
 
@@ -156,6 +159,16 @@ class LightField:
         return float(np.iinfo(kind).max) if kind.kind == "u" else 1.0
 
     @property
+    def whole_views(self) -> tuple[float, float]:
+        """(rows, columns) of views of the light field that this is a piece of, counted in this piece's steps.
+
+        What a camera decides by the extent of the views it decides for all pieces alike, so that the pictures
+        of the pieces add up to the picture of the whole.
+        """
+        assert self._whole_views is not None
+        return self._whole_views
+
+    @property
     def sample_volume(self) -> float:
         """The phase-space volume du·dv·ds·dt of one sample's cell, m² (slopes have no unit)."""
         return abs(self.frame.determinant)
@@ -169,7 +182,11 @@ class LightField:
     def __getitem__(self, index: Index | tuple[Index, ...]) -> LightField:
         """A piece of the light field, in its place: slices along (v, u, t, s[, channel])."""
         values, frame, steps = sliced(self.values, self.frame, index, LIGHT_FIELD_AXES, "a light field")
-        return self._with(values, frame, steps[0] / steps[2])
+        rows, columns = self.whole_views
+        return replace(
+            self._with(values, frame, steps[0] / steps[2]),
+            _whole_views=(rows / abs(steps[1]), columns / abs(steps[0])),
+        )
 
     def view(self, row: int, column: int) -> Image:
         """One view as a picture whose frame maps (column, row, 1) to the slopes (s, t, 1) of its pixels.

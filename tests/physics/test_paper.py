@@ -208,9 +208,11 @@ def grid(lf: vcc.LightField, shape: tuple[int, int, int, int]) -> Affine:
 # In mid-path the field is a sheared box in a straight grid, empty at the corners: the camera says so.
 @pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 def test_the_operators_step_by_step_tend_to_the_camera():
-    slope, spacing, number, pixels = 2e-3, 0.25 * mm, 6, 20
+    slope, spacing, number, pixels = 2e-3, 0.25 * mm, 8, 20
     world = Scene([Layer(1 * m, cosines(5, np.array([14.0, 20.0]) * slope * m))])
     samples = views(world, (number, number, pixels, pixels), spacing, slope, 1 * m)
+    # The outer views are dark: what lies between the last sample and its cell's border is resampled to zero.
+    samples[[0, -1]] = samples[:, [0, -1]] = 0
     lf = vcc.LightField.from_views(samples, spacing, slope, 1 * m, disparity_range=(0.0, 0.0))
     mask = vcc.Mask(pattern=CosineSum((2 * mm, 3 * mm), 1, 0.3), z=0.5 * D)
     sensor = vcc.Sensor(z=D, shape=(10, 10), pitch=D * slope)
@@ -226,7 +228,7 @@ def test_the_operators_step_by_step_tend_to_the_camera():
     reached = [psnr(pipeline(fine), expected) for fine in (16, 24, 40)]
     print([f"{value:.1f} dB" for value in reached])
     assert reached[0] < reached[1] < reached[2]
-    assert reached[2] > 35
+    assert reached[2] > 50
 
 
 def test_light_field_at_the_sensor_projects_to_the_picture():

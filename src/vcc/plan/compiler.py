@@ -66,7 +66,7 @@ def compile_plan(
     path_planes = [p for p in planes if p not in view_planes]
 
     divide = _divide_views(planes, between, refine)
-    fine = _divide_samples(path_planes, between, light_field.shape, refine)
+    fine = _divide_samples(path_planes, between, light_field.whole_views, refine)
     rows, row_shift, row_share = _tap_places(light_field.shape[0], divide)
     columns, column_shift, column_share = _tap_places(light_field.shape[1], divide)
     index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
@@ -213,7 +213,7 @@ def _divide_views(planes: list[Plane], between: BetweenViews, refine: int | str)
     return divide
 
 
-def _divide_samples(planes: list[Plane], between: BetweenViews, shape: tuple[int, ...], refine: int | str) -> int:
+def _divide_samples(planes: list[Plane], between: BetweenViews, views: tuple[float, float], refine: int | str) -> int:
     """Into how many parts a sample is divided each way, so that a mask near the sensor stays sharp.
 
     A sample's light lands on the pixels as one footprint, mask and all: detail of the mask that the
@@ -223,7 +223,7 @@ def _divide_samples(planes: list[Plane], between: BetweenViews, shape: tuple[int
         return refine
     fine = 1
     for plane in planes:
-        penumbra = np.abs(plane.view_step(between.motion)) @ np.array([shape[1], shape[0]])
+        penumbra = np.abs(plane.view_step(between.motion)) @ np.array([views[1], views[0]])
         sample = 2 * np.abs(plane.sample_step).sum(axis=1)
         while fine < LARGEST_REFINEMENT:
             if detail_lost(plane, penumbra, sample / fine) < FINE_DETAIL_IN_SAMPLE:

@@ -75,7 +75,8 @@ def choose_between_views(
         between_views: ``"auto"`` or ``"none"``.
         scene_distance: metres before the entrance plane, or None.
     """
-    if light_field.shape[0] == light_field.shape[1] == 1:
+    rows, columns = light_field.whole_views
+    if rows <= 1 and columns <= 1:
         return BetweenViews(np.zeros((2, 2)), (0.0, 0.0), 0.0, "a single view: nothing between views")
     vergences = _vergences(light_field, scene_distance)
     if vergences is None:
@@ -85,7 +86,7 @@ def choose_between_views(
     else:
         motions = np.stack([index_motion(frame, vergence) for vergence in vergences])
         steps = on_sensor[:, :2] - on_sensor[:, 2:] @ motions
-    axis = 0 if light_field.shape[1] > 1 else 1
+    axis = 0 if columns > 1 else 1
     along = steps[:, :, axis]
     gaps = np.linalg.norm(along, axis=-1)
     crosses_focus = (along @ along[0] < 0).any()
@@ -105,8 +106,8 @@ def choose_between_views(
     if wanted <= pixel:
         return BetweenViews(motions[chosen], (0.0, 0.0), largest, f"{spread}; {_advice(largest, pixel)}")
     step = np.abs(steps[chosen])
-    vertical = float(step[1].sum()) if light_field.shape[0] > 1 or axis == 1 else 0.0
-    horizontal = float(step[0].sum()) if light_field.shape[1] > 1 or axis == 0 else 0.0
+    vertical = float(step[1].sum()) if rows > 1 else 0.0
+    horizontal = float(step[0].sum()) if columns > 1 else 0.0
     left = max(largest - wanted, 0.0)
     return BetweenViews(
         motions[chosen],

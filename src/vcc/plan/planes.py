@@ -42,10 +42,10 @@ class Plane:
 
 
 def depends_on_view_only(plane: Plane, samples: tuple[int, int], motion: Array) -> bool:
-    """Whether all samples of a view meet the plane in one place, compared with the cell of a view."""
+    """Whether all samples of a view meet the plane in one place, but for rounding."""
     cell = np.abs(plane.view_step(motion)).sum(axis=1)
     travel = np.abs(plane.sample_step) @ np.array([samples[1], samples[0]])
-    return bool((travel <= 0.02 * cell).all())
+    return bool((travel <= 1e-6 * cell).all())
 
 
 def tap_origin(at_index: Array, offset: Array, index: Array, shift: Array, motion: Array) -> Array:
@@ -75,12 +75,13 @@ def mask_lookup(
     high = (place.reshape(-1, 2)[:, None] + corners).max(axis=(0, 1))
     bound = np.array(plane.pattern.size) / 2 + footprint
     low, high = np.maximum(low, -bound), np.minimum(high, bound)
-    extent = np.maximum(high - low, 1e-12)
-    spacing = np.maximum(footprint / TEXTURE_POINTS_PER_FOOTPRINT, extent / (LARGEST_TEXTURE - 4))
-    points = np.ceil(extent / spacing).astype(int) + 3
-    start = (low + high) / 2 - (points - 1) / 2 * spacing
-    grid_x = start[0] + np.arange(points[0]) * spacing[0]
-    grid_y = start[1] + np.arange(points[1]) * spacing[1]
+    spacing = _texture_spacing(footprint, np.minimum(2 * bound, high - low))
+    # Points lie on one lattice, whatever part of the mask is needed: pieces of a light field read the same.
+    first, last = np.floor(low / spacing) - 1, np.ceil(high / spacing) + 1
+    last = np.maximum(last, first + 2)
+    start = first * spacing
+    grid_x = np.arange(first[0], last[0] + 1) * spacing[0]
+    grid_y = np.arange(first[1], last[1] + 1) * spacing[1]
     texture = plane.pattern.mean(grid_x[None, :], grid_y[:, None], footprint[0], footprint[1])
     return MaskLookup(
         texture=np.ascontiguousarray(texture, dtype=np.float32),
@@ -113,3 +114,10 @@ def detail_lost(plane: Plane, known: Array, added: Array) -> float:
     before = mean(x[None, :], y[:, None], *np.maximum(known, size / counts)).var()
     after = mean(x[None, :], y[:, None], *np.maximum(np.hypot(known, added), size / counts)).var()
     return float((before - after) / whole)
+
+
+def _texture_spacing(footprint: Array, extent: Array) -> Array:
+    """Distance between texture points along (x, y): a share of the footprint, doubled until the texture fits."""
+    spacing = np.where(footprint > 0, footprint / TEXTURE_POINTS_PER_FOOTPRINT, np.maximum(extent, 1e-9) / 1024)
+    too_many = np.maximum(extent / spacing / (LARGEST_TEXTURE - 4), 1.0)
+    return np.asarray(spacing * 2 ** np.ceil(np.log2(too_many)))

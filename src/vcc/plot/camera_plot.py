@@ -92,8 +92,7 @@ def plot_camera(
         axes = style.new_axes(9.5, 4.8)
     start = -_scene_length(camera, points)
     paths = [
-        _trace_point(camera, point, light_field, axis, rays if not point.offset else 3, start)
-        for point in points
+        _trace_point(camera, point, light_field, axis, rays if not point.offset else 3, start) for point in points
     ]
     half = _half_height(camera, paths, axis)
     pen = _Pen(axes, axis, half, camera.sensor.z - start)
@@ -185,9 +184,7 @@ def _trace_point(
     return trace(camera, bundle, max(start, -point.distance))
 
 
-def _entrance(
-    camera: Camera, point: _Point, light_field: LightField | None, axis: int
-) -> tuple[float, float]:
+def _entrance(camera: Camera, point: _Point, light_field: LightField | None, axis: int) -> tuple[float, float]:
     """From where to where on the entrance plane the rays of a point go, metres."""
     if light_field is not None:
         ends = np.array(light_field.shape[1::-1]) - 0.5

@@ -1,0 +1,6 @@
+"""``python -m vcc.cli`` is ``vcc``."""
+
+from vcc.cli import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,318 @@
+"""The commands of ``vcc``: each reads its input, calls the library and says what came of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from vcc.cli import options as given
+from vcc.cli.console import Commands, check_output, make_folder, progress, show
+from vcc.errors import InputError
+
+if TYPE_CHECKING:
+    from vcc.formats import FolderInfo
+    from vcc.light_field import LightField
+
+SAMPLES_WORTH_A_BAR = 3e8
+"""Below this, a picture takes less than a second, and asking for progress would only slow it down."""
+
+app = typer.Typer(
+    cls=Commands,
+    name="vcc",
+    help="Virtual Computational Camera: what would a camera with unconventional optics record? "
+    "Give it a light field and a camera file, get the picture on its sensor.",
+    epilog="Try:  vcc demo  ·  Help on a command:  vcc capture --help",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from vcc import __version__
+
+        show(f"vcc {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command(
+    epilog='Example:  vcc capture camera.toml views/ -o picture.png --spacing "1 mm"\n\n'
+    "Example:  vcc capture camera.toml views/ -o picture.exr --interpolation cubic"
+)
+def capture(
+    camera: given.CameraFile,
+    light_field: given.LightFieldFolder,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="The picture: .png and .tif are for people (sRGB); .exr and .npy hold linear values untouched.",
+            show_default=False,
+        ),
+    ],
+    exposure: Annotated[
+        str,
+        typer.Option(
+            metavar="NUMBER",
+            help="Factor from irradiance to the brightness of a .png or .tif. auto shows the "
+            "brightest parts white and says which factor that took.",
+        ),
+    ] = "auto",
+    as_recorded: Annotated[
+        bool,
+        typer.Option("--as-recorded", help="Leave the picture upside down, as it lies on the sensor."),
+    ] = False,
+    interpolation: given.Interpolation = "linear",
+    between_views: given.BetweenViews = "auto",
+    scene_distance: given.SceneDistance = None,
+    engine: given.Engine = "numba",
+    transfer: given.Transfer = "srgb",
+    spacing: given.Spacing = None,
+    slope_per_pixel: given.SlopePerPixel = None,
+    focus_distance: given.FocusDistance = None,
+    orientation: given.Orientation = "auto",
+) -> None:
+    """Make the picture that a camera records of a light field."""
+    factor = given.exposure_of(exposure)
+    distance = given.length(scene_distance, "--scene-distance")
+    from vcc.camera_file import load_camera
+    from vcc.formats.pictures import WRITE_ENDINGS
+
+    output = check_output(output, WRITE_ENDINGS)
+    optics = load_camera(camera)
+    field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
+    plan = optics.compile(
+        field,
+        interpolation=interpolation,
+        between_views=between_views,
+        scene_distance=distance,
+    )
+    expensive = plan.samples_touched * (field.channels or 1) > SAMPLES_WORTH_A_BAR
+    with progress("Capturing") as advance:
+        image = optics.capture(
+            field,
+            interpolation=interpolation,
+            between_views=between_views,
+            scene_distance=distance,
+            engine=engine,
+            progress=advance if expensive else None,
+        )
+    show(image.save(output, exposure=factor, upright=not as_recorded).description)
+
+
+@app.command(epilog="Example:  vcc explain camera.toml views/")
+def explain(
+    camera: given.CameraFile,
+    light_field: given.LightFieldFolder,
+    interpolation: given.Interpolation = "linear",
+    between_views: given.BetweenViews = "auto",
+    scene_distance: given.SceneDistance = None,
+    engine: given.Engine = "numba",
+    transfer: given.Transfer = "srgb",
+    spacing: given.Spacing = None,
+    slope_per_pixel: given.SlopePerPixel = None,
+    focus_distance: given.FocusDistance = None,
+    orientation: given.Orientation = "auto",
+) -> None:
+    """Say how a picture would be made, what it costs and what to beware of."""
+    distance = given.length(scene_distance, "--scene-distance")
+    from vcc.camera_file import load_camera
+
+    optics = load_camera(camera)
+    field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
+    words = optics.explain(
+        field,
+        interpolation=interpolation,
+        between_views=between_views,
+        scene_distance=distance,
+        engine=engine,
+    )
+    show(str(words))
+
+
+@app.command(epilog="Example:  vcc info views/\n\nExample:  vcc info views/ --quick")
+def info(
+    light_field: given.LightFieldFolder,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help="Read one view only: nothing is measured, and no view compared."),
+    ] = False,
+) -> None:
+    """Say what a light field is: views, cameras, disparities, and what its files leave open."""
+    from vcc.formats import read_geometry
+
+    facts = read_geometry(light_field)
+    lines = _facts(facts)
+    if not quick:
+        # Linear keeps the type of the files: disparities do not need light, and memory is short.
+        field = given.read_light_field(light_field, "linear", None, None, None, "auto")
+        lines["disparities"] = _disparities(field, facts)
+    width = max(map(len, lines)) + 2
+    show("\n".join(f"{name:<{width}}{value}" for name, value in lines.items()))
+
+
+def _facts(facts: FolderInfo) -> dict[str, str]:
+    """What the folder states and what is taken for granted, line by line."""
+    import math
+
+    from vcc.units import text
+
+    def assumed(name: str) -> str:
+        return "  (not stated: assumed)" if name in facts.unknown else ""
+
+    kind = "floating-point" if facts.bits == 32 else f"{facts.bits}-bit"
+    colour = "grey" if facts.channels is None else f"{facts.channels} channels"
+    samples = facts.rows * facts.columns * facts.height * facts.width * (facts.channels or 1)
+    vertical, horizontal = facts.spacing
+    apart = text(float(f"{vertical:.6g}"))
+    if vertical != horizontal:
+        apart = f"{apart} (rows), {text(float(f'{horizontal:.6g}'))} (columns)"
+    focus = facts.focus_distance
+    converge = "parallel" if math.isinf(focus) else f"converge {text(float(f'{focus:.6g}'))} away"
+    lines = {
+        "format": facts.format,
+        "views": f"{facts.rows} × {facts.columns} (rows × columns)",
+        "pictures": f"{facts.width} × {facts.height} pixels, {colour}, {kind}",
+        "size": f"{samples * facts.bits // 8 / 1e6:,.1f} MB in memory as stored, "
+        f"{samples * 4 / 1e6:,.1f} MB as linear light",
+        "spacing": apart + assumed("spacing"),
+        "slope per pixel": f"{facts.slope_per_pixel:.6g}" + assumed("slope_per_pixel"),
+        "views are": converge + assumed("focus_distance"),
+    }
+    if facts.disparity_range is not None:
+        low, high = facts.disparity_range
+        lines["disparities"] = f"{low:.3g} to {high:.3g} pixels per view (stated)"
+    return lines
+
+
+def _disparities(field: LightField, facts: FolderInfo) -> str:
+    """The disparities and what they mean in metres."""
+    from vcc.units import text
+
+    known = field.measured_disparity_range()
+    if known is None:
+        return "none to measure: one view, or pictures without texture"
+    low, high = known
+    source = "measured" if facts.disparity_range is None else "stated"
+    words = f"{low:.3g} to {high:.3g} pixels per view ({source})"
+    near, far = field.distance_of(high), field.distance_of(low)
+    if 0 < near < far:
+        places = f"{text(float(f'{near:.3g}'))} to {text(float(f'{far:.3g}'))}"
+        words += f": things {places} away"
+        words += " if what is assumed is right" if facts.unknown else ""
+    return words
+
+
+@app.command(
+    epilog="Example:  vcc plot camera.toml -o camera.svg\n\n"
+    "Example:  vcc plot camera.toml --phase-space --light-field views/"
+)
+def plot(
+    camera: given.CameraFile,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="The drawing, .png, .svg or .pdf. Default: the camera file's name with .png, here.",
+            show_default=False,
+        ),
+    ] = None,
+    object_distance: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LENGTH",
+            help='Distance of a point to draw rays from, "1.2 m", or inf; may be repeated. Default: '
+            "the distance in focus and a nearer one.",
+            show_default=False,
+        ),
+    ] = None,
+    across: Annotated[Literal["x", "y"], typer.Option(help="The axis drawn upwards.")] = "x",
+    light_field: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="LIGHTFIELD",
+            help="A folder of views: rays fill its width; --phase-space draws it.",
+            show_default=False,
+        ),
+    ] = None,
+    phase_space: Annotated[
+        bool,
+        typer.Option(
+            "--phase-space",
+            help="Draw the u–s diagram of the light field instead: at the entrance, behind each "
+            "element, on the sensor.",
+        ),
+    ] = False,
+    transfer: given.Transfer = "srgb",
+    spacing: given.Spacing = None,
+    slope_per_pixel: given.SlopePerPixel = None,
+    focus_distance: given.FocusDistance = None,
+    orientation: given.Orientation = "auto",
+) -> None:
+    """Draw a camera from the side with rays, or a light field's way through it in phase space."""
+    if phase_space and light_field is None:
+        raise InputError("--phase-space draws a light field: give it with --light-field FOLDER")
+    target = check_output(output or Path(f"{camera.stem}.png"), (".png", ".svg", ".pdf"))
+    distances = [given.length(each, "--object-distance") or 0.0 for each in object_distance or []]
+    from vcc.camera_file import load_camera
+    from vcc.formats.atomic import atomic_path
+    from vcc.plot import plot_camera, plot_phase_space_stages
+
+    optics = load_camera(camera)
+    field = None
+    if light_field is not None:
+        field = given.read_light_field(
+            light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation
+        )
+    if phase_space and field is not None:
+        figure = plot_phase_space_stages(optics, field, across="u" if across == "x" else "v")
+    else:
+        axes = plot_camera(optics, light_field=field, object_distances=distances or None, across=across)
+        figure = axes.figure
+    with atomic_path(target) as temporary:
+        figure.savefig(temporary)
+    show(f"{target}: written")
+
+
+@app.command(epilog="Example:  vcc demo --small\n\nExample:  vcc demo --light-field views/")
+def demo(
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="FOLDER", help="Where the pictures go."),
+    ] = Path("vcc-demo"),
+    light_field: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="A light field of your own: a folder with a picture for each view. Default: a scene "
+            "that the demo makes.",
+            show_default=False,
+        ),
+    ] = None,
+    small: Annotated[bool, typer.Option("--small", help="Fewer views and pixels: a look in seconds.")] = False,
+) -> None:
+    """Show what this can do: several cameras look at one scene."""
+    folder = make_folder(output)
+    from rich.console import Console
+
+    from vcc.demo import run_demo
+
+    run_demo(folder, light_field, small, Console())

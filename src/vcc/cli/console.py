@@ -1,0 +1,108 @@
+"""How commands speak: results on standard output; errors, notes and progress on standard error."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from vcc.errors import InputError, ResultWarning
+
+
+class Commands(TyperGroup):
+    """A group of commands that all report errors and warnings alike."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command; bad input becomes a message and exit code 2, a warning a line."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", ResultWarning)
+            show = warnings.showwarning
+
+            def show_note(message: Any, category: type[Warning], *rest: Any, **named: Any) -> None:
+                if issubclass(category, ResultWarning):
+                    say("Note:", "yellow", str(message))
+                else:
+                    show(message, category, *rest, **named)
+
+            warnings.showwarning = show_note
+            try:
+                return super().invoke(ctx)
+            except InputError as error:
+                say("Error:", "bold red", str(error))
+                raise typer.Exit(2) from None
+
+
+def say(word: str, colour: str, message: str) -> None:
+    """A line on standard error, its first word in colour."""
+    from rich.console import Console
+    from rich.text import Text
+
+    Console(stderr=True).print(Text(word, style=colour), Text(message), soft_wrap=True)
+
+
+def show(message: str) -> None:
+    """Text on standard output as it is: no markup, no breaking of lines."""
+    typer.echo(message)
+
+
+@contextmanager
+def progress(task: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar on standard error while something runs, if people watch; yields what to call to move it.
+
+    Args:
+        task: what is being done, in a few words.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        running = bar.add_task(task, total=None)
+        yield lambda done, total: bar.update(running, completed=done, total=total)
+
+
+def check_output(path: Path, endings: tuple[str, ...]) -> Path:
+    """Refuse a file that cannot be written, before the work that it is for.
+
+    Args:
+        path: the file.
+        endings: those that it may have.
+
+    Raises:
+        InputError: another ending, a folder that does not exist or cannot be written to, or a path
+            that is a folder itself.
+    """
+    path = path.expanduser()
+    if path.suffix.lower() not in endings:
+        raise InputError(f'"{path.name}" cannot be written: end its name in {", ".join(endings)}')
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError(f"{path} cannot be written: there is no folder {folder}; make it first")
+    if path.is_dir():
+        raise InputError(f"{path} is a folder: give the name of a file")
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{path} cannot be written: no permission to write to {folder}")
+    return path
+
+
+def make_folder(path: Path) -> Path:
+    """A folder to write to, made if it is not there.
+
+    Raises:
+        InputError: it is a file, or cannot be made or written to.
+    """
+    path = path.expanduser()
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = "it is a file" if path.exists() else error.strerror or str(error)
+        raise InputError(f"{path} cannot be used as a folder: {reason}") from None
+    if not os.access(path, os.W_OK):
+        raise InputError(f"there is no permission to write to the folder {path}")
+    return path

@@ -1,0 +1,169 @@
+"""Options that several commands share, and what is made of them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from vcc.errors import InputError
+
+if TYPE_CHECKING:
+    from vcc.light_field import LightField
+
+_READING = "Reading the light field"
+_CAPTURING = "Making the picture"
+
+CameraFile = Annotated[Path, typer.Argument(metavar="CAMERA.toml", help="The camera file.", show_default=False)]
+LightFieldFolder = Annotated[
+    Path,
+    typer.Argument(metavar="LIGHTFIELD", help="A folder with a picture for each view.", show_default=False),
+]
+
+Transfer = Annotated[
+    Literal["srgb", "linear"],
+    typer.Option(
+        help="How pixel values of the views stand for light: srgb, as pictures for people do, or "
+        "linear (proportional to it).",
+        rich_help_panel=_READING,
+    ),
+]
+Spacing = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH",
+        help='Distance between neighbouring views with its unit, "1 mm"; two of them, "1 mm, 2 mm", '
+        "are for rows and columns. Default: what the folder states.",
+        show_default=False,
+        rich_help_panel=_READING,
+    ),
+]
+SlopePerPixel = Annotated[
+    float | None,
+    typer.Option(
+        metavar="NUMBER",
+        help="Pixel pitch over focal length of the cameras, no unit. Default: what the folder states.",
+        show_default=False,
+        rich_help_panel=_READING,
+    ),
+]
+FocusDistance = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH",
+        help='Where the views converge, "1.2 m", or inf if they are parallel. Default: what the folder states.',
+        show_default=False,
+        rich_help_panel=_READING,
+    ),
+]
+Orientation = Annotated[
+    Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"],
+    typer.Option(
+        help="Order of the views. auto checks it by parallax and puts it right; as-is takes the "
+        "files as they are.",
+        rich_help_panel=_READING,
+    ),
+]
+Interpolation = Annotated[
+    Literal["nearest", "linear", "cubic"],
+    typer.Option(help="Interpolation within a view.", rich_help_panel=_CAPTURING),
+]
+BetweenViews = Annotated[
+    Literal["auto", "none"],
+    typer.Option(
+        help="Whether to interpolate between views where neighbouring ones differ by more than a pixel.",
+        rich_help_panel=_CAPTURING,
+    ),
+]
+SceneDistance = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH",
+        help='Distance of the scene before the camera, "1.2 m", by which that interpolation goes. '
+        "Default: what the light field states or shows.",
+        show_default=False,
+        rich_help_panel=_CAPTURING,
+    ),
+]
+Engine = Annotated[
+    Literal["numba", "array_api", "reference"],
+    typer.Option(
+        help="What computes: numba is fast, reference slow and plain.",
+        rich_help_panel=_CAPTURING,
+    ),
+]
+
+
+def length(given: str | None, option: str) -> float | None:
+    """Metres of a length on the command line; None if it is not given.
+
+    Raises:
+        InputError: no unit, or not a length.
+    """
+    from vcc.units import parse
+
+    if given is None:
+        return None
+    if given.strip().lower() in ("inf", "infinity"):
+        return math.inf
+    return parse(given, "length", option)
+
+
+def spacing_of(given: str | None) -> float | tuple[float, float] | None:
+    """Metres of one length, or of two (rows, columns) with a comma between them.
+
+    Raises:
+        InputError: more than two, no unit, or not a length.
+    """
+    if given is None:
+        return None
+    parts = [length(part, "--spacing") or 0.0 for part in given.split(",")]
+    if len(parts) > 2:
+        raise InputError(f'--spacing is "{given}": one length, or two with a comma between them')
+    return parts[0] if len(parts) == 1 else (parts[0], parts[1])
+
+
+def exposure_of(given: str) -> Any:
+    """ "auto" or a number above 0.
+
+    Raises:
+        InputError: anything else.
+    """
+    if given == "auto":
+        return given
+    try:
+        number = float(given)
+    except ValueError:
+        number = math.nan
+    if not (number > 0 and math.isfinite(number)):
+        raise InputError(f'--exposure is "{given}": it is auto or a number above 0, like 0.8')
+    return number
+
+
+def read_light_field(
+    folder: Path,
+    transfer: str,
+    spacing: str | None,
+    slope_per_pixel: float | None,
+    focus_distance: str | None,
+    orientation: str,
+) -> LightField:
+    """The light field that the options of a command ask for, with a progress bar.
+
+    Raises:
+        InputError: what `vcc.open_light_field` and the lengths refuse.
+    """
+    given: dict[str, Any] = {
+        "transfer": transfer,
+        "orientation": orientation,
+        "spacing": spacing_of(spacing),
+        "slope_per_pixel": slope_per_pixel,
+        "focus_distance": length(focus_distance, "--focus-distance"),
+    }
+    from vcc.cli.console import progress
+    from vcc.formats import open_light_field
+
+    with progress("Reading views") as advance:
+        return open_light_field(folder, progress=advance, **given)
