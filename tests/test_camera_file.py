@@ -73,8 +73,7 @@ def test_reads_the_documented_form(tmp_path, written):
             patterns.CosineSum((1 * mm, math.inf), 3),
         ),
         (
-            '{ name = "cells", values = [[0, 1], [0.5, 0]], width = "4 mm", '
-            'middle = ["1 mm", "0 mm"] }',
+            '{ name = "cells", values = [[0, 1], [0.5, 0]], width = "4 mm", middle = ["1 mm", "0 mm"] }',
             patterns.Cells(np.array([[0, 1], [0.5, 0]]), 4 * mm, middle=(1 * mm, 0.0)),
         ),
         (
@@ -96,9 +95,7 @@ def test_reads_cells_from_npy_and_csv(tmp_path, written):
     np.savetxt(tmp_path / "a.csv", cells, delimiter=",", fmt="%.17g")
     np.save(tmp_path / "bytes.npy", np.array([[0, 255]], np.uint8))
     for file, expected in (("a.npy", cells), ("a.csv", cells), ("bytes.npy", [[0, 1]])):
-        camera = written(
-            f'[[elements]]\nkind = "mask"\nwidth = "1 mm"\npattern = "{file}"\n{SENSOR}'
-        )
+        camera = written(f'[[elements]]\nkind = "mask"\nwidth = "1 mm"\npattern = "{file}"\n{SENSOR}')
         assert np.array_equal(camera.elements[0].pattern.values, expected)
 
 
@@ -293,9 +290,7 @@ def test_elements_of_ones_own(tmp_path, monkeypatch):
             return Faces(Affine.lens(self.focal_length))
 
     camera = Camera([CylinderLens(5 * mm, 20 * deg)], Sensor(1 * mm, (2, 2), 1 * um))
-    with pytest.raises(
-        InputError, match=re.escape("Add its class to vcc.camera_file.ELEMENT_KINDS")
-    ):
+    with pytest.raises(InputError, match=re.escape("Add its class to vcc.camera_file.ELEMENT_KINDS")):
         save_camera(camera, tmp_path / "camera.toml")
     monkeypatch.setitem(ELEMENT_KINDS, "cylinder_lens", CylinderLens)
     save_camera(camera, tmp_path / "camera.toml")

@@ -69,9 +69,7 @@ ELEMENT_KINDS: dict[str, type[Element]] = {
 PATTERN_NAMES: dict[str, type[Pattern]] = {
     _friendly(kind): kind
     for kind in vars(patterns).values()
-    if isinstance(kind, type)
-    and issubclass(kind, Pattern)
-    and kind not in (Pattern, FunctionPattern)
+    if isinstance(kind, type) and issubclass(kind, Pattern) and kind not in (Pattern, FunctionPattern)
 }
 """Which class each ``name`` of a pattern in a camera file stands for."""
 
@@ -229,9 +227,7 @@ def _build(kind: type, given: Mapping[str, Any], place: str, folder: Path) -> An
         for name, value in given.items()
     }
     pattern = given.get("pattern")
-    if isinstance(pattern, str) and any(
-        field.name == "source" for field in dataclasses.fields(kind)
-    ):
+    if isinstance(pattern, str) and any(field.name == "source" for field in dataclasses.fields(kind)):
         values["source"] = pattern
     try:
         return kind(**values)
@@ -273,9 +269,7 @@ def _read_value(given: Any, hint: Any, unit: str | None, what: str, folder: Path
     return _read_plain(given, choices, what)
 
 
-def _read_list(
-    given: Any, hints: tuple[Any, ...], unit: str | None, what: str, folder: Path
-) -> tuple[Any, ...]:
+def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, folder: Path) -> tuple[Any, ...]:
     example = {None: "0", "length": '"1 mm"', "angle": '"1 deg"', "time": '"1 ms"'}[unit]
     if not isinstance(given, list) or len(given) != len(hints):
         wanted = ", ".join([example] * len(hints))
@@ -313,8 +307,7 @@ def _read_pattern(given: Any, arrays: bool, what: str, folder: Path) -> Any:
     if arrays:
         return _read_array(given, what, folder)
     raise InputError(
-        f"{what} is {given!r}: write a pattern by name, like "
-        '{ name = "circle", diameter = "5 mm" }'
+        f'{what} is {given!r}: write a pattern by name, like {{ name = "circle", diameter = "5 mm" }}'
     )
 
 
@@ -420,9 +413,7 @@ class _Writer:
             return units.text(value, unit, exact=True)
         if isinstance(value, bool | int | float | str):
             return value
-        raise InputError(
-            f"{name} of {self.label} is a {type(value).__name__}, which a camera file cannot hold"
-        )
+        raise InputError(f"{name} of {self.label} is a {type(value).__name__}, which a camera file cannot hold")
 
     def array(self, values: NDArray[np.float64]) -> str:
         """The name of the file that will hold an array."""

@@ -189,7 +189,7 @@ class LightField:
         )
 
     def view(self, row: int, column: int) -> Image:
-        """One view as a picture whose frame maps (column, row, 1) to the slopes (s, t, 1) of its pixels.
+        """One view as a picture, placed where its pixels look: on the plane 1 m before the light field, in metres.
 
         Args:
             row: which row of views, 0 at the top; negative counts from the end.
@@ -205,9 +205,10 @@ class LightField:
             raise InputError(f"there is no view ({row}, {column}) in a grid of {nv}×{nu} views")
         j, i = row % nv, column % nu
         at_view = self.frame @ Affine.translation(i, j, 0, 0)
-        slopes = Affine.from_parts(at_view.linear[2:, 2:], at_view.offset[2:])
+        # A ray through this view at slope s comes from −s on the plane 1 m before it.
+        looks_at = Affine.from_parts(-at_view.linear[2:, 2:], -at_view.offset[2:])
         values = to_numpy(self.values[j, i]) / np.float32(self.full_scale)
-        return Image(values.astype(np.float32), slopes, inverted=False)
+        return Image(values.astype(np.float32), looks_at, inverted=False)
 
     def scaled(self, factor: float) -> LightField:
         """The light field of the same scene in a world ``factor`` times as large (slopes stay).

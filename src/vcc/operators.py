@@ -128,6 +128,7 @@ def resampled(
         disparity_range=None,
         _shared_disparity=None,
         _disparity_factor=1.0,
+        _whole_views=None,
     )
 
 

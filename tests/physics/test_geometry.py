@@ -155,9 +155,9 @@ def test_a_camera_scaled_with_its_world_takes_the_same_picture():
 
 
 def test_pictures_land_upside_down_and_upright_turns_them():
-    # A bright corner at the top left of every view: light from there lands at the bottom right.
+    # A bright spot at the top left of every view: light from there lands at the bottom right.
     samples = np.full((3, 3, 12, 12), 0.1)
-    samples[:, :, 2:4, 1:3] = 1.0
+    samples[:, :, 3, 2] = 1.0
     lf = LightField.from_views(samples, 1 * mm, 2e-3, disparity_range=(0.0, 0.0))
     sensor = vcc.Sensor(z=50 * mm, shape=(10, 10), pitch=0.1 * mm)
     image = vcc.Camera([vcc.Lens(focal_length=50 * mm)], sensor).capture(lf)
@@ -180,8 +180,10 @@ def test_upright_of_another_size_keeps_every_pixel_in_its_place():
         np.testing.assert_allclose(turned.frame([2 - column, 1 - row]), image.frame([column, row]))
 
 
-def test_a_view_is_the_picture_of_its_slopes():
+def test_a_view_is_the_picture_of_what_its_pixels_look_at():
     lf = field()
     view = lf.view(-1, 2)
     np.testing.assert_allclose(view.values, lf.values[4, 2], rtol=1e-6)
-    np.testing.assert_allclose(view.frame([3, 4]), lf.frame([2, 4, 3, 4])[2:], atol=1e-15)
+    # Light of slope s comes from −s on a plane 1 m before the view.
+    np.testing.assert_allclose(view.frame([3, 4]), -lf.frame([2, 4, 3, 4])[2:], atol=1e-15)
+    assert not view.inverted

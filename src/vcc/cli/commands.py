@@ -12,6 +12,8 @@ from vcc.cli.console import Commands, check_output, make_folder, progress, show
 from vcc.errors import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
     from vcc.formats import FolderInfo
     from vcc.light_field import LightField
 
@@ -283,12 +285,13 @@ def plot(
             light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation
         )
     if phase_space and field is not None:
-        figure = plot_phase_space_stages(optics, field, across="u" if across == "x" else "v")
+        stages = plot_phase_space_stages(optics, field, across="u" if across == "x" else "v")
+        figure: Figure | SubFigure = stages
     else:
         axes = plot_camera(optics, light_field=field, object_distances=distances or None, across=across)
         figure = axes.figure
     with atomic_path(target) as temporary:
-        figure.savefig(temporary)
+        figure.savefig(temporary)  # type: ignore[union-attr]  # a new figure is no part of another
     show(f"{target}: written")
 
 
@@ -309,7 +312,7 @@ def demo(
     ] = None,
     small: Annotated[bool, typer.Option("--small", help="Fewer views and pixels: a look in seconds.")] = False,
 ) -> None:
-    """Show what this can do: several cameras look at one scene."""
+    """Run the paper's examples and its own check, and explain them on a page of pictures."""
     folder = make_folder(output)
     from rich.console import Console
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +14,11 @@ import typer
 from typer.core import TyperGroup
 
 from vcc.errors import InputError, ResultWarning
+
+_LIBRARY_OPTION = re.compile(
+    r"\b(transfer|spacing|slope_per_pixel|focus_distance|orientation|scene_distance|interpolation"
+    r"|between_views|engine|exposure)=(?=\S)"
+)
 
 
 class Commands(TyperGroup):
@@ -43,7 +49,17 @@ def say(word: str, colour: str, message: str) -> None:
     from rich.console import Console
     from rich.text import Text
 
-    Console(stderr=True).print(Text(word, style=colour), Text(message), soft_wrap=True)
+    words = Text(as_options(message))
+    Console(stderr=True).print(Text(word, style=colour), words, soft_wrap=True)
+
+
+def as_options(message: str) -> str:
+    """A message of the library in the words of the command line: focus_distance=… is
+    ``--focus-distance …`` here, and lengths carry units.
+    """
+    message = message.replace("(lengths in metres)", '(lengths with a unit: "50 mm")')
+    message = message.replace("focus_distance=… (metres)", 'focus_distance=… (a length: "1.2 m")')
+    return _LIBRARY_OPTION.sub(lambda match: f"--{match[1].replace('_', '-')} ", message)
 
 
 def show(message: str) -> None:

@@ -1,0 +1,222 @@
+"""The command line: what it writes and says, its exit codes, and that asking for help is quick."""
+
+import subprocess
+import sys
+import warnings
+
+import imagecodecs
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import vcc
+from vcc.cli.commands import app
+from vcc.cli.console import as_options
+
+CAMERA = """
+[[elements]]
+kind = "lens"
+z = "0 mm"
+focal_length = "50 mm"
+diameter = "4 mm"
+[sensor]
+z = "52 mm"
+shape = [12, 16]
+pitch = "1 mm"
+"""
+KNOWN = ["--spacing", "1 mm", "--slope-per-pixel", "0.02", "--focus-distance", "1.3 m"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder to work in, with a camera file and a light field of 3 × 3 views."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "camera.toml").write_text(CAMERA)
+    (tmp_path / "views").mkdir()
+    texture = np.random.default_rng(1).integers(40, 255, (24, 28, 3), np.uint8)
+    for row, column in np.ndindex(3, 3):
+        view = np.ascontiguousarray(texture[2 - row : 22 - row, 2 - column : 26 - column])
+        (tmp_path / "views" / f"view_{row}_{column}.png").write_bytes(imagecodecs.png_encode(view))
+    return tmp_path
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def refused(*arguments):
+    """What is said of bad input."""
+    result = run(*arguments)
+    assert result.exit_code == 2, result.output
+    assert "Traceback" not in result.output
+    return result.stderr
+
+
+def test_capture_writes_a_picture_and_says_how(folder):
+    result = run("capture", "camera.toml", "views", "-o", "picture.png", *KNOWN)
+    assert result.exit_code == 0, result.output
+    assert "picture.png: 16×12 pixels" in result.stdout
+    assert "exposure" in result.stdout
+    assert "Note: 29.0% of the rays" in result.stderr  # a circle of 4 mm, 3 × 3 views of 1 mm
+    assert imagecodecs.png_decode((folder / "picture.png").read_bytes()).shape == (12, 16, 3)
+
+
+def test_capture_gives_what_the_library_gives(folder):
+    run("capture", "camera.toml", "views", "-o", "upright.npy", "--engine", "reference", *KNOWN)
+    run("capture", "camera.toml", "views", "-o", "lying.npy", "--as-recorded", *KNOWN)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.ResultWarning)
+        geometry = {"spacing": 1e-3, "slope_per_pixel": 0.02, "focus_distance": 1.3}
+        light_field = vcc.open_light_field("views", **geometry)
+        image = vcc.load_camera("camera.toml").capture(light_field)
+    lying = np.load("lying.npy")
+    assert np.array_equal(lying, image.values)
+    assert np.allclose(np.load("upright.npy"), lying[::-1, ::-1], rtol=1e-4, atol=1e-9)
+
+
+def test_capture_takes_all_options(folder):
+    result = run(
+        *("capture", "camera.toml", "views", "-o", "picture.tif", "--interpolation", "cubic"),
+        *("--between-views", "none", "--scene-distance", "1 m", "--exposure", "2.5"),
+        *("--transfer", "linear", "--spacing", "1 mm, 2 mm", "--slope-per-pixel", "0.02"),
+        *("--focus-distance", "inf", "--orientation", "as-is"),
+    )
+    assert result.exit_code == 0, result.output
+    assert "exposure 2.5" in result.stdout
+
+
+def test_progress_is_asked_for_where_work_is_long(folder, monkeypatch):
+    from vcc.cli import commands
+
+    monkeypatch.setattr(commands, "SAMPLES_WORTH_A_BAR", 0)
+    assert run("capture", "camera.toml", "views", "-o", "picture.npy", *KNOWN).exit_code == 0
+
+
+def test_explain_prints_the_plan(folder):
+    result = run("explain", "camera.toml", "views", *KNOWN)
+    assert result.exit_code == 0, result.output
+    assert "3×3 views of 20×24 pixels" in result.stdout
+    assert "focal length 50 mm" in result.stdout
+    assert "Cost" in result.stdout
+
+
+def test_info_says_what_is_known_and_what_is_assumed(folder):
+    result = run("info", "views")
+    assert result.exit_code == 0, result.output
+    assert "3 × 3 (rows × columns)" in result.stdout
+    assert "24 × 20 pixels, 3 channels, 8-bit" in result.stdout
+    assert "1 mm  (not stated: assumed)" in result.stdout
+    assert "pixels per view (measured)" in result.stdout
+    assert "Note:" in result.stderr
+    assert "--spacing" in result.stderr
+    quick = run("info", "views", "--quick")
+    assert "pixels per view" not in quick.stdout
+    assert not quick.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "file"),
+    [
+        ([], "camera.png"),
+        (["-o", "side.svg", "--object-distance", "1.2 m", "--object-distance", "inf"], "side.svg"),
+        (["-o", "side.pdf", "--across", "y", "--light-field", "views"], "side.pdf"),
+        (["-o", "stages.png", "--phase-space", "--light-field", "views"], "stages.png"),
+    ],
+)
+def test_plot_writes_a_drawing(folder, arguments, file):
+    result = run("plot", "camera.toml", *arguments)
+    assert result.exit_code == 0, result.output
+    assert file in result.stdout
+    assert (folder / file).stat().st_size > 1000
+
+
+def test_demo_is_called_with_a_folder_that_is_there(folder, monkeypatch):
+    import types
+
+    calls = []
+    stand_in = types.ModuleType("vcc.demo")
+    stand_in.run_demo = lambda *arguments: calls.append(arguments)
+    monkeypatch.setitem(sys.modules, "vcc.demo", stand_in)
+    result = run("demo", "--output", "a/b", "--light-field", "views", "--small")
+    assert result.exit_code == 0, result.output
+    ((output, light_field, small, console),) = calls
+    assert output.is_dir()
+    assert (str(light_field), small) == ("views", True)
+    assert hasattr(console, "print")
+    (folder / "file").write_text("")
+    assert "cannot be used as a folder" in refused("demo", "--output", "file")
+
+
+def test_errors_name_what_is_wrong(folder):
+    capture = ["capture", "camera.toml", "views"]
+    assert 'Error: "p.jpg" cannot be written' in refused(*capture, "-o", "p.jpg")
+    assert "there is no folder lost" in refused(*capture, "-o", "lost/p.png")
+    (folder / "p.png").mkdir()
+    assert "is a folder" in refused(*capture, "-o", "p.png")
+    assert "there is no camera file" in refused("capture", "lost.toml", "views", "-o", "p.npy")
+    assert "there is no folder" in refused("capture", "camera.toml", "lost", "-o", "p.npy")
+    assert "--exposure is" in refused(*capture, "-o", "a.png", "--exposure", "bright")
+    assert "--exposure is" in refused(*capture, "-o", "a.png", "--exposure", "0")
+    message = refused(*capture, "-o", "a.png", "--scene-distance", "1.2")
+    assert '--scene-distance is "1.2": a length needs a unit' in message
+    assert "--spacing is" in refused(*capture, "-o", "a.png", "--spacing", "1 mm, 1 mm, 1 mm")
+    assert "--spacing is" in refused(*capture, "-o", "a.png", "--spacing", "1")
+    assert "--phase-space" in refused("plot", "camera.toml", "--phase-space")
+    assert "object distance" in refused("plot", "camera.toml", "--object-distance", "0 m")
+    (folder / "camera.toml").write_text(CAMERA.replace('"1 mm"', "1"))
+    message = refused("plot", "camera.toml")
+    assert "camera.toml: sensor: pitch is 1: a length needs a unit" in message
+
+
+def test_faulty_usage_exits_with_2(folder):
+    assert "Missing option" in refused("capture", "camera.toml", "views")
+    refused("capture", "camera.toml", "views", "-o", "a.png", "--interpolation", "fine")
+    refused("nonsense")
+
+
+def test_faults_of_the_program_exit_with_1_and_a_traceback(tmp_path):
+    code = (
+        "import sys, types; stand_in = types.ModuleType('vcc.demo'); sys.modules['vcc.demo'] = "
+        "stand_in; stand_in.run_demo = lambda *arguments: 1 / 0; "
+        "sys.argv = ['vcc', 'demo', '-o', sys.argv[1]]; "
+        "from vcc.cli import main; main()"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode == 1
+    assert "ZeroDivisionError" in result.stderr
+
+
+def test_as_a_module():
+    for module in ("vcc", "vcc.cli"):
+        command = [sys.executable, "-m", module, "--version"]
+        result = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert result.stdout.strip() == f"vcc {vcc.__version__}"
+
+
+@pytest.mark.parametrize("command", ["", "capture", "explain", "info", "plot", "demo"])
+def test_help_teaches(command):
+    result = run(*command.split(), "--help")
+    assert result.exit_code == 0
+    assert "Example:" in result.stdout or not command
+    if command == "capture":
+        assert "1.2 m" in result.stdout
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys; from vcc.cli import main; sys.argv = ['vcc', '--help']\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print(*({'numpy', 'numba', 'scipy', 'matplotlib', 'pint', 'imagecodecs'} "
+        "& set(sys.modules)), 'are loaded')"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.splitlines()[-1].strip() == "are loaded"
+
+
+def test_messages_speak_of_options():
+    said = 'pass spacing=…, focus_distance=… (lengths in metres) or orientation="as-is"'
+    assert as_options(said) == (
+        'pass --spacing …, --focus-distance … (lengths with a unit: "50 mm") or --orientation "as-is"'
+    )
