@@ -75,15 +75,6 @@ PATTERN_NAMES: dict[str, type[Pattern]] = {
 
 _MURA = "mura"
 
-_UNIT_OF: dict[tuple[type, str], str] = {
-    (Sensor, "z"): "length",
-    (Sensor, "pitch"): "length",
-    (Sensor, "decentre"): "length",
-    (patterns.Bounded, "width"): "length",
-    (patterns.Bounded, "height"): "length",
-}
-"""Units of fields that do not state them as metadata."""
-
 
 def load_camera(path: str | PathLike[str]) -> Camera:
     """The camera that a TOML file describes; see `vcc.camera_file` for its form.
@@ -223,7 +214,7 @@ def _build(kind: type, given: Mapping[str, Any], place: str, folder: Path) -> An
     _check_keys(given, fields, [name for name in fields if _needed(fields[name])], place, "field")
     hints = get_type_hints(kind)
     values = {
-        name: _read_value(value, hints[name], _unit(kind, fields[name]), f"{place}: {name}", folder)
+        name: _read_value(value, hints[name], _unit(fields[name]), f"{place}: {name}", folder)
         for name, value in given.items()
     }
     pattern = given.get("pattern")
@@ -244,9 +235,9 @@ def _needed(field: dataclasses.Field[Any]) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
-def _unit(kind: type, field: dataclasses.Field[Any]) -> str | None:
+def _unit(field: dataclasses.Field[Any]) -> str | None:
     """The dimension of a field; None for plain numbers, text and patterns."""
-    unit = field.metadata.get("unit") or _UNIT_OF.get((kind, field.name))
+    unit = field.metadata.get("unit")
     return None if unit is None else str(unit)
 
 
@@ -399,7 +390,7 @@ class _Writer:
             if isinstance(value, Pattern):
                 table[name] = self.pattern(value, thing)
             else:
-                table[name] = self.value(value, _unit(type(thing), field), name)
+                table[name] = self.value(value, _unit(field), name)
         return table
 
     def value(self, value: Any, unit: str | None, name: str) -> Any:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import abc
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -33,6 +34,14 @@ class Pattern(abc.ABC):
     @abc.abstractmethod
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Transmission, 0 to 1, at positions x, y in metres (arrays that broadcast against each other)."""
+
+    def described(self) -> str:
+        """The pattern in words, such as ``"circle (diameter 3 mm)"``."""
+        from vcc.describe import parameters_in_words
+
+        name = re.sub(r"(?<!^)(?=[A-Z])", " ", type(self).__name__).lower()
+        parameters = parameters_in_words(self)
+        return f"{name} ({parameters})" if parameters else name
 
     @property
     def size(self) -> tuple[float, float]:
@@ -299,6 +308,13 @@ class Cells(Pattern):
     def __hash__(self) -> int:
         return hash((self.values.tobytes(), self.width, self.height, self.middle))
 
+    def described(self) -> str:
+        """The number of cells and the size of the array in words."""
+        from vcc.units import text
+
+        rows, columns = self.values.shape
+        return f"{rows}×{columns} cells ({text(self.width)} wide)"
+
     def __repr__(self) -> str:
         rows, columns = self.values.shape
         return f"Cells({rows}×{columns}, width={self.width!r}, height={self.height!r})"
@@ -405,8 +421,8 @@ class Bounded(Pattern):
     """
 
     pattern: Pattern
-    width: float
-    height: float
+    width: float = field(metadata={"unit": "length"})
+    height: float = field(metadata={"unit": "length"})
 
     @property
     def size(self) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,10 @@ class Sensor:
         InputError: a pitch of zero or less, fewer than one pixel, or a place that is not finite.
     """
 
-    z: float
+    z: float = field(metadata={"unit": "length"})
     shape: tuple[int, int]
-    pitch: float | tuple[float, float]
-    decentre: tuple[float, float] = (0.0, 0.0)
+    pitch: float | tuple[float, float] = field(metadata={"unit": "length"})
+    decentre: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.z):
@@ -39,6 +39,8 @@ class Sensor:
         for pitch in self.pitches:
             if not (pitch > 0 and math.isfinite(pitch)):
                 raise InputError(f"the sensor's pitch must be greater than 0 m, not {pitch}")
+        if not isinstance(self.pitch, int | float):
+            object.__setattr__(self, "pitch", self.pitches)
         object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
         object.__setattr__(self, "decentre", (float(self.decentre[0]), float(self.decentre[1])))
 

@@ -241,7 +241,10 @@ def contact_sheet(title: str, rows: Sequence[SheetRow]) -> Figure:
         pictures = [_read(path) for _, path in row.pictures]
         ratios = [picture.shape[1] / picture.shape[0] for picture in pictures]
         for axes, (name, _), picture in zip(
-            part.subplots(1, len(pictures), width_ratios=ratios, squeeze=False)[0], row.pictures, pictures, strict=True
+            part.subplots(1, len(pictures), width_ratios=ratios, squeeze=False)[0],
+            row.pictures,
+            pictures,
+            strict=True,
         ):
             put(axes, picture, name).set_interpolation("antialiased")
     return figure

@@ -76,7 +76,9 @@ def psnr_table(psnr: dict[str, float], comments: dict[str, str]) -> str:
         f"<tr><td>{name}</td><td>{value:.1f} dB</td><td class=note>{comments.get(name, '')}</td></tr>"
         for name, value in psnr.items()
     )
-    return f"<table><thead><tr><th>interpolation</th><th>PSNR</th><th></th></tr></thead><tbody>{rows}</tbody></table>"
+    return (
+        f"<table><thead><tr><th>interpolation</th><th>PSNR</th><th></th></tr></thead><tbody>{rows}</tbody></table>"
+    )
 
 
 def _section(section: Section) -> str:
@@ -130,6 +132,8 @@ p { max-width: 46em; margin: .6em 0; }
 @media (max-width: 720px) { .n2, .n3, .n4 { grid-template-columns: 1fr 1fr; } }
 figure { margin: 0; }
 img { width: 100%; height: auto; display: block; border-radius: 3px; background: #fff; }
+.n1 img { width: auto; max-width: 100%; margin: 0 auto; }
+.n1 figcaption { max-width: 50em; margin: .45rem auto 0; }
 figcaption { font-size: .84rem; line-height: 1.45; color: var(--quiet); margin-top: .45rem; }
 figcaption b { color: var(--ink); font-weight: normal; }
 table { border-collapse: collapse; font-size: .92rem; margin: 1rem 0; font-variant-numeric: tabular-nums; }

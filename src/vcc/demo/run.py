@@ -239,7 +239,7 @@ def _draw_example_one(work: _Work, bench: Bench, taken: dict[str, _Taken]) -> No
 
 def _crops(bench: Bench, taken: dict[str, _Taken]) -> list[Crop]:
     """Where to look closely: known places of the built-in scene, else what is sharp in one picture only."""
-    size = max(min(bench.light_field.shape[2:4]) * 17 // 100, 8)
+    size = max(min(bench.light_field.shape[2:4]) * 13 // 100, 8)
     if bench.scene is None:
         return figures.detailed_crops([picture.shown for picture in taken.values()], size)
     return [_around(bench, place, size) for place in story.PLACES.values()]
@@ -355,9 +355,7 @@ def _print(console: Console, report: DemoReport) -> None:
         table.add_column(name, justify="right")
     table.add_column("", style="dim")
     for timing in report.timings:
-        table.add_row(
-            timing.step, duration(timing.first), duration(timing.again), speed_up(timing), timing.note
-        )
+        table.add_row(timing.step, duration(timing.first), duration(timing.again), speed_up(timing), timing.note)
     console.print(table)
     best = max(report.psnr, key=lambda name: report.psnr[name] if math.isfinite(report.psnr[name]) else -1.0)
     console.print(

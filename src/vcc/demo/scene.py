@@ -85,7 +85,9 @@ class Foliage:
             inside = np.clip(a, 0, 1)
             half = 0.62 * inside**0.75 * (1 - inside) ** 0.95
             opacity = soft((half - np.abs(b)) * length, self.edge)
-            opacity = opacity * soft(np.minimum(a, 1 - a) * length - self.edge, self.edge)  # no hair beyond the tip
+            opacity = opacity * soft(
+                np.minimum(a, 1 - a) * length - self.edge, self.edge
+            )  # no hair beyond the tip
             vein = np.exp(-((b / 0.012) ** 2)) + 0.45 * np.exp(
                 -((np.sin(26 * (a - 0.75 * np.abs(b))) / 0.16) ** 2)
             )

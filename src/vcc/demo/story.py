@@ -36,7 +36,7 @@ _COMMENTS = {
 
 def length(metres: float) -> str:
     """A length as people read it, three digits."""
-    return text(float(f"{metres:.3g}"))
+    return text(float(f"{metres:.3g}")).replace("um", "µm")
 
 
 def away(distance: float) -> str:
@@ -84,9 +84,17 @@ def introduction(bench: Bench, timings: Sequence[Timing]) -> str:
 
 
 def _what(bench: Bench) -> str:
-    nv, nu, nt, ns = bench.light_field.shape[:4]
     whose = "a built-in scene" if bench.scene is not None else "your light field"
-    return f"{whose} of {nv}×{nu} views of {nt}×{ns} pixels"
+    return f"{whose}, {_sizes(bench)}"
+
+
+def _sizes(bench: Bench) -> str:
+    nv, nu, nt, ns = bench.light_field.shape[:4]
+    return f"{nv}×{nu} views of {nt}×{ns} pixels"
+
+
+def _signed(number: float) -> str:
+    return f"{number:.2g}".replace("-", "−")
 
 
 @dataclass
@@ -164,10 +172,10 @@ def _light_field_text(bench: Bench) -> str:
     converging = f"F = {length(1 / convergence)}" if convergence else "F = ∞ (parallel views)"
     return (
         "<p>A light field tells the radiance of each ray, named by where it meets the plane of the lens, (u, v), and "
-        f"by its slope, (s, t). It comes as {_what(bench)}: view i stands at u, and its pixel k looks along s.{scaled}"
+        f"by its slope, (s, t). It comes as {_sizes(bench)}: view i stands at u, and its pixel k looks along s.{scaled}"
         "</p><p class=formula>u = (i − i₀)·Δu, &nbsp; s = u/F − (k − k₀)·p, &nbsp;&nbsp; likewise v, t"
         f"</p><p>Here Δu = {length(abs(linear[0, 0]))}, p = {abs(linear[2, 2]):.3g} a pixel, {converging}. A point at "
-        f"distance Z moves by −Δu·(1/Z − 1/F)/p pixels from view to view: {low:.2g} to {high:.2g} in this scene.</p>"
+        f"distance Z moves by −Δu·(1/Z − 1/F)/p pixels from view to view: {_signed(low)} to {_signed(high)} in this scene.</p>"
     )
 
 
@@ -205,13 +213,15 @@ def _example_one(bench: Bench, exposure: float) -> Section:
                     "example-1-close-ups.png",
                     "The same places in all three",
                     "Pixels as they are, not smoothed.",
-                ),
+                )
+            ],
+            [
                 Panel(
                     "example-1-camera.png",
                     f"The camera, focused {away(bench.far)}",
                     "Rays from a point in focus, one beside it, and one so near that it blurs widely. "
                     "Heights are magnified.",
-                ),
+                )
             ],
             [
                 Panel(
@@ -270,9 +280,9 @@ def _example_two(bench: Bench) -> Section:
                     "example-2-close-ups.png",
                     "Close-ups: no mask, cosine mask, coded mask",
                     "The same places of three cameras focused near.",
-                ),
-                Panel("example-2-masks.png", "The masks", "White lets all light pass, black none."),
+                )
             ],
+            [Panel("example-2-masks.png", "The masks", "White lets all light pass, black none.")],
             [
                 Panel(
                     "example-2-cosine-camera.png",
@@ -301,7 +311,11 @@ def _check(bench: Bench, psnr: dict[str, float]) -> Section:
     values = {"truth": "", **{name: f"{psnr[name]:.1f} dB" for name in psnr}}
     captions = {"truth": "What a pinhole there truly sees.", **_COMMENTS}
     panels = [
-        Panel(f"check-{name}.png", f"{name.capitalize()} {values[name]}".strip(), captions[name].capitalize())
+        Panel(
+            f"check-{name}.png",
+            f"{name.capitalize()} {values[name]}".strip(),
+            captions[name][:1].upper() + captions[name][1:],
+        )
         for name in names
     ]
     return Section(
@@ -403,7 +417,8 @@ def sheet_rows(bench: Bench, psnr: dict[str, float], timings: Sequence[Timing]) 
         ),
         Row(
             "The paper’s own check: a simulated pinhole picture against the truth",
-            f"Truth: {truth_in_words(bench)}. " + ", ".join(f"{name} {value:.1f} dB" for name, value in psnr.items()),
+            f"Truth: {truth_in_words(bench)}. "
+            + ", ".join(f"{name} {value:.1f} dB" for name, value in psnr.items()),
             [
                 ("simulated pinhole picture, linear", "check-linear.png"),
                 ("close-ups", "check-close-ups.png"),

@@ -58,9 +58,7 @@ def _slopes(bench: Bench, camera: Camera) -> tuple[NDArray[np.float64], NDArray[
     return (x - u) / d + u / bench.focal_length, (y - v) / d + v / bench.focal_length
 
 
-def _spline(
-    light_field: LightField, view: tuple[int, int], s: NDArray[np.float64], t: NDArray[np.float64]
-) -> Any:
+def _spline(light_field: LightField, view: tuple[int, int], s: NDArray[np.float64], t: NDArray[np.float64]) -> Any:
     """A cubic spline through a view's samples at slopes s × t: radiance (t, s, channels)."""
     from scipy.ndimage import map_coordinates
 

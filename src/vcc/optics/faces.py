@@ -11,8 +11,6 @@ import abc
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -97,19 +95,6 @@ class Element(abc.ABC):
 
     def described(self) -> str:
         """The element's parameters in words, for `explain`."""
-        from dataclasses import fields
+        from vcc.describe import parameters_in_words
 
-        from vcc.units import text
-
-        parts = []
-        for parameter in fields(self):
-            value: Any = getattr(self, parameter.name)
-            if parameter.name in ("z", "name") or value is None or value == parameter.default:
-                continue
-            unit = parameter.metadata.get("unit")
-            if unit and isinstance(value, int | float):
-                value = text(value, unit)
-            elif unit:
-                value = "(" + ", ".join(text(part, unit) for part in value) + ")"
-            parts.append(f"{parameter.name.replace('_', ' ')} {value}")
-        return ", ".join(parts)
+        return parameters_in_words(self, leave_out=("z", "name", "source"))

@@ -213,7 +213,9 @@ def _divide_views(planes: list[Plane], between: BetweenViews, refine: int | str)
     return divide
 
 
-def _divide_samples(planes: list[Plane], between: BetweenViews, views: tuple[float, float], refine: int | str) -> int:
+def _divide_samples(
+    planes: list[Plane], between: BetweenViews, views: tuple[float, float], refine: int | str
+) -> int:
     """Into how many parts a sample is divided each way, so that a mask near the sensor stays sharp.
 
     A sample's light lands on the pixels as one footprint, mask and all: detail of the mask that the

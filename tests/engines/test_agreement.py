@@ -1,0 +1,241 @@
+"""Every engine makes the picture that ``reference`` makes, to 1e-5 of its brightest pixel.
+
+The oracle for what a picture *should* be is elsewhere (tests/physics); here engines are held together, on
+every library that the array engine is required to work with. They are imported, not skipped.
+"""
+
+from __future__ import annotations
+
+import array_api_strict
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import torch
+
+import vcc
+from vcc import Affine
+from vcc.patterns import CosineSum
+from vcc.units import mm
+
+# Cameras here ask for what they like.
+pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+
+SHAPE = (4, 5, 13, 15)
+D = 1 / (1 / 50e-3 - 1)
+LENS = vcc.Lens(focal_length=50 * mm, diameter=8 * mm)
+SENSOR = vcc.Sensor(D, (17, 19), D * 2e-3 * 0.9)
+
+LIBRARIES = {
+    "numpy": np.asarray,
+    "strict": array_api_strict.asarray,
+    "torch": torch.asarray,
+    "jax": jnp.asarray,
+}
+
+
+def mask(z: float, **options) -> vcc.Mask:
+    return vcc.Mask(pattern=CosineSum((5 * mm, 7 * mm), 2, 0.3), z=z, **options)
+
+
+CAMERAS = {
+    "in focus": vcc.Camera([LENS], SENSOR),
+    "no element": vcc.Camera([], vcc.Sensor(30 * mm, (17, 19), 0.3 * mm)),
+    "parallel light": vcc.Camera([LENS], vcc.Sensor(50 * mm, (17, 19), 0.08 * mm)),
+    "large samples": vcc.Camera([LENS], vcc.Sensor(D, (17, 19), D * 2e-3 / 3.1)),
+    "small samples": vcc.Camera([LENS], vcc.Sensor(D, (7, 6), D * 2e-3 * 2.3)),
+    "at the views": vcc.Camera([LENS], vcc.Sensor(0.0, (7, 9), 1.3 * mm)),
+    "prism": vcc.Camera([LENS, vcc.Prism(deflection=(0.004, -0.003))], SENSOR),
+    "decentred": vcc.Camera(
+        [vcc.Lens(focal_length=50 * mm, decentre=(0.2 * mm, 0.4 * mm)), vcc.Lens(focal_length=-90 * mm, z=9 * mm)],
+        vcc.Sensor(60 * mm, (18, 14), (0.1 * mm, 0.13 * mm), decentre=(0.3 * mm, 0.1 * mm)),
+    ),
+    "mask half-way": vcc.Camera([LENS, mask(D / 2)], SENSOR),
+    "three masks": vcc.Camera(
+        [
+            LENS,
+            mask(20 * mm, decentre=(0.5 * mm, -0.3 * mm)),
+            vcc.Mask(pattern=np.random.default_rng(1).random((5, 4)), width=7 * mm, z=40 * mm),
+            mask(D),
+        ],
+        SENSOR,
+    ),
+    "strong defocus": vcc.Camera([LENS], vcc.Sensor(38 * mm, (30, 31), 38 * mm * 2e-3)),
+    "strong defocus, masked": vcc.Camera(
+        [LENS, mask(20 * mm), mask(38 * mm)], vcc.Sensor(38 * mm, (30, 31), 38 * mm * 2e-3)
+    ),
+}
+
+
+def samples(shape=SHAPE, dtype="float32", seed=0) -> np.ndarray:
+    values = np.random.default_rng(seed).random(shape)
+    if np.dtype(dtype).kind == "u":
+        return (values * np.iinfo(dtype).max).astype(dtype)
+    return values.astype(dtype)
+
+
+def field(values, **options) -> vcc.LightField:
+    defaults = {"spacing": 2 * mm, "slope_per_pixel": 2e-3, "focus_distance": 1.0, "disparity_range": (-0.2, 0.2)}
+    return vcc.LightField.from_views(values, **(defaults | options))
+
+
+def as_numpy(values) -> np.ndarray:
+    return np.asarray(values.detach() if hasattr(values, "detach") else np.from_dlpack(values)).astype(float)
+
+
+def assert_engines_agree(camera: vcc.Camera, lf: vcc.LightField, libraries=tuple(LIBRARIES), **options) -> None:
+    expected = camera.capture(lf, engine="reference", **options).values.astype(float)
+    assert expected.any()
+    pictures = {"numba": camera.capture(lf, engine="numba", **options).values}
+    for name in libraries:
+        other = lf.replaced(LIBRARIES[name](np.ascontiguousarray(lf.values)))
+        picture = camera.capture(other, engine="array_api", **options).values
+        assert type(picture) is type(other.values)
+        pictures[name] = as_numpy(picture)
+    for name, picture in pictures.items():
+        assert picture.shape == expected.shape
+        error = np.abs(picture - expected).max() / expected.max()
+        assert error < 1e-5, f"{name} is off by {error:.1e}"
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+@pytest.mark.parametrize("name", list(CAMERAS))
+def test_cameras(name, interpolation):
+    assert_engines_agree(CAMERAS[name], field(samples()), interpolation=interpolation)
+
+
+@pytest.mark.parametrize("channels", [None, 1, 3, 4])
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16", "float32", "float64"])
+def test_types_and_channels(dtype, channels):
+    shape = SHAPE if channels is None else (*SHAPE, channels)
+    # array-api-strict and JAX have no half precision to spare: the standard does not ask for it
+    libraries = ("numpy", "torch") if dtype == "float16" else tuple(n for n in LIBRARIES if n != "jax")
+    # PyTorch's uint16 is a type for storage
+    libraries = tuple(name for name in libraries if (dtype, name) != ("uint16", "torch"))
+    if dtype in ("uint8", "float32"):
+        libraries = (*libraries, "jax")
+    assert_engines_agree(CAMERAS["mask half-way"], field(samples(shape, dtype)), libraries)
+    assert_engines_agree(CAMERAS["strong defocus"], field(samples(shape, dtype)), libraries)
+
+
+def test_integers_are_fractions_of_their_largest_value():
+    eight = samples(dtype="uint8")
+    camera = CAMERAS["in focus"]
+    as_float = camera.capture(field(eight / np.float64(255)), engine="reference").values
+    for engine in ("reference", "numba", "array_api"):
+        picture = camera.capture(field(eight), engine=engine).values
+        np.testing.assert_allclose(picture, as_float, rtol=1e-5)
+
+
+SLICES = {
+    "steps": np.s_[::2, 1::2],
+    "negative steps": np.s_[::-1, ::-1, ::-1, ::-2],
+    "a window of pixels": np.s_[:, :, 2:11, 3:12],
+    "one view": np.s_[1:2, 2:3],
+    "one row of views": np.s_[1:2],
+    "one column of pixels": np.s_[:, :, :, 4:5],
+}
+
+
+@pytest.mark.parametrize("piece", list(SLICES))
+@pytest.mark.parametrize("channels", [None, 3])
+@pytest.mark.parametrize("name", ["in focus", "mask half-way", "strong defocus"])
+def test_slices_that_are_not_contiguous(name, channels, piece):
+    shape = SHAPE if channels is None else (*SHAPE, channels)
+    assert_engines_agree(CAMERAS[name], field(samples(shape))[SLICES[piece]], ("numpy", "torch"))
+
+
+def test_values_in_fortran_order_and_channels_first_in_memory():
+    values = np.asfortranarray(samples((*SHAPE, 3)))
+    assert_engines_agree(CAMERAS["three masks"], field(values), ("numpy",))
+    moved = np.moveaxis(samples((3, *SHAPE)), 0, -1)
+    assert_engines_agree(CAMERAS["three masks"], field(moved), ("numpy",))
+
+
+def turned(lf: vcc.LightField, angle: float) -> vcc.LightField:
+    """The light field seen by a camera rolled around the axis."""
+    c, s = np.cos(angle), np.sin(angle)
+    roll = np.array([[c, -s], [s, c]])
+    linear = np.zeros((4, 4))
+    linear[:2, :2] = linear[2:, 2:] = roll
+    return lf.transformed(Affine.from_parts(linear, np.zeros(4)))
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+@pytest.mark.parametrize("name", ["in focus", "small samples", "three masks", "strong defocus"])
+@pytest.mark.parametrize("angle", [0.1, -0.7])
+def test_rolled_frames(name, angle, interpolation):
+    lf = turned(field(samples()), angle)
+    camera = CAMERAS[name]
+    assert not camera.compile(lf).separable
+    assert_engines_agree(camera, lf, ("numpy", "torch"), interpolation=interpolation)
+
+
+@pytest.mark.parametrize("library", list(LIBRARIES))
+def test_rolled_frames_on_every_library(library):
+    lf = turned(field(samples((*SHAPE, 3))), 0.3)
+    assert_engines_agree(CAMERAS["three masks"], lf, (library,))
+
+
+@pytest.mark.parametrize("name", ["in focus", "three masks", "strong defocus"])
+def test_frames_rolled_by_a_right_angle_swap_the_pixel_axes(name):
+    lf = turned(field(samples()), np.pi / 2)
+    camera = CAMERAS[name]
+    assert camera.compile(lf).swap_pixel_axes
+    assert_engines_agree(camera, lf)
+
+
+def test_a_right_angle_turns_the_picture():
+    """An oracle of its own: turning the rays by 90° turns the picture of a round camera by 90°."""
+    sensor = vcc.Sensor(D, (17, 17), D * 2e-3 * 0.9)
+    lf = field(samples())
+    camera = vcc.Camera([LENS], sensor)
+    plain = camera.capture(lf).values
+    # (x, y) → (−y, x): what was at column c, row r comes to column −r, row c.
+    rolled = camera.capture(turned(lf, np.pi / 2)).values
+    np.testing.assert_allclose(rolled, np.rot90(plain, -1), rtol=1e-5, atol=1e-6 * plain.max())
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+@pytest.mark.parametrize("refine", [1, 2, 3, 8])
+def test_refined_samples(refine, interpolation):
+    camera = CAMERAS["three masks"]
+    options = {"refine": refine, "interpolation": interpolation}
+    assert_engines_agree(camera, field(samples()), ("numpy", "torch"), **options)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_refined_samples_of_a_rolled_frame(interpolation):
+    lf = turned(field(samples((*SHAPE, 3))), 0.3)
+    options = {"refine": 2, "interpolation": interpolation}
+    assert_engines_agree(CAMERAS["three masks"], lf, ("numpy", "torch"), **options)
+
+
+def test_divided_views():
+    # A checkerboard finer than a view's cell under strong defocus: the plan divides cells by itself.
+    board = np.indices((24, 24)).sum(axis=0) % 2
+    stop = vcc.Mask(pattern=board, width=9 * mm)
+    camera = vcc.Camera([vcc.Lens(focal_length=50 * mm), stop], vcc.Sensor(30 * mm, (40, 41), 60e-6))
+    lf = field(samples())
+    assert len(camera.compile(lf).view_rows) > SHAPE[0]
+    assert_engines_agree(camera, lf)
+
+
+def test_the_engine_follows_from_the_arrays():
+    camera = CAMERAS["in focus"]
+    lf = field(samples())
+    assert isinstance(camera.capture(lf).values, np.ndarray)
+    picture = camera.capture(lf.replaced(torch.asarray(lf.values))).values
+    assert isinstance(picture, torch.Tensor)
+    assert picture.dtype == torch.float32
+
+
+@pytest.mark.parametrize("engine", ["numba", "reference"])
+def test_engines_for_numpy_refuse_other_arrays_and_say_what_to_do(engine):
+    lf = field(samples()).replaced(torch.asarray(samples()))
+    with pytest.raises(vcc.InputError, match=rf"engine '{engine}' takes NumPy arrays, not torch.Tensor.*array_api"):
+        CAMERAS["in focus"].capture(lf, engine=engine)
+
+
+def test_an_unknown_engine_is_refused_by_name():
+    with pytest.raises(vcc.InputError, match="no engine 'cuda'.*reference.*array_api.*numba"):
+        CAMERAS["in focus"].capture(field(samples()), engine="cuda")
