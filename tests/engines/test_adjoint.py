@@ -18,14 +18,14 @@ from vcc.units import mm
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
-SHAPE = (3, 4, 9, 11)
+SHAPE = (3, 3, 7, 8)
 D = 1 / (1 / 50e-3 - 1)
 LENS = vcc.Lens(focal_length=50 * mm, diameter=7 * mm)
 MASK = vcc.Mask(pattern=CosineSum((5 * mm, 7 * mm)), z=30 * mm)
 CAMERAS = {
-    "conventional": vcc.Camera([LENS], vcc.Sensor(D, (12, 13), D * 2e-3 * 0.9)),
-    "masked": vcc.Camera([LENS, MASK], vcc.Sensor(D, (12, 13), D * 2e-3 * 0.9)),
-    "strong defocus": vcc.Camera([LENS, MASK], vcc.Sensor(36 * mm, (20, 21), 36 * mm * 2e-3)),
+    "conventional": vcc.Camera([LENS], vcc.Sensor(D, (9, 10), D * 2e-3 * 0.9)),
+    "masked": vcc.Camera([LENS, MASK], vcc.Sensor(D, (9, 10), D * 2e-3 * 0.9)),
+    "strong defocus": vcc.Camera([LENS, MASK], vcc.Sensor(44 * mm, (12, 13), 44 * mm * 2e-3)),
 }
 
 
@@ -43,9 +43,12 @@ def random(*shape: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).random(shape)
 
 
-@pytest.mark.parametrize("frame", [lambda lf: lf, rolled], ids=["straight", "rolled"])
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
-@pytest.mark.parametrize("name", list(CAMERAS))
+@pytest.mark.parametrize(
+    ("name", "frame"),
+    [*((name, lambda lf: lf) for name in CAMERAS), ("conventional", rolled), ("masked", rolled)],
+    ids=[*CAMERAS, "conventional, rolled", "masked, rolled"],
+)
 def test_torch_gradients_are_the_adjoint(name, interpolation, frame):
     camera = CAMERAS[name]
     samples = torch.tensor(random(*SHAPE), requires_grad=True)
@@ -62,7 +65,7 @@ def test_torch_gradients_are_the_adjoint(name, interpolation, frame):
 
 
 @pytest.mark.parametrize("name", list(CAMERAS))
-def test_jax_gradients_are_torchs(name):
+def test_jax_gradients_are_the_same_as_torchs(name):
     camera = CAMERAS[name]
     values = random(*SHAPE).astype(np.float32)
     shape = camera.sensor.shape

@@ -20,10 +20,11 @@ from vcc.units import mm
 # Cameras here ask for what they like.
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
-SHAPE = (4, 5, 13, 15)
+SHAPE = (3, 4, 9, 11)
 D = 1 / (1 / 50e-3 - 1)
-LENS = vcc.Lens(focal_length=50 * mm, diameter=8 * mm)
-SENSOR = vcc.Sensor(D, (17, 19), D * 2e-3 * 0.9)
+LENS = vcc.Lens(focal_length=50 * mm, diameter=6 * mm)
+# 0.93: no sample, nor a part of one, lies on the border of a pixel, where rounding decides for "nearest"
+SENSOR = vcc.Sensor(D, (11, 13), D * 2e-3 * 0.93)
 
 LIBRARIES = {
     "numpy": np.asarray,
@@ -39,10 +40,10 @@ def mask(z: float, **options) -> vcc.Mask:
 
 CAMERAS = {
     "in focus": vcc.Camera([LENS], SENSOR),
-    "no element": vcc.Camera([], vcc.Sensor(30 * mm, (17, 19), 0.3 * mm)),
-    "parallel light": vcc.Camera([LENS], vcc.Sensor(50 * mm, (17, 19), 0.08 * mm)),
-    "large samples": vcc.Camera([LENS], vcc.Sensor(D, (17, 19), D * 2e-3 / 3.1)),
-    "small samples": vcc.Camera([LENS], vcc.Sensor(D, (7, 6), D * 2e-3 * 2.3)),
+    "no element": vcc.Camera([], vcc.Sensor(30 * mm, (11, 13), 0.31 * mm)),
+    "parallel light": vcc.Camera([LENS], vcc.Sensor(50 * mm, (11, 13), 0.08 * mm)),
+    "large samples": vcc.Camera([LENS], vcc.Sensor(D, (14, 15), D * 2e-3 / 3.1)),
+    "small samples": vcc.Camera([LENS], vcc.Sensor(D, (7, 5), D * 2e-3 * 2.3)),
     "at the views": vcc.Camera([LENS], vcc.Sensor(0.0, (7, 9), 1.3 * mm)),
     "prism": vcc.Camera([LENS, vcc.Prism(deflection=(0.004, -0.003))], SENSOR),
     "decentred": vcc.Camera(
@@ -54,14 +55,14 @@ CAMERAS = {
         [
             LENS,
             mask(20 * mm, decentre=(0.5 * mm, -0.3 * mm)),
-            vcc.Mask(pattern=np.random.default_rng(1).random((5, 4)), width=7 * mm, z=40 * mm),
+            vcc.Mask(pattern=np.random.default_rng(1).random((5, 4)), width=6 * mm, z=40 * mm),
             mask(D),
         ],
         SENSOR,
     ),
-    "strong defocus": vcc.Camera([LENS], vcc.Sensor(38 * mm, (30, 31), 38 * mm * 2e-3)),
+    "strong defocus": vcc.Camera([LENS], vcc.Sensor(44 * mm, (14, 15), 44 * mm * 2e-3)),
     "strong defocus, masked": vcc.Camera(
-        [LENS, mask(20 * mm), mask(38 * mm)], vcc.Sensor(38 * mm, (30, 31), 38 * mm * 2e-3)
+        [LENS, mask(20 * mm), mask(44 * mm)], vcc.Sensor(44 * mm, (14, 15), 44 * mm * 2e-3)
     ),
 }
 
@@ -111,10 +112,9 @@ def test_types_and_channels(dtype, channels):
     libraries = ("numpy", "torch") if dtype == "float16" else tuple(n for n in LIBRARIES if n != "jax")
     # PyTorch's uint16 is a type for storage
     libraries = tuple(name for name in libraries if (dtype, name) != ("uint16", "torch"))
-    if dtype in ("uint8", "float32"):
+    if dtype in ("uint8", "float32") and channels == 3:
         libraries = (*libraries, "jax")
     assert_engines_agree(CAMERAS["mask half-way"], field(samples(shape, dtype)), libraries)
-    assert_engines_agree(CAMERAS["strong defocus"], field(samples(shape, dtype)), libraries)
 
 
 def test_integers_are_fractions_of_their_largest_value():
@@ -129,7 +129,7 @@ def test_integers_are_fractions_of_their_largest_value():
 SLICES = {
     "steps": np.s_[::2, 1::2],
     "negative steps": np.s_[::-1, ::-1, ::-1, ::-2],
-    "a window of pixels": np.s_[:, :, 2:11, 3:12],
+    "a window of pixels": np.s_[:, :, 2:8, 3:9],
     "one view": np.s_[1:2, 2:3],
     "one row of views": np.s_[1:2],
     "one column of pixels": np.s_[:, :, :, 4:5],
@@ -161,13 +161,19 @@ def turned(lf: vcc.LightField, angle: float) -> vcc.LightField:
 
 
 @pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
-@pytest.mark.parametrize("name", ["in focus", "small samples", "three masks", "strong defocus"])
-@pytest.mark.parametrize("angle", [0.1, -0.7])
+@pytest.mark.parametrize(
+    ("name", "angle"),
+    [("in focus", 0.1), ("in focus", -0.7), ("small samples", -0.7), ("three masks", 0.1)],
+)
 def test_rolled_frames(name, angle, interpolation):
     lf = turned(field(samples()), angle)
     camera = CAMERAS[name]
     assert not camera.compile(lf).separable
     assert_engines_agree(camera, lf, ("numpy", "torch"), interpolation=interpolation)
+
+
+def test_a_rolled_frame_under_strong_defocus():
+    assert_engines_agree(CAMERAS["strong defocus"], turned(field(samples()), 0.1), ("numpy",))
 
 
 @pytest.mark.parametrize("library", list(LIBRARIES))
@@ -176,7 +182,7 @@ def test_rolled_frames_on_every_library(library):
     assert_engines_agree(CAMERAS["three masks"], lf, (library,))
 
 
-@pytest.mark.parametrize("name", ["in focus", "three masks", "strong defocus"])
+@pytest.mark.parametrize("name", ["in focus", "three masks"])
 def test_frames_rolled_by_a_right_angle_swap_the_pixel_axes(name):
     lf = turned(field(samples()), np.pi / 2)
     camera = CAMERAS[name]
@@ -214,7 +220,7 @@ def test_divided_views():
     # A checkerboard finer than a view's cell under strong defocus: the plan divides cells by itself.
     board = np.indices((24, 24)).sum(axis=0) % 2
     stop = vcc.Mask(pattern=board, width=9 * mm)
-    camera = vcc.Camera([vcc.Lens(focal_length=50 * mm), stop], vcc.Sensor(30 * mm, (40, 41), 60e-6))
+    camera = vcc.Camera([vcc.Lens(focal_length=50 * mm), stop], vcc.Sensor(44 * mm, (14, 15), 90e-6))
     lf = field(samples())
     assert len(camera.compile(lf).view_rows) > SHAPE[0]
     assert_engines_agree(camera, lf)

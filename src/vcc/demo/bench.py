@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from vcc import patterns
+from vcc.affine import Affine
 from vcc.camera import Camera
 from vcc.demo.scene import FAR, MIDDLE, NEAR, demo_scene
 from vcc.errors import InputError
@@ -23,6 +25,8 @@ APERTURE = 20 * mm
 RIM = 0.9
 """The lens's diameter as a share of that: a round rim inside a square grid of views."""
 FOCAL_LENGTH = 50 * mm
+INSIDE = 0.15
+"""How far inside a light field's range of disparities near and far lie, as a share of the range."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,7 @@ class Bench:
         diameter: of the lens, metres.
         pitch: (vertical, horizontal) of the sensor's pixels, metres.
         scale: by what the light field's world was multiplied.
+        assumed: what had to be assumed about it, a sentence for people; empty if nothing.
     """
 
     light_field: LightField
@@ -50,6 +55,7 @@ class Bench:
     diameter: float
     pitch: tuple[float, float]
     scale: float = 1.0
+    assumed: str = ""
 
     def image_distance(self, distance: float) -> float:
         """Where the lens makes a sharp image of what is ``distance`` metres away: 1/d = 1/f − 1/Z."""
@@ -69,16 +75,25 @@ class Bench:
         """The paper's Example 1: a lens, and a sensor focused on a distance in metres."""
         return Camera([self.lens], self.sensor(distance))
 
+    @property
+    def masked_focus(self) -> float:
+        """What the cameras with masks are focused on, metres.
+
+        Near in the built-in scene, so that the lamps behind blur widely. In the middle of someone's own, whose
+        views are often too few for more.
+        """
+        return self.middle if self.scene is None else self.near
+
     def cosine(self) -> Camera:
         """The paper's Example 2 as Veeraraghavan built it: a cosine mask just before the sensor."""
-        sensor = self.sensor(self.near)
+        sensor = self.sensor(self.masked_focus)
         carrier = 2 * sensor.size[1] / 30
         mask = Mask(patterns.CosineSum((carrier, carrier)), z=sensor.z * (1 - 0.04), name="cosine")
         return Camera([self.lens, mask], sensor)
 
     def coded(self) -> Camera:
         """The paper's Example 2 with a mask half-way: a MURA of 13×13 cells."""
-        sensor = self.sensor(self.near)
+        sensor = self.sensor(self.masked_focus)
         # As wide as the cone of light that reaches any part of the sensor, there.
         width = (self.diameter + max(sensor.size)) / 2
         return Camera([self.lens, Mask(patterns.mura(13), z=sensor.z / 2, width=width, name="MURA")], sensor)
@@ -142,61 +157,103 @@ def built_in(small: bool, progress: Callable[[int, int], None] | None = None) ->
     return Bench(light_field, scene, NEAR, MIDDLE, FAR, FOCAL_LENGTH, RIM * APERTURE, (pitch, pitch))
 
 
-def from_folder(path: Path, small: bool, progress: Callable[[int, int], None] | None = None) -> Bench:
+def from_someone(
+    given: Path | LightField, small: bool, progress: Callable[[int, int], None] | None = None
+) -> Bench:
     """The bench with someone's own light field.
 
     Its world is scaled so that the grid of views is 20 mm wide, a lens's width. The lens has f = 50 mm, or less
     where the scaled scene is nearer than four times that. The distances to focus on come from the range of
-    disparities. The sensor's pixels are the views' at the middle distance, and a little smaller where the
-    sensor would otherwise look past the views.
+    disparities; where these lie beyond infinity, the views are taken to converge such that the farthest thing
+    is 3 m away. The sensor's pixels are the views' at the middle distance, and a little smaller where the sensor
+    would otherwise look past the views.
 
     Args:
-        path: a folder that `vcc.open_light_field` reads.
-        small: keep every second view and pixel of those, for a quick look.
+        given: a light field, or a folder that `vcc.open_light_field` reads.
+        small: keep every second view and pixel only, for a quick look.
         progress: called with (done, total) in pictures read.
 
     Raises:
-        InputError: what the reader refuses, or views without parallax or in a single row.
+        InputError: what the reader refuses, views that are not on an upright grid or in a single row, or views
+            without parallax.
     """
     from vcc.formats import open_light_field
 
-    light_field = open_light_field(path, progress=progress)
+    light_field = given if isinstance(given, LightField) else open_light_field(given, progress=progress)
     if small:
         light_field = light_field[::2, ::2, ::2, ::2]
     if min(light_field.shape[:2]) < 2:
         raise InputError(
-            f"the demo needs two rows and two columns of views or more; {path} has {light_field.shape[:2]}"
+            f"the demo needs two rows and two columns of views or more, not {light_field.shape[0]} and "
+            f"{light_field.shape[1]}"
         )
-    disparities = light_field.measured_disparity_range()
-    if disparities is None:
-        raise InputError(f"the views of {path} show no parallax: there is nothing to focus on")
+    if light_field.channels not in (None, 1, 3):
+        raise InputError(
+            f"the demo shows light fields of 1 or 3 channels, not {light_field.channels}: choose, e.g. lf[..., :3]"
+        )
+    _check_upright(light_field)
     scale = APERTURE / _aperture(light_field)
-    return _fitted(light_field.scaled(scale), scale)
+    scaled, assumed = _before_the_lens(light_field.scaled(scale))
+    return _fitted(scaled, scale, assumed)
+
+
+def _check_upright(light_field: LightField) -> None:
+    """The close-ups and the true picture rely on u and s running along columns, v and t along rows."""
+    linear = light_field.frame.linear
+    mixed = linear[[0, 0, 0, 1, 1, 1, 2, 2, 3, 3], [1, 2, 3, 0, 2, 3, 1, 3, 0, 2]]
+    if not np.allclose(mixed, 0):
+        raise InputError("the demo needs a light field of views on an upright grid; this one has another frame")
 
 
 def _aperture(light_field: LightField) -> float:
     """The width of the grid of views, the narrower way, cells included, metres."""
-    spacing = abs(light_field.frame.linear[[1, 0], [1, 0]])
+    spacing = np.abs(light_field.frame.linear[[1, 0], [1, 0]])
     return float(min(light_field.shape[0] * spacing[0], light_field.shape[1] * spacing[1]))
 
 
-def _fitted(light_field: LightField, scale: float) -> Bench:
+def _before_the_lens(light_field: LightField) -> tuple[LightField, str]:
+    """The light field with all of its scene at real distances, and what was assumed for that."""
+    disparities = light_field.measured_disparity_range()
+    if disparities is None:
+        raise InputError("the views show no parallax: there is nothing to focus on")
+    low, high = (1 / light_field.distance_of(d) for d in disparities)
+    # A little beyond infinity is the measurement's error; more is a wrong or unknown convergence.
+    if low >= -0.05 * (high - low):
+        return light_field, ""
+    assumed = (
+        f"Its disparities, {disparities[0]:.2g} to {disparities[1]:.2g} pixels per view, would put part of the "
+        f"scene beyond infinity: the views were taken to converge such that the farthest thing is {FAR:g} m away"
+    )
+    if disparities[1] < 0:
+        assumed += (
+            " (if near and far look exchanged, the views run the wrong way: open it with another orientation)"
+        )
+    # Views that converge at F are parallel ones behind a lens of focal length −F.
+    return light_field.transformed(Affine.lens(-1 / (1 / FAR - low))), assumed
+
+
+def _fitted(light_field: LightField, scale: float, assumed: str) -> Bench:
     """A lens and a sensor for a light field whose disparities are known."""
     low, high = light_field.measured_disparity_range() or (0.0, 0.0)
-    vergences = [1 / light_field.distance_of(d) for d in (high, (low + high) / 2, low)]
-    if vergences[0] <= 0:
-        raise InputError(
-            f"disparities of {low:.3g} to {high:.3g} pixels per view lie beyond infinity for the geometry of this "
-            "light field: state spacing and focus distance, e.g. in a parameters.cfg"
-        )
-    # What the measurement puts beyond infinity counts as infinitely far.
+    # What the measurement puts beyond infinity counts as very far.
+    # A measured range reaches a little beyond the scene: focus inside it.
+    inside = INSIDE * (high - low)
+    chosen = (high - inside, (low + high) / 2, low + inside)
+    vergences = [max(1 / light_field.distance_of(d), 1e-6) for d in chosen]
     near, middle, far = (1 / v if v > 1e-6 else math.inf for v in vergences)
-    focal_length = min(FOCAL_LENGTH, near / 4)
-    bench = Bench(light_field, None, near, middle, far, focal_length, RIM * APERTURE, (1.0, 1.0), scale)
-    pitches = [_pitch(bench, axis) for axis in (0, 1)]
-    return Bench(
-        light_field, None, near, middle, far, focal_length, RIM * APERTURE, (pitches[0], pitches[1]), scale
+    bench = Bench(
+        light_field,
+        None,
+        near,
+        middle,
+        far,
+        min(FOCAL_LENGTH, near / 4),
+        RIM * APERTURE,
+        (1.0, 1.0),
+        scale,
+        assumed,
     )
+    return replace(bench, pitch=(_pitch(bench, 0), _pitch(bench, 1)))
 
 
 def _pitch(bench: Bench, axis: int) -> float:

@@ -24,6 +24,8 @@ Shown = NDArray[np.float32]
 INK, QUIET, ACCENT = "#222222", "#666666", "#D55E00"
 LABEL = 9
 """Points."""
+SHEET_WIDTH, HIGHEST_ROW = 15.0, 6.8
+"""Of the contact sheet, inches."""
 
 
 @dataclass(frozen=True)
@@ -141,10 +143,11 @@ def put(axes: Any, picture: Shown, title: str = "", **options: Any) -> Any:
 
 def views_figure(light_field: LightField) -> Figure:
     """The outermost and the middle view of a row, and the slice through all views along one row of pixels."""
-    nv, nu, nt, _ = light_field.shape[:4]
+    nv, nu, nt, ns = light_field.shape[:4]
     row, pixel_row = nv // 2, round(0.46 * nt)
-    figure = new_figure(10, 5.0)
-    grid = figure.add_gridspec(2, 3, height_ratios=(3.3, 1.0))
+    height = 3.3 * nt / ns
+    figure = new_figure(10, height + 1.7)
+    grid = figure.add_gridspec(2, 3, height_ratios=(height, 1.0))
     for place, (column, name) in enumerate(((0, "leftmost"), (nu // 2, "middle"), (nu - 1, "rightmost"))):
         axes = figure.add_subplot(grid[0, place])
         put(axes, view_shown(light_field, row, column), f"{name} view of row {row + 1}")
@@ -223,7 +226,6 @@ class SheetRow:
     title: str
     text: str
     pictures: Sequence[tuple[str, Path]]
-    height: float
 
 
 def contact_sheet(title: str, rows: Sequence[SheetRow]) -> Figure:
@@ -233,19 +235,16 @@ def contact_sheet(title: str, rows: Sequence[SheetRow]) -> Figure:
         title: of the sheet.
         rows: what it shows.
     """
-    figure = new_figure(15, 0.7 + sum(row.height for row in rows))
+    pictures = [[_read(path) for _, path in row.pictures] for row in rows]
+    ratios = [[picture.shape[1] / picture.shape[0] for picture in row] for row in pictures]
+    heights = [min(SHEET_WIDTH / sum(row), HIGHEST_ROW) + 0.9 for row in ratios]
+    figure = new_figure(SHEET_WIDTH, 0.6 + sum(heights))
     figure.suptitle(title, fontsize=17, color=INK, x=0.01, ha="left", fontweight="bold")
-    parts = figure.subfigures(len(rows), 1, height_ratios=[row.height for row in rows], squeeze=False)[:, 0]
-    for part, row in zip(parts, rows, strict=True):
+    parts = figure.subfigures(len(rows), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for part, row, row_pictures, row_ratios in zip(parts, rows, pictures, ratios, strict=True):
         part.suptitle(f"{row.title}\n{row.text}", fontsize=11.5, color=INK, x=0.01, ha="left")
-        pictures = [_read(path) for _, path in row.pictures]
-        ratios = [picture.shape[1] / picture.shape[0] for picture in pictures]
-        for axes, (name, _), picture in zip(
-            part.subplots(1, len(pictures), width_ratios=ratios, squeeze=False)[0],
-            row.pictures,
-            pictures,
-            strict=True,
-        ):
+        places = part.subplots(1, len(row_pictures), width_ratios=row_ratios, squeeze=False)[0]
+        for axes, (name, _), picture in zip(places, row.pictures, row_pictures, strict=True):
             put(axes, picture, name).set_interpolation("antialiased")
     return figure
 

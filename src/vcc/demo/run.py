@@ -9,19 +9,22 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vcc.camera import Camera
 from vcc.demo import figures, story
-from vcc.demo.bench import Bench, built_in, from_folder
-from vcc.demo.figures import Crop, Shown, SheetRow
+from vcc.demo.bench import Bench, built_in, from_someone
+from vcc.demo.figures import Crop, SheetRow, Shown
 from vcc.demo.page import write_page
 from vcc.demo.report import DemoReport, Timing, duration, speed_up
 from vcc.demo.truth import psnr, true_picture
 from vcc.errors import InputError, ResultWarning
 from vcc.image import Image
+from vcc.light_field import LightField
+from vcc.sources import PlanesScene, TexturedPlane
+from vcc.sources.textures import Uniform
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,13 +34,17 @@ PAPER_SHAPE = (20, 20, 500, 500)
 
 
 def run_demo(
-    output: Path, light_field: Path | None = None, small: bool = False, console: Console | None = None
+    output: Path,
+    light_field: Path | LightField | None = None,
+    small: bool = False,
+    console: Console | None = None,
 ) -> DemoReport:
     """Do the paper's two examples and its own check, and write pictures and a page that explain them.
 
     Args:
         output: the folder for pictures, ``index.html`` and ``contact-sheet.png``; made if missing.
-        light_field: a folder that `vcc.open_light_field` reads, instead of the built-in scene.
+        light_field: a light field, or a folder that `vcc.open_light_field` reads, instead of the built-in
+            scene.
         small: a smaller light field (8×8 views of 160×160 pixels; of someone's own, every second view and
             pixel), for a quick look.
         console: where to print progress and results; None prints to the standard output.
@@ -81,7 +88,7 @@ class _Work:
         self.files.append(path)
         return path
 
-    def draw(self, name: str, figure: object) -> None:
+    def draw(self, name: str, figure: Any) -> None:
         """Write a figure, or the figure of axes."""
         figures.write_figure(getattr(figure, "figure", figure), self.path(name))
 
@@ -117,15 +124,15 @@ def _made(folder: Path) -> Path:
 # --- the light field ---
 
 
-def _light_field(work: _Work, path: Path | None, small: bool) -> Bench:
+def _light_field(work: _Work, given: Path | LightField | None, small: bool) -> Bench:
     with work.status("compiling"):
         begun = time.perf_counter()
-        if path is None:
+        if given is None:
             _tiny().light_field((1, 1), (2, 2), spacing=1e-3, slope_per_pixel=1e-3)
         compiling = time.perf_counter() - begun
     with work.bar("light field") as progress:
         begun = time.perf_counter()
-        bench = built_in(small, progress) if path is None else from_folder(path, small, progress)
+        bench = built_in(small, progress) if given is None else from_someone(given, small, progress)
         made = time.perf_counter() - begun
     with work.status("compiling"):
         begun = time.perf_counter()
@@ -136,16 +143,15 @@ def _light_field(work: _Work, path: Path | None, small: bool) -> Bench:
     work.timings.append(
         Timing("compiling the loops", compiling, note="once on a machine: kept on disk for the next run")
     )
-    verb = "synthesizing" if path is None else "reading"
+    verb = "synthesizing" if given is None else "reading"
     work.timings.append(Timing(f"{verb} the light field", made, note=f"{sizes}, {values.nbytes / 1e6:.0f} MB"))
     work.console.print(f"{bench.light_field!r}")
+    if bench.assumed:
+        work.console.print(bench.assumed)
     return bench
 
 
-def _tiny() -> object:
-    from vcc.sources import PlanesScene, TexturedPlane
-    from vcc.sources.textures import Uniform
-
+def _tiny() -> PlanesScene:
     return PlanesScene([TexturedPlane(Uniform(), 1.0)])
 
 
@@ -273,7 +279,8 @@ def _example_two(work: _Work, bench: Bench, conventional: dict[str, _Taken]) -> 
                 compared=full,
             )
         )
-    _draw_example_two(work, bench, {"no mask": conventional["near"], **taken})
+    unmasked = conventional["near" if bench.masked_focus == bench.near else "middle"]
+    _draw_example_two(work, bench, {"no mask": unmasked, **taken})
     work.told.example_two(bench)
 
 
@@ -282,7 +289,7 @@ def _draw_example_two(work: _Work, bench: Bench, taken: dict[str, _Taken]) -> No
     for name, camera in cameras.items():
         work.draw(f"example-2-{name}-camera.png", camera.plot(light_field=bench.light_field))
     masks = [(story.MASK_TITLES[name], camera.elements[-1]) for name, camera in cameras.items()]
-    width = max(bench.sensor(bench.near).size) * 0.9
+    width = max(cameras["cosine"].sensor.size) * 0.9
     work.draw("example-2-masks.png", figures.mask_figure(masks, width))
     titles = {"no mask": "no mask", **story.MASK_TITLES}
     columns = [(titles[name], picture.shown) for name, picture in taken.items()]
@@ -333,7 +340,7 @@ def _check_crops(bench: Bench, conventional: dict[str, _Taken]) -> list[Crop]:
 def _finish(work: _Work, bench: Bench, truth: str) -> DemoReport:
     folder = work.folder
     rows = [
-        SheetRow(row.title, row.text, [(name, folder / file) for name, file in row.pictures], row.height)
+        SheetRow(row.title, row.text, [(name, folder / file) for name, file in row.pictures])
         for row in story.sheet_rows(bench, work.psnr, work.timings)
     ]
     work.draw("contact-sheet.png", figures.contact_sheet("Virtual Computational Camera", rows))

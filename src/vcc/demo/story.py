@@ -17,7 +17,7 @@ TITLE = "A virtual computational camera at work"
 PLACES = {
     "leaves before the chart": (-0.128, -0.085, MIDDLE),
     "the chart's star": (-0.046, 0.030, MIDDLE),
-    "lamps of the town": (0.25, -0.37, FAR),
+    "lamps of the town": (0.48, -0.335, FAR),
 }
 """Places of the built-in scene worth a close look: (X, Y, distance), metres."""
 CHECK_PLACES = {
@@ -72,13 +72,17 @@ def introduction(bench: Bench, timings: Sequence[Timing]) -> str:
     if compared:
         slowest = max(compared, key=lambda timing: timing.first)
         speed = (
-            f" One picture through a mask took the paper’s Matlab 8 minutes on a 3 GHz PC of 2009; here, with three "
+            " One picture through a mask took the paper’s Matlab 8 minutes on a 3 GHz PC of 2009; here, "
+            "with three "
             f"colours instead of one channel, it took {duration(slowest.first)}."
         )
     return (
-        "<p>A camera takes a <i>light field</i>, bends, masks and sums it. Changyin Zhou’s <i>Virtual Computational "
-        "Camera</i> (2009) simulates that: put lenses and masks along an axis, give the light field, get the picture "
-        "that such a camera would record. Below are the paper’s two examples and its own check, computed a moment "
+        "<p>A camera takes a <i>light field</i>, bends, masks and sums it. Changyin Zhou’s <i>Virtual "
+        "Computational "
+        "Camera</i> (2009) simulates that: put lenses and masks along an axis, give the light field, get "
+        "the picture "
+        "that such a camera would record. Below are the paper’s two examples and its own check, computed a "
+        "moment "
         f"ago on {_what(bench)}.{speed}</p>"
     )
 
@@ -119,8 +123,10 @@ class Told:
                         Panel(
                             "light-field-views.png",
                             "Three of the views, and a slice through a row of them",
-                            "Below, one row of pixels (dashed) of each view of the row, stacked. Each thing leaves a "
-                            "straight trace; the farther from the distance at which the views converge, the more it "
+                            "Below, one row of pixels (dashed) of each view of the row, stacked. Each "
+                            "thing leaves a "
+                            "straight trace; the farther from the distance at which the views converge, "
+                            "the more it "
                             "slopes, nearer things one way and farther ones the other.",
                         )
                     ]
@@ -150,9 +156,11 @@ class Told:
                 + ".</p>"
             )
         note = (
-            "<p>Wall-clock time on the machine that wrote this page. “First” is the first picture of its kind with "
+            "<p>Wall-clock time on the machine that wrote this page. “First” is the first picture of its "
+            "kind with "
             "everything compiled, “again” the same once more. The paper’s 8 minutes are for one picture "
-            "through one mask from 500×500×20×20 samples of one channel, in Matlab, on an Intel PC of 2009 at 3 GHz: "
+            "through one mask from 500×500×20×20 samples of one channel, in Matlab, on an Intel PC of 2009 "
+            "at 3 GHz: "
             "most of the difference is the method, some of it is the machine.</p>"
         )
         return [*self.parts, Section("What each step took", note, after=timings_table(timings) + gaps)]
@@ -165,17 +173,24 @@ def _light_field_text(bench: Bench) -> str:
     scaled = ""
     if bench.scene is None:
         scaled = (
-            f" Its world was scaled by {bench.scale:.3g}, so that the grid of views is {length(20 * mm)} wide, as a "
+            f" Its world was scaled by {bench.scale:.3g}, so that the grid of views is {length(20 * mm)} "
+            "wide, as a "
             "lens is; all distances below are in that scaled world."
         )
+        if bench.assumed:
+            scaled += f" {bench.assumed}."
     convergence = float(linear[2, 0] / linear[0, 0])
     converging = f"F = {length(1 / convergence)}" if convergence else "F = ∞ (parallel views)"
     return (
-        "<p>A light field tells the radiance of each ray, named by where it meets the plane of the lens, (u, v), and "
-        f"by its slope, (s, t). It comes as {_sizes(bench)}: view i stands at u, and its pixel k looks along s.{scaled}"
+        "<p>A light field tells the radiance of each ray, named by where it meets the plane of the lens, "
+        "(u, v), and "
+        f"by its slope, (s, t). It comes as {_sizes(bench)}: view i stands at u, and its pixel k looks "
+        f"along s.{scaled}"
         "</p><p class=formula>u = (i − i₀)·Δu, &nbsp; s = u/F − (k − k₀)·p, &nbsp;&nbsp; likewise v, t"
-        f"</p><p>Here Δu = {length(abs(linear[0, 0]))}, p = {abs(linear[2, 2]):.3g} a pixel, {converging}. A point at "
-        f"distance Z moves by −Δu·(1/Z − 1/F)/p pixels from view to view: {_signed(low)} to {_signed(high)} in this scene.</p>"
+        f"</p><p>Here Δu = {length(abs(linear[0, 0]))}, p = {abs(linear[2, 2]):.3g} a pixel, {converging}. "
+        "A point at "
+        f"distance Z moves by −Δu·(1/Z − 1/F)/p pixels from view to view: {_signed(low)} to {_signed(high)} "
+        "in this scene.</p>"
     )
 
 
@@ -198,13 +213,17 @@ def _example_one(bench: Bench, exposure: float) -> Section:
     ]
     return Section(
         "Example 1: a conventional camera",
-        "<p>A thin lens and empty space are linear: they move rays, and leave the radiance along each alone. So the "
-        "samples need not be touched. Only the matrix that says <i>which ray each sample is</i> gets multiplied, once "
+        "<p>A thin lens and empty space are linear: they move rays, and leave the radiance along each "
+        "alone. So the "
+        "samples need not be touched. Only the matrix that says <i>which ray each sample is</i> gets "
+        "multiplied, once "
         "for each element; the sensor then sums all rays that land on a pixel:</p>"
         "<p class=formula>lens: s ← s − u/f &nbsp;&nbsp; flight: u ← u + d·s &nbsp;&nbsp; sensor: I(u, v) = "
         "∬ L(u, v, s, t) ds dt</p>"
-        f"<p>With f = {length(bench.focal_length)} and a lens {length(bench.diameter)} wide, what is at distance Z is "
-        "sharp at d where 1/d = 1/f − 1/Z; everything else blurs over A·|1 − d/d<sub>Z</sub>|, with A the lens’s "
+        f"<p>With f = {length(bench.focal_length)} and a lens {length(bench.diameter)} wide, what is at "
+        "distance Z is "
+        "sharp at d where 1/d = 1/f − 1/Z; everything else blurs over A·|1 − d/d<sub>Z</sub>|, with A the "
+        "lens’s "
         f"width. All three pictures are shown with one exposure (radiance 1 is white: × {exposure:.3g}).</p>",
         [
             panels,
@@ -227,10 +246,14 @@ def _example_one(bench: Bench, exposure: float) -> Section:
                 Panel(
                     "example-1-phase-space-points.png",
                     "Two points of light in phase space (the paper’s Figure 4c)",
-                    "Position u across, slope s up; the sensor at d = f. Parallel light, from a point infinitely far "
-                    "(blue), has one slope: a level line. Light from a point near (orange) leans the more the nearer "
-                    "it is. An element is a shear: the lens tilts (s changes), flight slides (u changes). Focus is "
-                    "where a line stands upright: all its light has one u, and the sensor, which sums each upright "
+                    "Position u across, slope s up; the sensor at d = f. Parallel light, from a point "
+                    "infinitely far "
+                    "(blue), has one slope: a level line. Light from a point near (orange) leans the more "
+                    "the nearer "
+                    "it is. An element is a shear: the lens tilts (s changes), flight slides (u changes). "
+                    "Focus is "
+                    "where a line stands upright: all its light has one u, and the sensor, which sums each "
+                    "upright "
                     "column, gets a point. The orange line still leans: it blurs.",
                 )
             ],
@@ -238,7 +261,8 @@ def _example_one(bench: Bench, exposure: float) -> Section:
                 Panel(
                     "example-1-phase-space-scene.png",
                     f"The same for a row of pixels of the light field, focused {away(bench.far)}",
-                    "Many lines at once; on the sensor, those of what is in focus stand upright. Nothing was resampled: each cell is a sample of the light field, "
+                    "Many lines at once; on the sensor, those of what is in focus stand upright. Nothing "
+                    "was resampled: each cell is a sample of the light field, "
                     "drawn where its frame puts it.",
                 )
             ],
@@ -251,35 +275,44 @@ def _example_two(bench: Bench) -> Section:
     gap = cosine.sensor.z - cosine.elements[-1].z
     return Section(
         "Example 2: a mask between lens and sensor",
-        "<p>A mask multiplies: L′(u, v, s, t) = L(u, v, s, t)·K(u, v), in its own plane. By then the rays have moved, "
-        "and putting the field on a grid there would take far more samples than it has (the paper: 250⁴ and more). So "
-        "the mask is pulled to the samples instead: linear optics says where on the mask each sample passes, and its "
+        "<p>A mask multiplies: L′(u, v, s, t) = L(u, v, s, t)·K(u, v), in its own plane. By then the rays "
+        "have moved, "
+        "and putting the field on a grid there would take far more samples than it has (the paper: 250⁴ "
+        "and more). So "
+        "the mask is pulled to the samples instead: linear optics says where on the mask each sample "
+        "passes, and its "
         "weight is looked up there. Transform, mask and sum are one pass.</p>"
-        "<p class=formula>I = S( 𝕋(L, M<sub>2</sub>(f)·M<sub>1</sub>(d<sub>1</sub>)·M<sub>1</sub>(d<sub>2</sub>)) · "
+        "<p class=formula>I = S( 𝕋(L, "
+        "M<sub>2</sub>(f)·M<sub>1</sub>(d<sub>1</sub>)·M<sub>1</sub>(d<sub>2</sub>)) · "
         "𝕋(K, M<sub>1</sub>(d<sub>2</sub>)) ) &nbsp;&nbsp; (paper, section 4.2)</p>"
-        "<p>Both cameras are focused near. The exposure makes up for what a mask stops: four times that of Example 1 "
-        "for the cosines, which let a quarter pass, twice for the coded mask, which is half open.</p>",
+        f"<p>Both cameras are focused on what is {away(bench.masked_focus)}. The exposure makes up for "
+        "what a mask stops: four times that of Example 1 for the cosines, which let a quarter pass, "
+        "twice for the coded mask, which is half open.</p>",
         [
             [
                 Panel(
                     "example-2-cosine.png",
                     f"Cosine mask, {length(gap)} before the sensor",
-                    "Veeraraghavan’s heterodyne camera (2007): in each period of the cosine the shadow depends on the "
-                    "direction that light came from. The picture carries directions as a modulation, from which "
+                    "Veeraraghavan’s heterodyne camera (2007): in each period of the cosine the shadow "
+                    "depends on the "
+                    "direction that light came from. The picture carries directions as a modulation, from "
+                    "which "
                     "a light field can be computed back.",
                 ),
                 Panel(
                     "example-2-coded.png",
                     f"Coded mask half-way, {length(coded.elements[-1].z)} behind the lens",
-                    "Light of a sharp point crosses much of the mask and is only dimmed. A point out of focus spreads "
-                    "its light on the sensor, and the mask’s shadow shows in it: discs have become stamps of the code.",
+                    "Light of a sharp point crosses much of the mask and is only dimmed. A point out of "
+                    "focus spreads "
+                    "its light on the sensor, and the mask’s shadow shows in it: discs have become stamps "
+                    "of the code.",
                 ),
             ],
             [
                 Panel(
                     "example-2-close-ups.png",
                     "Close-ups: no mask, cosine mask, coded mask",
-                    "The same places of three cameras focused near.",
+                    "The same places, three cameras with the same focus.",
                 )
             ],
             [Panel("example-2-masks.png", "The masks", "White lets all light pass, black none.")],
@@ -298,12 +331,14 @@ def _example_two(bench: Bench) -> Section:
 def _check(bench: Bench, psnr: dict[str, float]) -> Section:
     if bench.scene is not None:
         against = (
-            "The truth is the scene’s closed form, traced through the pinhole at 4×4 points of every pixel; it has "
+            "The truth is the scene’s closed form, traced through the pinhole at 4×4 points of every "
+            "pixel; it has "
             "never seen the light field."
         )
     else:
         against = (
-            "Between a real view’s samples nobody knows the truth: the reference is a cubic spline through the view "
+            "Between a real view’s samples nobody knows the truth: the reference is a cubic spline through "
+            "the view "
             "at the pinhole, averaged over each pixel. It is an interpolation too, so the decibels tell "
             "how well they agree, not how far either is from the world."
         )
@@ -321,9 +356,12 @@ def _check(bench: Bench, psnr: dict[str, float]) -> Section:
     return Section(
         "The paper’s own check: a simulated pinhole picture",
         "<p>Closed down to a pinhole (a hole of "
-        f"{length(bench.pinhole_diameter)} at one view, beside the axis), the camera must show what that view shows. "
-        "The paper compares the two by eye, and finds strips, from taking the nearest sample. The sensor’s pixels are "
-        f"not the views’ pixels here, so interpolation matters. {against} PSNR is in linear light, with radiance 1 as "
+        f"{length(bench.pinhole_diameter)} at one view, beside the axis), the camera must show what that "
+        "view shows. "
+        "The paper compares the two by eye, and finds strips, from taking the nearest sample. The sensor’s "
+        "pixels are "
+        f"not the views’ pixels here, so interpolation matters. {against} PSNR is in linear light, with "
+        "radiance 1 as "
         "the peak, the outermost 3 % left out.</p>",
         [
             panels,
@@ -354,13 +392,11 @@ class Row:
         title: above it.
         text: below that.
         pictures: name and file of each.
-        height: inches.
     """
 
     title: str
     text: str
     pictures: Sequence[tuple[str, str]]
-    height: float
 
 
 def sheet_rows(bench: Bench, psnr: dict[str, float], timings: Sequence[Timing]) -> list[Row]:
@@ -374,7 +410,6 @@ def sheet_rows(bench: Bench, psnr: dict[str, float], timings: Sequence[Timing]) 
             f"The light field: {_what(bench)}",
             "Three views of a row, and the slice through all views along the dashed line: slope tells distance.",
             [("", "light-field-views.png")],
-            6.6,
         ),
         Row(
             "Example 1: a conventional camera; only the sensor moves",
@@ -384,17 +419,15 @@ def sheet_rows(bench: Bench, psnr: dict[str, float], timings: Sequence[Timing]) 
                 (f"focused in the middle, {away(bench.middle)}", "example-1-focused-middle.png"),
                 (f"focused far, {away(bench.far)}", "example-1-focused-far.png"),
             ],
-            5.6,
         ),
         Row(
             "The conventional camera in phase space (position u across, slope s up)",
-            "A point is a line; lens and flight shear it; it is sharp where it stands upright. Left: parallel light "
-            "(blue) and a near point (orange), as the paper’s Figure 4(c). Right: a row of pixels of the light field.",
+            "A point is a line, sheared by lens and flight; sharp where it stands upright. Left: parallel light "
+            "(blue) and a near point (orange), the paper’s Figure 4(c). Right: a row of pixels.",
             [
                 ("", "example-1-phase-space-points.png"),
                 ("", "example-1-phase-space-scene.png"),
             ],
-            3.5,
         ),
         Row(
             f"Example 2: a mask between lens and sensor{speed}",
@@ -404,7 +437,6 @@ def sheet_rows(bench: Bench, psnr: dict[str, float], timings: Sequence[Timing]) 
                 (MASK_TITLES["coded"], "example-2-coded.png"),
                 ("close-ups", "example-2-close-ups.png"),
             ],
-            5.6,
         ),
         Row(
             "The cameras from the side",
@@ -413,7 +445,6 @@ def sheet_rows(bench: Bench, psnr: dict[str, float], timings: Sequence[Timing]) 
                 ("", "example-1-camera.png"),
                 ("", "example-2-coded-camera.png"),
             ],
-            4.6,
         ),
         Row(
             "The paper’s own check: a simulated pinhole picture against the truth",
@@ -423,6 +454,5 @@ def sheet_rows(bench: Bench, psnr: dict[str, float], timings: Sequence[Timing]) 
                 ("simulated pinhole picture, linear", "check-linear.png"),
                 ("close-ups", "check-close-ups.png"),
             ],
-            7.2,
         ),
     ]

@@ -66,7 +66,7 @@ def _spline(light_field: LightField, view: tuple[int, int], s: NDArray[np.float6
     frame = light_field.frame
     slope_0 = frame([column, row, 0, 0])[2:]
     k = (s - slope_0[0]) / frame.linear[2, 2]
-    l = (t - slope_0[1]) / frame.linear[3, 3]  # noqa: E741
+    l = (t - slope_0[1]) / frame.linear[3, 3]
     samples = to_numpy(light_field.values[row, column]).astype(np.float64) / light_field.full_scale
     samples = samples.reshape(*samples.shape[:2], -1)
     places = np.meshgrid(l, k, indexing="ij")

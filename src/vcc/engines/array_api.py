@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.engines.smear import tent_matrix
 from vcc.light_field import to_dtype
-from vcc.plan.footprint import SMALLEST_STEP, reach_in_pixels, refinement_matrix, shares
+from vcc.plan.footprint import reach_in_pixels, refinement_matrix, shares
 from vcc.plan.model import MaskLookup, Plan
 
 
@@ -155,9 +155,9 @@ class _Run:
         """
         xp = self.xp
         samples, width, _ = block.shape
-        size = max(abs(step), SMALLEST_STEP)
+        size = abs(step)
         reach = reach_in_pixels(self.plan.interpolation, size)
-        middle = (pixel - start) / (size if step >= 0 else -size)
+        middle = (pixel - start) / step
         first = np.clip(np.ceil(middle - reach / size), 0, samples - 1).astype(np.int64)
         last = np.clip(np.floor(middle + reach / size), 0, samples - 1).astype(np.int64)
         total = xp.zeros((len(pixel), width, block.shape[2]), dtype=self.float, device=self.device)

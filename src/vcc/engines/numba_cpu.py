@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from vcc.engines import numba_kernels as kernels
 from vcc.engines.smear import finish
-from vcc.plan.footprint import REACH, SMALLEST_STEP, Taps, refinement_matrix, taps
+from vcc.plan.footprint import REACH, Taps, refinement_matrix, taps
 from vcc.plan.model import Plan
 
 Progress = Callable[[int, int], None]
@@ -243,8 +243,7 @@ def _add_sheared(
     for texture, mask in zip(textures, plan.masks, strict=True):
         texture[: mask.texture.shape[0], : mask.texture.shape[1]] = mask.texture
     mask_step = np.array([mask.step for mask in plan.masks]).reshape(-1, 2, 2)
-    row_step = np.copysign(max(abs(plan.row_step), SMALLEST_STEP), plan.row_step)
-    column_step = np.copysign(max(abs(plan.column_step), SMALLEST_STEP), plan.column_step)
+    row_step, column_step = plan.row_step, plan.column_step
     code = list(REACH).index(plan.interpolation)
     for done, (b, a) in enumerate(zip(*np.nonzero(plan.weights), strict=True)):
         if progress is not None:

@@ -269,7 +269,7 @@ def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
 def _share(interpolation, offset, size):  # type: ignore[no-untyped-def]
     if interpolation == 0:
         reach = max(size, 1.0) / 2
-        return 1.0 / max(size, 1.0) if -reach <= offset < reach else 0.0
+        return 1.0 / max(size, 1.0) if -reach - 1e-9 <= offset < reach - 1e-9 else 0.0
     return _cumulative(interpolation, (offset + 0.5) / size) - _cumulative(interpolation, (offset - 0.5) / size)
 
 
@@ -301,8 +301,8 @@ def sheared_view(  # type: ignore[no-untyped-def]
     """
     nt, ns, channels = view.shape
     height, width = abs(fine_row_step), abs(fine_column_step)
-    reach_y = max(height, 1.0) / 2 if interpolation == 0 else reach * height + 0.5
-    reach_x = max(width, 1.0) / 2 if interpolation == 0 else reach * width + 0.5
+    reach_y = 1e-6 + (max(height, 1.0) / 2 if interpolation == 0 else reach * height + 0.5)
+    reach_x = 1e-6 + (max(width, 1.0) / 2 if interpolation == 0 else reach * width + 0.5)
     line = np.empty((ns, channels))
     for y in range(start, stop):
         line[:] = 0

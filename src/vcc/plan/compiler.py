@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.light_field import LightField
-from vcc.plan.footprint import REACH
+from vcc.plan.footprint import REACH, SMALLEST_STEP
 from vcc.plan.model import Plan
 from vcc.plan.parallax_rule import BetweenViews, choose_between_views
 from vcc.plan.planes import Plane, depends_on_view_only, detail_lost, mask_lookup, tap_origin
@@ -134,13 +134,14 @@ def _without_transposition(light_field: LightField, at_sensor: Affine) -> tuple[
 
 
 def _cleaned(step: Array, samples: tuple[int, int]) -> Array:
-    """Steps whose cross terms are rounding errors, set to zero."""
+    """Steps without cross terms that are rounding errors, and without zeros on the way to the pixels."""
     step = step.copy()
     for row, column in ((0, 1), (1, 0)):
         if abs(step[row, column]) * max(samples) < 1e-6:
             step[row, column] = 0.0
-    if step[1, 1] == 0 and step[0, 1] != 0:
-        raise InputError("the light field's pixel rows fall onto one sensor row: such a frame is not supported")
+    for axis in (0, 1):
+        if abs(step[axis, axis]) < SMALLEST_STEP:
+            step[axis, axis] = np.copysign(SMALLEST_STEP, step[axis, axis])
     return step
 
 

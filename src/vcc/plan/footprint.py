@@ -25,7 +25,12 @@ REACH = {"nearest": 0.5, "linear": 1.0, "cubic": 2.0}
 """Half the width of each interpolation's footprint, in samples."""
 
 SMALLEST_STEP = 1e-7
-"""Steps from sample to sample below this, in pixels, count as this: a ten-millionth of a pixel is a point."""
+"""Plans keep steps from sample to sample at this or above, in pixels: a view that falls into a point falls into
+a ten-millionth of a pixel times its samples, and nothing has to be divided by zero."""
+
+TIE = 1e-9
+"""Pixels by which ``"nearest"`` moves its borders: a sample exactly between two pixels goes to the same one
+whatever the rounding."""
 
 
 def cumulative(interpolation: str, a: Any, xp: Any = np) -> Any:
@@ -71,17 +76,17 @@ def shares(interpolation: str, pixel: Any, position: Any, step: float, xp: Any =
         interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
         pixel: pixel indices, as floating point.
         position: the samples' pixel coordinates.
-        step: pixels from one sample to the next, any sign.
+        step: pixels from one sample to the next, of any sign, not 0.
         xp: the array namespace of the arrays.
 
     ``"nearest"`` is the paper's: where samples are closer than pixels, each falls into the pixel that holds
     it (forward); where they are further apart, each pixel takes the sample nearest to its middle (backward).
     """
-    size = max(abs(step), SMALLEST_STEP)
+    size = abs(step)
     offset = pixel - position
     if interpolation == "nearest":
         reach = max(size, 1.0) / 2
-        inside = (offset >= -reach) & (offset < reach)
+        inside = (offset >= -reach - TIE) & (offset < reach - TIE)
         return xp.astype(inside, offset.dtype) / max(size, 1.0)
     upper = cumulative(interpolation, (offset + 0.5) / size, xp)
     return upper - cumulative(interpolation, (offset - 0.5) / size, xp)
@@ -94,7 +99,8 @@ def reach_in_pixels(interpolation: str, size: float) -> float:
         interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
         size: pixels from one sample to the next, greater than 0.
     """
-    return max(size, 1.0) / 2 if interpolation == "nearest" else REACH[interpolation] * size + 0.5
+    reach = max(size, 1.0) / 2 if interpolation == "nearest" else REACH[interpolation] * size + 0.5
+    return reach + 1e-6  # a border reached by rounding is looked at, and gets the share that it deserves
 
 
 @dataclass(frozen=True)
@@ -122,11 +128,10 @@ def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: i
         samples: how many samples there are.
         pixels: how many pixels there are.
     """
-    size = max(abs(step), SMALLEST_STEP)
-    signed = size if step >= 0 else -size
+    size = abs(step)
     reach = reach_in_pixels(interpolation, size)
     pixel = np.arange(pixels, dtype=np.float64)
-    middle = (pixel - np.asarray(origin, dtype=np.float64)[..., None]) / signed
+    middle = (pixel - np.asarray(origin, dtype=np.float64)[..., None]) / step
     low = np.clip(np.ceil(middle - reach / size), 0, samples)
     high = np.clip(np.floor(middle + reach / size), -1, samples - 1)
     first = low.astype(np.int64)

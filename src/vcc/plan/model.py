@@ -138,7 +138,7 @@ class Plan:
     def shear(self) -> float:
         """Raster columns by which a sample's place moves per raster row, its column index held."""
         (_, xl), (_, yl) = self.step
-        return float(xl / yl) if yl else 0.0
+        return float(xl / yl)
 
     @property
     def direction(self) -> str:

@@ -58,20 +58,30 @@ class TexturedPlane:
         if not 0 <= self.opacity <= 1:
             raise InputError(f"the opacity of a plane lies between 0 and 1, not {self.opacity}")
 
-    def at(self, x: Array, y: Array) -> Array:
+    def at(self, x: Array, y: Array, cell: float = 0.0) -> Array:
         """Radiance times opacity, and opacity, shape (..., 4), at positions of the scene.
 
         Args:
             x: metres from the axis, to the right.
             y: metres from the axis, downwards; broadcast against x.
+            cell: size of the square that each position stands for, metres: one cut by the border of the plane
+                counts by its share. 0 for points.
         """
         x, y = np.asarray(x, float) - self.middle[0], np.asarray(y, float) - self.middle[1]
         values = radiance_and_opacity(self.texture, x, y)
         height = self.width if self.height is None else self.height
         if math.isinf(self.width) and math.isinf(height) and self.opacity == 1:
             return values
-        inside = (np.abs(x) <= self.width / 2) & (np.abs(y) <= height / 2)
-        return np.asarray(values * np.where(inside, values.dtype.type(self.opacity), 0)[..., None])
+        share = self.opacity * _share_inside(x, self.width, cell) * _share_inside(y, height, cell)
+        return np.asarray(values * share.astype(values.dtype)[..., None])
+
+
+def _share_inside(place: Array, size: float, cell: float) -> Array:
+    """The share of cells around places that lies within ±size/2, along one axis."""
+    if cell == 0 or math.isinf(size):
+        return (np.abs(place) <= size / 2).astype(np.float64)
+    covered = np.minimum(place + cell / 2, size / 2) - np.maximum(place - cell / 2, -size / 2)
+    return np.asarray(np.clip(covered / cell, 0.0, 1.0))
 
 
 class PlanesScene:
@@ -208,7 +218,7 @@ def _rasters(planes: tuple[TexturedPlane, ...], grid: _Grid, pool: ThreadPoolExe
         # Point m of the raster is the mean over points m … m + fine − 1, whose middle is m + (fine − 1)/2.
         x = (np.arange(columns * fine + fine - 1) - (columns * fine - 1) / 2 - (fine - 1) / 2) * step
         y = (np.arange(start, stop + fine - 1) - (rows * fine - 1) / 2 - (fine - 1) / 2) * step
-        values = plane.at(x[None, :], y[:, None]).astype(np.float32, copy=False)
+        values = plane.at(x[None, :], y[:, None], step).astype(np.float32, copy=False)
         mean = _running_mean(_running_mean(values, 0, fine), 1, fine)
         phased = mean.reshape(stop - start, columns, fine, 4)
         rasters[number, start:stop] = phased.transpose(0, 2, 3, 1)

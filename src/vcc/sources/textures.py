@@ -99,7 +99,7 @@ class Waves:
         total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
         for f, a, p in zip(frequency, angle, phase, strict=True):
             total += np.cos(2 * math.pi * f * (x * math.cos(a) + y * math.sin(a)) + p)
-        return 0.5 + total * (self.contrast / (2 * self.waves))
+        return np.asarray(0.5 + total * (self.contrast / (2 * self.waves)))
 
 
 @dataclass(frozen=True)
@@ -165,8 +165,9 @@ class Picture:
             np.asarray(x, float) / pitch + (columns - 1) / 2, np.asarray(y, float) / pitch + (rows - 1) / 2
         )
         inside = (np.abs(column - (columns - 1) / 2) <= columns / 2) & (np.abs(row - (rows - 1) / 2) <= rows / 2)
-        channels = [map_coordinates(values[..., c], [row, column], order=1, mode="nearest") for c in range(4)]
-        return np.stack(channels, axis=-1) * inside[..., None]
+        places = [row.ravel(), column.ravel()]
+        channels = [map_coordinates(values[..., c], places, order=1, mode="nearest") for c in range(4)]
+        return np.asarray(np.stack(channels, axis=-1).reshape(*row.shape, 4) * inside[..., None])
 
 
 class Painting:

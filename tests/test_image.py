@@ -1,0 +1,67 @@
+"""`vcc.Image`: a grid with a frame. What it refuses, slices in place, and what it says of itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+import vcc
+from vcc import Affine, Image, Sensor
+
+FRAME = Sensor(0.05, (4, 6), (2e-5, 1e-5)).frame
+
+
+def image(*shape: int) -> Image:
+    return Image(np.random.default_rng(0).random(shape or (4, 6)).astype(np.float32), FRAME)
+
+
+@pytest.mark.parametrize("shape", [(4,), (2, 3, 4, 5)])
+def test_other_than_two_or_three_axes_are_refused_with_their_shape(shape):
+    with pytest.raises(vcc.InputError, match=rf"not shape \({shape[0]},"):
+        Image(np.zeros(shape), FRAME)
+
+
+def test_a_frame_of_rays_is_refused():
+    with pytest.raises(vcc.InputError, match="3×3 frame"):
+        Image(np.zeros((4, 6)), Affine.identity())
+
+
+@pytest.mark.parametrize("index", [np.s_[1:3, ::2], np.s_[::-1], np.s_[..., 2:], np.s_[3:0:-2, 5:1:-1]])
+def test_a_piece_keeps_its_place(index):
+    whole = image()
+    piece = whole[index]
+    rows, columns = np.indices((4, 6))
+    for row, column in np.ndindex(piece.shape):
+        r, c = int(rows[index][row, column]), int(columns[index][row, column])
+        assert piece.values[row, column] == whole.values[r, c]
+        np.testing.assert_allclose(piece.frame([column, row]), whole.frame([c, r]), atol=1e-18)
+
+
+def test_channels_stay():
+    assert image(4, 6, 3)[1:].shape == (3, 6, 3)
+    assert image(4, 6, 3).upright().shape == (4, 6, 3)
+
+
+def test_integers_as_index_are_refused():
+    with pytest.raises(vcc.InputError, match="write 2:3"):
+        image()[2]
+
+
+def test_pixel_area_is_pitch_times_pitch():
+    assert image().pixel_area == pytest.approx(2e-10, rel=1e-12)
+
+
+def test_values_of_other_libraries_become_numpy():
+    values = torch.ones((4, 6), requires_grad=True)
+    as_numpy = Image(values, FRAME).to_numpy()
+    assert isinstance(as_numpy, np.ndarray)
+    assert as_numpy.dtype == np.float32
+    turned = Image(torch.arange(24.0).reshape(4, 6), FRAME).upright()
+    assert turned.values[0, 0] == 23
+
+
+def test_repr_says_shape_pitch_and_missing_rays():
+    assert "4×6" in repr(image())
+    assert "missing" not in repr(image())
+    assert "12.5% of the rays missing" in repr(Image(np.zeros((4, 6)), FRAME, missing_rays=0.125))
