@@ -53,13 +53,22 @@ def test_the_sensors_pixels_are_where_its_frame_says():
 @pytest.mark.parametrize(
     ("elements", "message"),
     [
-        ([vcc.Lens(focal_length=0.05, z=60 * mm)], r"lens at z = 60 mm \(z = 60 mm\) stands behind the sensor \(z = 52 mm\)"),
-        ([vcc.Mask(pattern=np.ones((1, 1)), width=1.0, z=53 * mm, name="code")], 'mask "code" .*behind the sensor'),
+        (
+            [vcc.Lens(focal_length=0.05, z=60 * mm)],
+            r"lens at z = 60 mm \(z = 60 mm\) stands behind the sensor \(z = 52 mm\)",
+        ),
+        (
+            [vcc.Mask(pattern=np.ones((1, 1)), width=1.0, z=53 * mm, name="code")],
+            'mask "code" .*behind the sensor',
+        ),
         ([vcc.Lens(focal_length=0.05, z=-1 * mm)], "lens at z = -1 mm stands before the entrance plane"),
-        ([LENS, vcc.Prism(deflection=(0, 0), name="a"), vcc.Lens(focal_length=1.0, name="a")], '2 elements are named "a"'),
+        (
+            [LENS, vcc.Prism(deflection=(0, 0), name="a"), vcc.Lens(focal_length=1.0, name="a")],
+            '2 elements are named "a"',
+        ),
         (["lens"], "vcc.Element objects, not str"),
     ],
-)  # fmt: skip
+)
 def test_cameras_that_cannot_be_are_refused(elements, message):
     with pytest.raises(vcc.InputError, match=message):
         vcc.Camera(elements, SENSOR)

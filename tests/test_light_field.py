@@ -70,7 +70,7 @@ def test_types_that_are_no_radiance_are_refused_by_name(dtype):
     "matrix", [np.diag([0, 1, 1, 1, 1.0]), np.array([[1, 0, 2, 0, 0]] * 4 + [[0, 0, 0, 0, 1]], float)]
 )
 def test_a_frame_that_is_not_invertible_is_refused_and_shown(matrix):
-    with pytest.raises(vcc.InputError, match="must be invertible(.|\n)*Affine"):
+    with pytest.raises(vcc.InputError, match=r"must be invertible(.|\n)*Affine"):
         LightField(samples(), Affine(matrix))
 
 
@@ -144,9 +144,9 @@ def test_repr_says_shape_type_and_geometry():
 
 def test_operators_refuse_more_memory_than_allowed_and_say_how_much():
     lf = field()
-    with pytest.raises(vcc.InputError, match="needs .* GiB.* are allowed.*memory_limit"):
+    with pytest.raises(vcc.InputError, match=r"needs .* GiB.* are allowed.*memory_limit"):
         lf.resampled(lf.frame, (500, 500, 500, 500))
-    with pytest.raises(vcc.InputError, match="needs 1.406 KiB, and 1000 bytes are allowed"):
+    with pytest.raises(vcc.InputError, match=r"needs 1.406 KiB, and 1000 bytes are allowed"):
         lf.masked(vcc.Mask(pattern=np.ones((2, 2)), width=1.0), memory_limit=1000)
     assert lf.masked(vcc.Mask(pattern=np.ones((2, 2)), width=1.0), memory_limit=1440).shape == lf.shape
 

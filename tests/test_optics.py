@@ -46,9 +46,7 @@ def test_a_users_element_equals_the_prism_and_the_mask_that_it_is(engine, z):
         return np.exp(-(x**2 + y**2) / (2 * mm) ** 2)
 
     own = vcc.Camera([lens, Axicon(bend=2e-3, waist=2 * mm, z=z)], SENSOR)
-    parts = vcc.Camera(
-        [lens, vcc.Prism(deflection=(2e-3, 0.0), z=z), vcc.Mask(pattern=gaussian, z=z)], SENSOR
-    )
+    parts = vcc.Camera([lens, vcc.Prism(deflection=(2e-3, 0.0), z=z), vcc.Mask(pattern=gaussian, z=z)], SENSOR)
     image = own.capture(light_field(), engine=engine)
     np.testing.assert_allclose(image.values, parts.capture(light_field(), engine=engine).values, rtol=1e-6)
     without = vcc.Camera([lens], SENSOR).capture(light_field(), engine=engine)

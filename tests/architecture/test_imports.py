@@ -2,7 +2,7 @@
 
 Layers, lowest first; a module may import from its own layer and from those below::
 
-    errors, units < affine < sampled < light_field, image, sensor < patterns < optics < camera
+    errors < units < describe < affine < sampled < light_field, image, sensor < patterns < optics < camera
     < plan < engines < operators, formats, sources, parallax, plot, cli, demo, ...
 
 Imports inside functions that go up are allowed only from the list below, each with its reason.
@@ -24,6 +24,7 @@ ROOT = Path(vcc.__file__).parent
 LAYERS: list[set[str]] = [
     {"errors"},
     {"units"},
+    {"describe"},
     {"affine"},
     {"sampled"},
     {"light_field", "image", "sensor"},
@@ -42,6 +43,7 @@ ALLOWED_UP = {
     ("image", "formats"): "image.save(path) writes through the formats",
     ("camera", "plan"): "camera.compile and explain make the plan",
     ("camera", "engines"): "camera.capture runs the plan",
+    ("plan", "engines"): "explain foretells an engine's memory and times a small run of it",
     ("camera", "operators"): "camera.light_field_at masks on the way",
     ("camera", "plot"): "camera.plot draws",
     ("camera", "camera_file"): "camera.save writes a camera file",

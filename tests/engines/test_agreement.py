@@ -238,10 +238,12 @@ def test_the_engine_follows_from_the_arrays():
 @pytest.mark.parametrize("engine", ["numba", "reference"])
 def test_engines_for_numpy_refuse_other_arrays_and_say_what_to_do(engine):
     lf = field(samples()).replaced(torch.asarray(samples()))
-    with pytest.raises(vcc.InputError, match=rf"engine '{engine}' takes NumPy arrays, not torch.Tensor.*array_api"):
+    with pytest.raises(
+        vcc.InputError, match=rf"engine '{engine}' takes NumPy arrays, not torch.Tensor.*array_api"
+    ):
         CAMERAS["in focus"].capture(lf, engine=engine)
 
 
 def test_an_unknown_engine_is_refused_by_name():
-    with pytest.raises(vcc.InputError, match="no engine 'cuda'.*reference.*array_api.*numba"):
+    with pytest.raises(vcc.InputError, match=r"no engine 'cuda'.*reference.*array_api.*numba"):
         CAMERAS["in focus"].capture(field(samples()), engine="cuda")

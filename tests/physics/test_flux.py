@@ -26,7 +26,7 @@ def random_field(seed: int = 0, **options) -> vcc.LightField:
 
 def catching_sensor(camera_elements: list, lf: vcc.LightField, z: float) -> vcc.Sensor:
     """A sensor around all light: by hand, the corners of the grid of rays through each element in turn."""
-    j, i, l, k = np.meshgrid(*([-4.0, n + 3.0] for n in lf.shape[:4]), indexing="ij")  # noqa: E741
+    j, i, l, k = np.meshgrid(*([-4.0, n + 3.0] for n in lf.shape[:4]), indexing="ij")
     rays = lf.frame.matrix @ np.stack([a.ravel() for a in (i, j, k, l, np.ones_like(i))])
     (u, v, s, t), here = rays[:4], 0.0
     for element in sorted(camera_elements, key=lambda e: e.z):

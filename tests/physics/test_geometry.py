@@ -52,7 +52,7 @@ def test_a_point_moves_by_spacing_times_difference_of_vergences_over_slope(x, di
 
 
 def test_a_point_right_of_and_below_the_axis_is_seen_right_of_and_below_the_middle():
-    k, l = pixel_of(field(), (3, 2), (0.01, 0.02, 1.0))  # noqa: E741
+    k, l = pixel_of(field(), (3, 2), (0.01, 0.02, 1.0))
     assert k > 6
     assert l > 5
 
@@ -78,9 +78,7 @@ def test_disparity_of_and_distance_of_are_inverse(disparity):
 
 def test_disparity_at_infinity_and_back():
     lf = field()
-    assert lf.distance_of(lf.disparity_of(math.inf)) == math.inf or lf.distance_of(
-        lf.disparity_of(math.inf)
-    ) > 1e9
+    assert lf.distance_of(lf.disparity_of(math.inf)) == math.inf or lf.distance_of(lf.disparity_of(math.inf)) > 1e9
     assert field(focus_distance=math.inf).distance_of(0.0) == math.inf
 
 
@@ -104,7 +102,7 @@ def test_rays_of_pieces_are_the_rays_of_the_whole(index):
     piece = lf[index]
     picked = [list(range(*s.indices(n))) for s, n in zip(index, SHAPE, strict=True)]
     for place in ((0, 0, 0, 0), tuple(len(p) - 1 for p in picked), tuple(len(p) // 2 for p in picked)):
-        j, i, l, k = place  # noqa: E741
+        j, i, l, k = place
         jw, iw, lw, kw = (p[n] for p, n in zip(picked, place, strict=True))
         assert piece.values[place] == lf.values[jw, iw, lw, kw]
         np.testing.assert_allclose(piece.frame([i, j, k, l]), lf.frame([iw, jw, kw, lw]), atol=1e-15)

@@ -14,7 +14,7 @@ import pytest
 from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, square_stop, views
 
 import vcc
-from vcc.patterns import Cells, Circle, CosineSum
+from vcc.patterns import Circle, CosineSum
 from vcc.units import m, mm, um
 
 FOCAL_LENGTH, DIAMETER = 50 * mm, 16 * mm
@@ -129,9 +129,7 @@ def test_a_round_mask_at_the_lens_is_the_diameter_of_the_lens(small_field, engin
 def test_a_mask_at_the_lens_is_the_aperture_of_brute_force(scene, light_field):
     side, decentre = 9.3 * mm, (2.1 * mm, -1.4 * mm)
     lens = vcc.Lens(focal_length=FOCAL_LENGTH)
-    image = capture(
-        [lens, vcc.Mask(pattern=np.ones((1, 1)), width=side, decentre=decentre)], light_field, PICTURE
-    )
+    image = capture([lens, vcc.Mask(pattern=np.ones((1, 1)), width=side, decentre=decentre)], light_field, PICTURE)
 
     def truth(points: int) -> np.ndarray:
         a, b, area = square_stop(side, points)
@@ -254,7 +252,9 @@ def test_two_masks_in_one_plane_multiply(small_field):
     # They depend on different axes, so the mean of the product is the product of means; left is the raster
     # of 16 points a cell by which a plain function is averaged: (π/16)²·(cell/period)² /6 = 1e-4.
     np.testing.assert_allclose(one_by_one, at_once, rtol=5e-4)
-    assert np.abs(one_by_one / capture([SMALL_LENS, vcc.Mask(pattern=both, z=20 * mm)], small_field) - 1).max() > 0.01
+    assert (
+        np.abs(one_by_one / capture([SMALL_LENS, vcc.Mask(pattern=both, z=20 * mm)], small_field) - 1).max() > 0.01
+    )
 
 
 def test_the_same_sheet_twice_is_its_square_where_cells_are_uniform(small_field):
@@ -287,9 +287,7 @@ def test_coplanar_elements_commute_exactly_in_the_fold():
     lens, prism = vcc.Lens(focal_length=50 * mm, z=10 * mm), vcc.Prism(deflection=(0.1, 0.2), z=10 * mm)
     other = vcc.Lens(focal_length=-70 * mm, z=10 * mm, decentre=(3 * mm, 1 * mm))
     sensor = vcc.Sensor(z=60 * mm, shape=(2, 2), pitch=10 * um)
-    rays = [
-        vcc.Camera(order, sensor).rays_at(60 * mm) for order in itertools.permutations([lens, prism, other])
-    ]
+    rays = [vcc.Camera(order, sensor).rays_at(60 * mm) for order in itertools.permutations([lens, prism, other])]
     assert all(ray.isclose(rays[0], 1e-12) for ray in rays)
     # Powers add: 1/50 − 1/70 per mm.
     after = vcc.Camera([lens, prism, other], sensor).rays_at(10 * mm)
@@ -308,9 +306,12 @@ def test_refining_samples_converges_to_brute_force_for_a_fine_mask_near_the_sens
     step = d * slope
     plane = Scene([Layer(FOCUS, cosines(4, np.array([26.0, 40.0]) * slope * FOCUS))])
     lf = vcc.LightField.from_views(
-        views(plane, (12, 12, 40, 40), 0.25 * mm, slope, FOCUS), 0.25 * mm, slope, FOCUS,
+        views(plane, (12, 12, 40, 40), 0.25 * mm, slope, FOCUS),
+        0.25 * mm,
+        slope,
+        FOCUS,
         disparity_range=(0.0, 0.0),
-    )  # fmt: skip
+    )
     sensor = vcc.Sensor(z=d, shape=(80, 80), pitch=step / 4)
     diameter, z, period = 2.6 * mm, 0.97 * d, 3 * step
     lens = vcc.Lens(focal_length=FOCAL_LENGTH, diameter=diameter)

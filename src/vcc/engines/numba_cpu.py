@@ -64,67 +64,56 @@ class _Block:
     view_columns: NDArray[np.int64]
 
 
-@dataclass(frozen=True)
 class _FineGrid:
-    """The samples of a view after refinement: how many, and the index of the first."""
+    """The samples of a view after division: how many, the index of the first, and how they are made."""
 
-    rows: int
-    columns: int
-    first_row: float
-    first_column: float
-    down: NDArray[np.float64] | None
-    across: NDArray[np.float64] | None
+    def __init__(self, plan: Plan, channels: int) -> None:
+        self.rows, self.columns = plan.samples
+        self.first_row = self.first_column = 0.0
+        down = across = np.zeros((0, 0))
+        if plan.refine > 1:
+            down, self.first_row = refinement_matrix(plan.interpolation, plan.samples[0], plan.refine)
+            across, self.first_column = refinement_matrix(plan.interpolation, plan.samples[1], plan.refine)
+            self.rows, self.columns = len(down), len(across)
+        self.tables = (*_as_taps(down), *_as_taps(across), channels)
+        self._down, self._across = down, across
 
-    @classmethod
-    def of(cls, plan: Plan) -> _FineGrid:
-        if plan.refine == 1:
-            return cls(*plan.samples, 0.0, 0.0, None, None)
-        down, first_row = refinement_matrix(plan.interpolation, plan.samples[0], plan.refine)
-        across, first_column = refinement_matrix(plan.interpolation, plan.samples[1], plan.refine)
-        return cls(len(down), len(across), first_row, first_column, down, across)
-
-    def refined(self, view: NDArray[Any]) -> NDArray[np.float32]:
-        """A view (t, s, channels) with its samples divided."""
-        if self.down is None or self.across is None:
+    def divided(self, view: NDArray[Any]) -> NDArray[np.float32]:
+        """A view (t, s, channels) with its samples divided, for plans in which rows and columns do not part."""
+        if not self._down.size:
             return np.ascontiguousarray(view, dtype=np.float32)
-        from scipy.sparse import csr_array  # a few weights a row
-
-        t, s, channels = view.shape
-        tall = csr_array(self.down.astype(np.float32)) @ view.reshape(t, -1).astype(np.float32)
-        turned = np.ascontiguousarray(tall.reshape(-1, s, channels).swapaxes(0, 1))
-        wide = csr_array(self.across.astype(np.float32)) @ turned.reshape(s, -1)
-        return np.ascontiguousarray(wide.reshape(self.columns, self.rows, channels).swapaxes(0, 1))
+        fine = np.einsum("at,bs,tsc->abc", self._down, self._across, view.astype(np.float32), optimize=True)
+        return np.ascontiguousarray(fine, dtype=np.float32)
 
 
-def _blocks(plan: Plan, values: NDArray[Any], fine: _FineGrid, by_column: bool) -> Iterator[_Block]:
+def _as_taps(matrix: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """A banded matrix by rows: the first column that counts, and the numbers from there on, in threes."""
+    if not matrix.size:
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.float32)
+    first = (matrix != 0).argmax(axis=1)
+    counts = matrix.shape[1] - (matrix[:, ::-1] != 0).argmax(axis=1) - first
+    index = first[:, None] + np.arange(-(-int(counts.max()) // 3) * 3)
+    inside = index < matrix.shape[1]
+    rows = np.arange(len(matrix))[:, None]
+    shares = np.where(inside, matrix[rows, np.where(inside, index, 0)], 0.0)
+    return first, np.ascontiguousarray(shares, dtype=np.float32)
+
+
+def _blocks(plan: Plan, values: NDArray[Any], by_column: bool) -> Iterator[_Block]:
     """The samples in pieces that kernels can read, without ever copying more than a column of views."""
-    nv, nu, nt, ns = values.shape[:4]
+    nv, nu, nt = values.shape[:3]
     all_rows, all_columns = np.arange(len(plan.view_rows)), np.arange(len(plan.view_columns))
-    used = plan.weights != 0
-    if plan.refine > 1:
-        for b, a in zip(*np.nonzero(used), strict=True):
-            view = values[plan.view_rows[b], plan.view_columns[a]].reshape(nt, ns, -1)
-            samples = fine.refined(view).reshape(1, 1, fine.rows, -1)
-            zero = np.zeros(1, dtype=np.int64)
-            yield _Block(samples, all_rows[b : b + 1], all_columns[a : a + 1], zero, zero)
-        return
     readable = values.flags.c_contiguous and values.dtype != np.float16
     if readable and not by_column:
         yield _Block(values.reshape(nv, nu, nt, -1), all_rows, all_columns, plan.view_rows, plan.view_columns)
         return
-    for a in np.flatnonzero(used.any(axis=0)):
-        i = plan.view_columns[a]
+    for a in np.flatnonzero((plan.weights != 0).any(axis=0)):
+        i = plan.view_columns[a : a + 1]
         if readable:
-            yield _Block(
-                values.reshape(nv, nu, nt, -1),
-                all_rows,
-                all_columns[a : a + 1],
-                plan.view_rows,
-                np.array([i]),
-            )
+            yield _Block(values.reshape(nv, nu, nt, -1), all_rows, all_columns[a : a + 1], plan.view_rows, i)
             continue
         kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
-        column = np.ascontiguousarray(values[:, i : i + 1], dtype=kind).reshape(nv, 1, nt, -1)
+        column = np.ascontiguousarray(values[:, i[0] : i[0] + 1], dtype=kind).reshape(nv, 1, nt, -1)
         yield _Block(column, all_rows, all_columns[a : a + 1], plan.view_rows, np.zeros(1, dtype=np.int64))
 
 
@@ -133,7 +122,7 @@ class _Separable:
 
     def __init__(self, plan: Plan, channels: int) -> None:
         self.plan, self.channels = plan, channels
-        self.fine = fine = _FineGrid.of(plan)
+        self.fine = fine = _FineGrid(plan, channels)
         rows, columns = plan.raster_shape
         start_y = plan.y[:, 0] + plan.row_step * fine.first_row
         start_x = plan.x[0] + plan.column_step * fine.first_column
@@ -142,6 +131,13 @@ class _Separable:
         self.across = taps(plan.interpolation, start_x, column_step, fine.columns, columns)
         self.down_shares, self.across_shares = _in_threes(self.down), _in_threes(self.across)
         self.weights = (plan.weights * plan.scale).astype(np.float32)
+        # Masks' textures one after another: how many rows each has, where they begin, and which mask row the
+        # first row of samples of each tap row looks up, and the step from there.
+        self.mask_rows = np.array([len(mask.texture) for mask in plan.masks], dtype=np.int64)
+        self.mask_start = np.cumsum(self.mask_rows) - self.mask_rows
+        row = [mask.row[:, 0] + mask.step[1, 1] * fine.first_row for mask in plan.masks]
+        self.mask_row = np.array(row).reshape(-1, len(plan.view_rows))
+        self.mask_row_step = np.array([mask.step[1, 1] / plan.refine for mask in plan.masks], dtype=np.float64)
 
     def add(
         self,
@@ -151,9 +147,9 @@ class _Separable:
         progress: Progress | None,
     ) -> None:
         """Add all samples to the raster (rows, columns × channels)."""
-        masked, total, done = bool(self.plan.masks), self.plan.taps_used, 0
+        masked, total, done = bool(self.plan.masks) or self.plan.refine > 1, self.plan.taps_used, 0
         by_column = masked or progress is not None
-        for block in _blocks(self.plan, values, self.fine, by_column):
+        for block in _blocks(self.plan, values, by_column):
             masks = self.mask_columns(int(block.tap_columns[0]), pool) if masked else None
             starts = range(0, len(raster), MASKED_BAND if masked else BAND)
             list(pool.map(partial(self.band, block, masks, raster), starts))
@@ -177,31 +173,10 @@ class _Separable:
             return
         (a,), (view_column,) = columns, block.view_columns
         kernels.add_masked_band(
-            block.samples, block.view_rows, view_column, weights[:, 0], first_row, row_shares,
+            block.samples, block.view_rows, view_column, weights[:, 0], first_row, row_shares, self.fine.tables,
             masks, self.mask_start, self.mask_rows, self.mask_row[:, rows], self.mask_row_step,
             self.across.first[a], self.across_shares[a], self.channels, start, stop, raster,
         )  # fmt: skip
-
-    @property
-    def mask_rows(self) -> NDArray[np.int64]:
-        """How many rows each mask's texture has."""
-        return np.array([len(mask.texture) for mask in self.plan.masks])
-
-    @property
-    def mask_start(self) -> NDArray[np.int64]:
-        """Where each mask's rows begin when all are stacked."""
-        return np.cumsum(self.mask_rows) - self.mask_rows
-
-    @property
-    def mask_row_step(self) -> NDArray[np.float64]:
-        """Mask rows from one row of samples to the next."""
-        return np.array([mask.step[1, 1] / self.plan.refine for mask in self.plan.masks])
-
-    @property
-    def mask_row(self) -> NDArray[np.float64]:
-        """Mask row of the first row of samples, (masks, rows of taps)."""
-        first = self.fine.first_row
-        return np.stack([mask.row[:, 0] + mask.step[1, 1] * first for mask in self.plan.masks])
 
     def mask_columns(self, a: int, pool: ThreadPoolExecutor) -> NDArray[np.float32]:
         """All masks' rows, one mask after another, sampled at the columns of the samples of tap column a."""
@@ -237,7 +212,7 @@ def _add_sheared(
     progress: Progress | None,
 ) -> None:
     """Add all samples to the raster (rows, columns, channels) where rows and columns do not part."""
-    fine = _FineGrid.of(plan)
+    fine = _FineGrid(plan, 1)
     size = np.array([mask.texture.shape for mask in plan.masks], dtype=np.int64).reshape(-1, 2)
     textures = np.zeros((len(plan.masks), *size.max(axis=0, initial=1)), dtype=np.float32)
     for texture, mask in zip(textures, plan.masks, strict=True):
@@ -248,7 +223,7 @@ def _add_sheared(
     for done, (b, a) in enumerate(zip(*np.nonzero(plan.weights), strict=True)):
         if progress is not None:
             progress(done, plan.taps_used)
-        view = fine.refined(values[plan.view_rows[b], plan.view_columns[a]].reshape(*plan.samples, -1))
+        view = fine.divided(values[plan.view_rows[b], plan.view_columns[a]].reshape(*plan.samples, -1))
         place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in plan.masks]).reshape(-1, 2)
 
         def band(start: int, view=view, place=place, b=b, a=a) -> None:  # type: ignore[no-untyped-def]

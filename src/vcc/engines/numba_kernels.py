@@ -77,7 +77,7 @@ def sum_rows(values, view_rows, column, weights, first, shares, start, stop, sum
 
 @_compiled
 def sum_masked_rows(  # type: ignore[no-untyped-def]
-    values, view_rows, column, weights, first, shares, masks, mask_start, mask_rows, row, row_step,
+    values, view_rows, column, weights, first, shares, fine, masks, mask_start, mask_rows, row, row_step,
     start, stop, sums,
 ):  # fmt: skip
     """As `sum_rows`, each sample times its weight from the masks.
@@ -86,9 +86,18 @@ def sum_masked_rows(  # type: ignore[no-untyped-def]
     (masks,), where each mask's rows begin and how many there are; row: (masks, taps), mask row of sample
     row 0; row_step: (masks,).
 
+    fine: (first_row, row_shares, first_column, column_shares, channels) by which samples are divided into
+    finer ones, the rows and columns above then being fine ones; empty tables leave samples as they are.
+
     Weighted rows are kept for as long as neighbouring raster rows gather from them: each is made once.
     """
+    fine_first_row, fine_row_shares, fine_first_column, fine_column_shares, channels = fine
+    divided = fine_first_row.size > 0
     last, n = values.shape[2] - 1, values.shape[3]
+    if divided:
+        last, n = fine_first_row.size - 1, fine_first_column.size * channels
+    source = np.zeros(values.shape[3] + fine_column_shares.shape[1] * channels, np.float32)
+    samples = np.zeros(n, np.float32)
     width = shares.shape[2]
     kept = np.zeros((width + 1, n), np.float32)
     kept_row = np.empty(width + 1, np.int64)
@@ -101,19 +110,16 @@ def sum_masked_rows(  # type: ignore[no-untyped-def]
                 slot[t] = l % (width + 1)
                 if shares[b, y, t] != 0 and kept_row[slot[t]] != l:
                     kept_row[slot[t]] = l
-                    samples = values[view_rows[b], column, l]
-                    _weigh(
-                        samples,
-                        masks,
-                        mask_start,
-                        mask_rows,
-                        row,
-                        row_step,
-                        b,
-                        l,
-                        weights[b],
-                        kept[slot[t]],
-                    )
+                    product = kept[slot[t]]
+                    if divided:
+                        _divided_row(
+                            values, view_rows[b], column, fine_first_row[l], fine_row_shares[l],
+                            fine_first_column, fine_column_shares, channels, source, samples,
+                        )  # fmt: skip
+                        _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], product)
+                    else:
+                        whole = values[view_rows[b], column, l]
+                        _weigh(whole, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], product)
             line = sums[y - start]
             for t in range(0, width, 3):
                 r0, r1, r2 = kept[slot[t]], kept[slot[t + 1]], kept[slot[t + 2]]
@@ -122,9 +128,28 @@ def sum_masked_rows(  # type: ignore[no-untyped-def]
                     line[x] += a0 * r0[x] + a1 * r1[x] + a2 * r2[x]
 
 
+@_compiled
+def _divided_row(  # type: ignore[no-untyped-def]
+    values, j, column, first, row_shares, first_column, column_shares, channels, source, samples
+):
+    """samples = one row of finer samples of a view; source is room for a row of the view itself."""
+    n = values.shape[3]
+    source[:n] = 0
+    for t in range(row_shares.size):
+        if row_shares[t] != 0:
+            line = values[j, column, first + t]
+            for x in range(n):
+                source[x] += row_shares[t] * np.float32(line[x])
+    samples[:] = 0
+    mix_columns(source.reshape(1, -1), first_column, column_shares, channels, samples.reshape(1, -1))
+
+
 @_inlined
 def _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weight, product):  # type: ignore[no-untyped-def]
     """product = weight · samples · masks along one row."""
+    if row_step.size == 0:
+        for x in range(product.size):
+            product[x] = weight * np.float32(samples[x])
     for mask in range(row_step.size):
         place = row[mask, b] + row_step[mask] * l
         if not (place > -1 and place < mask_rows[mask]):
@@ -238,14 +263,15 @@ def add_band(  # type: ignore[no-untyped-def]
 
 @_compiled
 def add_masked_band(  # type: ignore[no-untyped-def]
-    values, view_rows, column, weights, first_row, row_shares, masks, mask_start, mask_rows, row, row_step,
+    values, view_rows, column, weights, first_row, row_shares, fine, masks, mask_start, mask_rows, row, row_step,
     first_column, column_shares, channels, start, stop, raster,
 ):  # fmt: skip
-    """As `add_band` for one column of views, each sample times its weight from the masks."""
-    sums = np.zeros((stop - start, values.shape[3] + column_shares.shape[1] * channels), np.float32)
+    """As `add_band` for one column of views, each sample divided as ``fine`` says and weighted by the masks."""
+    n = fine[2].size * channels if fine[2].size > 0 else values.shape[3]
+    sums = np.zeros((stop - start, n + column_shares.shape[1] * channels), np.float32)
     sum_masked_rows(
-        values, view_rows, column, weights, first_row, row_shares, masks, mask_start, mask_rows, row, row_step,
-        start, stop, sums,
+        values, view_rows, column, weights, first_row, row_shares, fine, masks, mask_start, mask_rows, row,
+        row_step, start, stop, sums,
     )  # fmt: skip
     mix_columns(sums, first_column, column_shares, channels, raster[start:stop])
 

@@ -32,6 +32,8 @@ FINE_DETAIL_IN_VIEW = 0.15
 FINE_DETAIL_IN_SAMPLE = 0.01
 """Share of a mask's variance that may vanish inside a sample before samples are divided."""
 LARGEST_REFINEMENT = 8
+LARGEST_CHOSEN_REFINEMENT = 4
+"""Beyond this a plan divides samples only when told to: the cost grows with the square."""
 
 
 def compile_plan(
@@ -228,7 +230,7 @@ def _divide_samples(
     for plane in planes:
         penumbra = np.abs(plane.view_step(between.motion)) @ np.array([views[1], views[0]])
         sample = 2 * np.abs(plane.sample_step).sum(axis=1)
-        while fine < LARGEST_REFINEMENT:
+        while fine < LARGEST_CHOSEN_REFINEMENT:
             if detail_lost(plane, penumbra, sample / fine) < FINE_DETAIL_IN_SAMPLE:
                 break
             fine *= 2

@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 
 TEXTURE_POINTS_PER_FOOTPRINT = 6
 """Weights are looked up linearly between texture points this fine: the error is below 1/6² of a curvature."""
-LARGEST_TEXTURE = 3072
-"""Points a side of a mask texture: 36 MiB."""
+LARGEST_TEXTURE = 2048
+"""Points a side of a mask texture: 16 MiB."""
 
 
 @dataclass(frozen=True, eq=False)
