@@ -142,5 +142,5 @@ def test_a_thin_element_moves_no_ray_and_mixes_no_slopes(deflection):
 def test_faces_refuse_what_is_no_deflection_or_transmission():
     with pytest.raises(vcc.InputError, match="5×5"):
         vcc.Faces(deflection=Affine.identity(2))
-    with pytest.raises(vcc.InputError, match="a pattern is .*, not int"):
+    with pytest.raises(vcc.InputError, match=r"a pattern is .*, not int"):
         vcc.Faces(transmission=3)
