@@ -265,6 +265,9 @@ print(first, peak() - before)
 """
 
 
+NAMES = {"plain": "conventional", "mask": "mask in mid-path"}
+
+
 def first_calls() -> None:
     """First call in a new process, with and without a compiled cache, and memory beside the light field."""
     print("| first `capture` in a new process | nothing compiled | compiled code cached |")
@@ -281,16 +284,14 @@ def first_calls() -> None:
                 )
                 for _ in range(2)
             ]  # fmt: skip
-        print(
-            f"| {'conventional' if kind == 'plain' else 'mask in mid-path'} | {times[0]:.2f} s | {times[1]:.2f} s |"
-        )
+        print(f"| {NAMES[kind]} | {times[0]:.2f} s | {times[1]:.2f} s |")
     print()
     for kind in ("plain", "mask"):
         out = subprocess.run(
             [sys.executable, "-c", _CHILD, kind, "full"], capture_output=True, text=True, check=True
         ).stdout.split()
         print(
-            f"Peak memory while capturing, {'conventional' if kind == 'plain' else 'mask in mid-path'}: "
+            f"Peak memory while capturing, {NAMES[kind]}: "
             f"{float(out[1]):.0f} MB more than before, the 300 MB light field and all libraries being loaded."
         )
 

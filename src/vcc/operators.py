@@ -116,7 +116,7 @@ def resampled(
             offset,
             output_shape=shape,
             order=SPLINE_ORDER[interpolation],
-            mode="constant",
+            mode="grid-constant",  # zero beyond the border, and interpolated towards it
             output=np.float32,
         )
     np.maximum(result, 0, out=result)  # a spline may undershoot; radiance does not

@@ -294,7 +294,8 @@ class Cells(Pattern):
         total[1:, 1:] = self.values.cumsum(0).cumsum(1)
         row, column = self._index(x, y)
         row, column = np.broadcast_arrays(np.clip(row, 0, rows), np.clip(column, 0, columns))
-        content = map_coordinates(total, [row, column], order=1, mode="nearest")
+        shape = row.shape
+        content = map_coordinates(total, [np.ravel(row), np.ravel(column)], order=1, mode="nearest").reshape(shape)
         assert self.height is not None
         return np.asarray(content * (self.width / columns) * (self.height / rows))
 

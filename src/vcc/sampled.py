@@ -38,10 +38,10 @@ def sliced(
         InputError: an integer or array index (it would lose an axis), too many slices, or nothing left.
     """
     parts: list[Any] = list(index) if isinstance(index, tuple) else [index]
-    if parts.count(Ellipsis) > 1:
+    ellipses = [place for place, part in enumerate(parts) if part is Ellipsis]
+    if len(ellipses) > 1:
         raise InputError(f"{what} takes at most one ellipsis as an index")
-    if Ellipsis in parts:
-        place = parts.index(Ellipsis)
+    for place in ellipses:
         parts[place : place + 1] = [slice(None)] * (values.ndim - len(parts) + 1)
     if len(parts) > values.ndim:
         raise InputError(f"{what} has {values.ndim} axes, and {len(parts)} slices were given")

@@ -39,6 +39,8 @@ class Sensor:
         for pitch in self.pitches:
             if not (pitch > 0 and math.isfinite(pitch)):
                 raise InputError(f"the sensor's pitch must be greater than 0 m, not {pitch}")
+        if len(self.decentre) != 2 or not all(math.isfinite(offset) for offset in self.decentre):
+            raise InputError(f"the sensor's decentre is (x, y) in metres, not {self.decentre}")
         if not isinstance(self.pitch, int | float):
             object.__setattr__(self, "pitch", self.pitches)
         object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))

@@ -92,10 +92,9 @@ def test_pictures_of_planes_match_the_integral_over_the_round_stop_to_60_dB(scen
 
 @pytest.mark.parametrize("pixel", [0.8, 1.3])
 def test_linear_beats_nearest_by_10_dB_where_pixels_and_samples_do_not_coincide(scene, light_field, pixel):
-    # Samples that fall into whole pixels fill some twice: in focus all views' rasters beat alike with the
-    # pixels' and the loss is of the order of the signal (11 dB); elsewhere the views' beats average, at 0.8
-    # pixels to some 42 dB. Pixels exactly as large as samples are the one lucky case, in which
-    # nearest spares the tent's loss: no claim is made there.
+    # Samples that fall into whole pixels fill some of 1.3 samples once and others twice, each way, which is
+    # most of the signal (10 dB); of pixels of 0.8 samples, neighbours share one (40 to 45 dB). Pixels exactly
+    # as large as samples are the one lucky case, in which nearest spares the tent's loss: no claim there.
     pitch = pixel * DISTANCE * SLOPE
     expected = truth(scene, pitch)
     linear, nearest = (

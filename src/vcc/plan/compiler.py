@@ -357,5 +357,10 @@ def _notes(
     if divide > 1:
         notes.append(f"cells of views divided {divide}×{divide}: a mask is finer than a view's cell")
     if fine > 1:
-        notes.append(f"samples divided {fine}×{fine}: a mask near the sensor is finer than a sample")
+        further = (
+            f"; finer ones, up to refine={LARGEST_REFINEMENT}, are made when asked for"
+            if fine == LARGEST_CHOSEN_REFINEMENT
+            else ""
+        )
+        notes.append(f"samples divided {fine}×{fine}: a mask near the sensor is finer than a sample{further}")
     return tuple(notes)
