@@ -25,7 +25,7 @@ from vcc.plan.model import Plan
 
 Progress = Callable[[int, int], None]
 
-BAND = 16
+BAND = 32
 """Rows of the picture that a thread works on at once: their sums stay in the second-level cache."""
 MASKED_BAND = 64
 """Likewise with masks: more rows, so that rows weighted for the band's ends are seldom made twice."""
@@ -38,7 +38,10 @@ def run(plan: Plan, values: NDArray[Any], progress: Progress | None = None) -> N
     raster = np.zeros((rows, columns, channels), dtype=np.float32)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         if plan.separable:
-            _Separable(plan, channels).add(values, raster.reshape(rows, -1), pool, progress)
+            separable = _Separable(plan, channels)
+            separable.add(values, raster.reshape(rows, -1), pool, progress)
+            if separable.mirrored:
+                raster = raster[:, ::-1]
         else:
             _add_sheared(plan, values, raster, pool, progress)
     picture = finish(plan, raster)
@@ -129,7 +132,13 @@ class _Separable:
         row_step, column_step = plan.row_step / plan.refine, plan.column_step / plan.refine
         self.down = taps(plan.interpolation, start_y, row_step, fine.rows, rows)
         self.across = taps(plan.interpolation, start_x, column_step, fine.columns, columns)
+        # A real image runs against its samples: the raster is then filled in mirror writing, so that samples
+        # and pixels are read and written in the same direction.
+        self.mirrored = column_step < 0
+        if self.mirrored:
+            self.across = self.across.mirrored()
         self.down_shares, self.across_shares = _in_threes(self.down), _in_threes(self.across)
+        self.alike = _alike(self.across.first, self.across_shares)
         self.weights = (plan.weights * plan.scale).astype(np.float32)
         # Masks' textures one after another: how many rows each has, where they begin, and which mask row the
         # first row of samples of each tap row looks up, and the step from there.
@@ -168,14 +177,15 @@ class _Separable:
         if masks is None:
             kernels.add_band(
                 block.samples, block.view_rows, block.view_columns, weights, first_row, row_shares,
-                self.across.first[columns], self.across_shares[columns], self.channels, start, stop, raster,
+                self.across.first[columns], self.across_shares[columns], self.alike[columns], self.channels,
+                start, stop, raster,
             )  # fmt: skip
             return
         (a,), (view_column,) = columns, block.view_columns
         kernels.add_masked_band(
             block.samples, block.view_rows, view_column, weights[:, 0], first_row, row_shares, self.fine.tables,
             masks, self.mask_start, self.mask_rows, self.mask_row[:, rows], self.mask_row_step,
-            self.across.first[a], self.across_shares[a], self.channels, start, stop, raster,
+            self.across.first[a], self.across_shares[a], self.alike[a], self.channels, start, stop, raster,
         )  # fmt: skip
 
     def mask_columns(self, a: int, pool: ThreadPoolExecutor) -> NDArray[np.float32]:
@@ -201,7 +211,26 @@ class _Separable:
 def _in_threes(table: Taps) -> NDArray[np.float32]:
     """The shares with zeros added until their number is a multiple of three, as the kernels want them."""
     extra = -table.weights.shape[-1] % 3
-    return np.pad(table.weights, [(0, 0)] * (table.weights.ndim - 1) + [(0, extra)])
+    return np.ascontiguousarray(np.pad(table.weights, [(0, 0)] * (table.weights.ndim - 1) + [(0, extra)]))
+
+
+def _alike(first: NDArray[np.int64], shares: NDArray[np.float32]) -> NDArray[np.int64]:
+    """(begin, end) of the columns around the middle that gather successive samples with the same shares.
+
+    They are all but the borders where a sample is as large as a pixel, a common choice; else there are none.
+    """
+    columns = first.shape[1]
+    middle = columns // 2
+    place = first - np.arange(columns)
+    same = (place == place[:, middle : middle + 1]) & (
+        np.abs(shares - shares[:, middle : middle + 1]).max(axis=-1) < 1e-6
+    )
+    runs = np.zeros((len(first), 2), dtype=np.int64)
+    for row, run in zip(same, runs, strict=True):
+        others = np.flatnonzero(~row)
+        run[0] = others[others < middle].max(initial=-1) + 1
+        run[1] = others[others > middle].min(initial=columns)
+    return runs
 
 
 def _add_sheared(

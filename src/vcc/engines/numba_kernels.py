@@ -89,7 +89,7 @@ def sum_masked_rows(  # type: ignore[no-untyped-def]
     fine: (first_row, row_shares, first_column, column_shares, channels) by which samples are divided into
     finer ones, the rows and columns above then being fine ones; empty tables leave samples as they are.
 
-    Weighted rows are kept for as long as neighbouring raster rows gather from them: each is made once.
+    Rows of weighted samples are made once for each view, then summed by raster row.
     """
     fine_first_row, fine_row_shares, fine_first_column, fine_column_shares, channels = fine
     divided = fine_first_row.size > 0
@@ -98,34 +98,40 @@ def sum_masked_rows(  # type: ignore[no-untyped-def]
         last, n = fine_first_row.size - 1, fine_first_column.size * channels
     source = np.zeros(values.shape[3] + fine_column_shares.shape[1] * channels, np.float32)
     samples = np.zeros(n, np.float32)
-    width = shares.shape[2]
-    kept = np.zeros((width + 1, n), np.float32)
-    kept_row = np.empty(width + 1, np.int64)
-    slot = np.empty(width, np.int64)
-    for b in np.flatnonzero(weights):
-        kept_row[:] = -1
+    used = np.flatnonzero(weights)
+    low, high = np.full(weights.size, last + 1), np.zeros(weights.size, np.int64)
+    for b in used:
         for y in range(start, stop):
-            for t in range(width):
-                l = min(first[b, y] + t, last)
-                slot[t] = l % (width + 1)
-                if shares[b, y, t] != 0 and kept_row[slot[t]] != l:
-                    kept_row[slot[t]] = l
-                    product = kept[slot[t]]
-                    if divided:
-                        _divided_row(
-                            values, view_rows[b], column, fine_first_row[l], fine_row_shares[l],
-                            fine_first_column, fine_column_shares, channels, source, samples,
-                        )  # fmt: skip
-                        _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], product)
-                    else:
-                        whole = values[view_rows[b], column, l]
-                        _weigh(whole, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], product)
-            line = sums[y - start]
-            for t in range(0, width, 3):
-                r0, r1, r2 = kept[slot[t]], kept[slot[t + 1]], kept[slot[t + 2]]
+            for t in range(shares.shape[2]):
+                if shares[b, y, t] != 0:
+                    low[b] = min(low[b], first[b, y] + t)
+                    high[b] = max(high[b], first[b, y] + t + 1)
+    products = np.zeros((max(int((high - low).max()), 1), n), np.float32)
+    for b in used:
+        j = view_rows[b]
+        for l in range(low[b], high[b]):
+            product = products[l - low[b]]
+            if divided:
+                _divided_row(
+                    values, j, column, fine_first_row[l], fine_row_shares[l],
+                    fine_first_column, fine_column_shares, channels, source, samples,
+                )  # fmt: skip
+                _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], product)
+            else:
+                whole = values[j, column, l]
+                _weigh(whole, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], product)
+        for y in range(start, stop):
+            line = y - start
+            for t in range(0, shares.shape[2], 3):
                 a0, a1, a2 = shares[b, y, t], shares[b, y, t + 1], shares[b, y, t + 2]
+                if a0 == 0 and a1 == 0 and a2 == 0:
+                    continue
+                # Where a share is zero, any row will do.
+                r0 = min(max(first[b, y] + t, low[b]), high[b] - 1) - low[b]
+                r1 = min(max(first[b, y] + t + 1, low[b]), high[b] - 1) - low[b]
+                r2 = min(max(first[b, y] + t + 2, low[b]), high[b] - 1) - low[b]
                 for x in range(n):
-                    line[x] += a0 * r0[x] + a1 * r1[x] + a2 * r2[x]
+                    sums[line, x] += a0 * products[r0, x] + a1 * products[r1, x] + a2 * products[r2, x]
 
 
 @_compiled
@@ -141,7 +147,7 @@ def _divided_row(  # type: ignore[no-untyped-def]
             for x in range(n):
                 source[x] += row_shares[t] * np.float32(line[x])
     samples[:] = 0
-    mix_columns(source.reshape(1, -1), first_column, column_shares, channels, samples.reshape(1, -1))
+    mix_columns(source.reshape(1, -1), first_column, column_shares, (0, 0), channels, samples.reshape(1, -1))
 
 
 @_inlined
@@ -204,37 +210,51 @@ def sample_mask_columns(texture, column, channels, out):  # type: ignore[no-unty
 
 
 @_compiled
-def mix_columns(sums, first, shares, channels, raster):  # type: ignore[no-untyped-def]
+def mix_columns(sums, first, shares, alike, channels, raster):  # type: ignore[no-untyped-def]
     """raster[y, x·channels + c] += Σ share · sums[y, k·channels + c] over the samples that reach column x.
 
     sums must reach ``width`` samples beyond the last one, with zeros; shares: (columns, width), width a
-    multiple of 3.
+    multiple of 3. alike: (begin, end), columns with the same shares of successive samples: one contiguous
+    sum, where the others are taken one by one.
     """
-    columns, width = shares.shape
+    begin, end = alike
     for y in range(sums.shape[0]):
         line, out = sums[y], raster[y]
-        for t in range(0, width, 3):
-            if channels == 3:
-                for x in range(columns):
-                    k = 3 * (first[x] + t)
-                    a, b, c = shares[x, t], shares[x, t + 1], shares[x, t + 2]
-                    out[3 * x] += a * line[k] + b * line[k + 3] + c * line[k + 6]
-                    out[3 * x + 1] += a * line[k + 1] + b * line[k + 4] + c * line[k + 7]
-                    out[3 * x + 2] += a * line[k + 2] + b * line[k + 5] + c * line[k + 8]
-            else:
-                for x in range(columns):
-                    k = channels * (first[x] + t)
-                    a, b, c = shares[x, t], shares[x, t + 1], shares[x, t + 2]
-                    for n in range(channels):
-                        out[channels * x + n] += (
-                            a * line[k + n] + b * line[k + channels + n] + c * line[k + 2 * channels + n]
-                        )
+        for t in range(0, shares.shape[1], 3):
+            _mix_one_by_one(line, first, shares, t, channels, 0, begin, out)
+            _mix_one_by_one(line, first, shares, t, channels, end, first.size, out)
+            if end > begin:
+                n = channels * (end - begin)
+                start = channels * (first[begin] + t)
+                near = line[start : start + n]
+                mid = line[start + channels : start + channels + n]
+                far = line[start + 2 * channels : start + 2 * channels + n]
+                here = out[channels * begin : channels * end]
+                a, b, c = shares[begin, t], shares[begin, t + 1], shares[begin, t + 2]
+                for x in range(n):
+                    here[x] += a * near[x] + b * mid[x] + c * far[x]
+
+
+@_inlined
+def _mix_one_by_one(line, first, shares, t, channels, begin, end, out):  # type: ignore[no-untyped-def]
+    for x in range(begin, end):
+        k = channels * (first[x] + t)
+        a, b, c = shares[x, t], shares[x, t + 1], shares[x, t + 2]
+        if channels == 3:
+            out[3 * x] += a * line[k] + b * line[k + 3] + c * line[k + 6]
+            out[3 * x + 1] += a * line[k + 1] + b * line[k + 4] + c * line[k + 7]
+            out[3 * x + 2] += a * line[k + 2] + b * line[k + 5] + c * line[k + 8]
+        else:
+            for n in range(channels):
+                out[channels * x + n] += (
+                    a * line[k + n] + b * line[k + channels + n] + c * line[k + 2 * channels + n]
+                )
 
 
 @_compiled
 def add_band(  # type: ignore[no-untyped-def]
-    values, view_rows, view_columns, weights, first_row, row_shares, first_column, column_shares, channels,
-    start, stop, raster,
+    values, view_rows, view_columns, weights, first_row, row_shares, first_column, column_shares, alike,
+    channels, start, stop, raster,
 ):  # fmt: skip
     """Add all views to raster rows start … stop, column of views by column of views.
 
@@ -258,13 +278,13 @@ def add_band(  # type: ignore[no-untyped-def]
             stop,
             sums,
         )
-        mix_columns(sums, first_column[a], column_shares[a], channels, raster[start:stop])
+        mix_columns(sums, first_column[a], column_shares[a], alike[a], channels, raster[start:stop])
 
 
 @_compiled
 def add_masked_band(  # type: ignore[no-untyped-def]
     values, view_rows, column, weights, first_row, row_shares, fine, masks, mask_start, mask_rows, row, row_step,
-    first_column, column_shares, channels, start, stop, raster,
+    first_column, column_shares, alike, channels, start, stop, raster,
 ):  # fmt: skip
     """As `add_band` for one column of views, each sample divided as ``fine`` says and weighted by the masks."""
     n = fine[2].size * channels if fine[2].size > 0 else values.shape[3]
@@ -273,7 +293,7 @@ def add_masked_band(  # type: ignore[no-untyped-def]
         values, view_rows, column, weights, first_row, row_shares, fine, masks, mask_start, mask_rows, row,
         row_step, start, stop, sums,
     )  # fmt: skip
-    mix_columns(sums, first_column, column_shares, channels, raster[start:stop])
+    mix_columns(sums, first_column, column_shares, alike, channels, raster[start:stop])
 
 
 @_inlined

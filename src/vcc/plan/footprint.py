@@ -117,6 +117,11 @@ class Taps:
     count: NDArray[np.int64]
     weights: NDArray[np.float32]
 
+    def mirrored(self) -> Taps:
+        """The table for pixels counted from the other end."""
+        parts = (self.first[..., ::-1], self.count[..., ::-1], self.weights[..., ::-1, :])
+        return Taps(*(np.ascontiguousarray(part) for part in parts))
+
 
 def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: int) -> Taps:
     """The table of shares for rows of samples at ``origin + step · index``, in pixels.
