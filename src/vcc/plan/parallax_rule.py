@@ -40,20 +40,20 @@ class BetweenViews:
     reason: str
 
 
-def index_motion(frame: Affine, vergence: float) -> Array:
-    """How a point of the scene moves within a view: 2×2, (k, l) per (i, j), sign turned.
+def index_motions(frame: Affine, vergences: Array) -> Array:
+    """How points of the scene move within a view: (n, 2, 2), (k, l) per (i, j), sign turned.
 
     Args:
         frame: of the light field.
-        vergence: 1/Z, one over the point's distance before the plane of the light field, 1/m.
+        vergences: 1/Z of n points, one over their distance before the plane of the light field, 1/m.
     """
     linear = frame.linear
     # Rays from a point keep s − u/Z; solve for the pixel along the views.
-    conserved = linear[2:] - vergence * linear[:2]
-    within, across = conserved[:, 2:], conserved[:, :2]
-    if abs(np.linalg.det(within)) < 1e-12 * np.abs(within).max(initial=0.0) ** 2:
-        return np.zeros((2, 2))
-    return np.asarray(np.linalg.solve(within, across))
+    conserved = linear[2:] - vergences[:, None, None] * linear[:2]
+    across, within = conserved[..., :2], conserved[..., 2:]
+    singular = np.abs(np.linalg.det(within)) <= 1e-12 * np.abs(within).max(axis=(1, 2)) ** 2
+    within = np.where(singular[:, None, None], np.eye(2), within)
+    return np.where(singular[:, None, None], 0.0, np.linalg.solve(within, across))
 
 
 def choose_between_views(
@@ -84,7 +84,7 @@ def choose_between_views(
         steps = np.stack([on_sensor[:, :2] - on_sensor[:, 2:] @ motion])
         motions = np.stack([motion])
     else:
-        motions = np.stack([index_motion(frame, vergence) for vergence in vergences])
+        motions = index_motions(frame, vergences)
         steps = on_sensor[:, :2] - on_sensor[:, 2:] @ motions
     axis = 0 if columns > 1 else 1
     along = steps[:, :, axis]
