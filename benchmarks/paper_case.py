@@ -315,9 +315,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=9, help="rounds of all steps (default 9)")
     rounds = parser.parse_args().rounds
-    print(
-        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, "
-    )
+    print(f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, ")
     print(f"NumPy {np.__version__}, Numba {numba.__version__}\n")
     main_table(rounds)
     growth(max(rounds // 2, 3))
