@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.errors import InputError
-from vcc.sampled import LIGHT_FIELD_AXES, Index, sliced, to_numpy
+from vcc.sampled import LIGHT_FIELD_AXES, Index, sliced, to_dtype, to_numpy
 
 if TYPE_CHECKING:
     from vcc.image import Image
@@ -367,15 +367,6 @@ def describe_geometry(light_field: LightField) -> str:
     return (
         f"spacing {text(float(f'{abs(linear[0, 0]):.6g}'))}, slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
     )
-
-
-def to_dtype(values: Any) -> np.dtype[Any]:
-    """The NumPy dtype that corresponds to that of an array of any library."""
-    name = str(values.dtype).rsplit(".", 1)[-1]
-    try:
-        return np.dtype(name)
-    except TypeError:
-        raise InputError(f"samples of type {values.dtype} are not supported: use float32 or uint8") from None
 
 
 def _check_samples(values: Any) -> None:

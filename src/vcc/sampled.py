@@ -75,3 +75,12 @@ def to_numpy(values: Any) -> np.ndarray[Any, Any]:
         return np.asarray(values)
     except (TypeError, ValueError, RuntimeError):
         return np.from_dlpack(values)
+
+
+def to_dtype(values: Any) -> np.dtype[Any]:
+    """The NumPy dtype that corresponds to that of an array of any library."""
+    name = str(values.dtype).rsplit(".", 1)[-1]
+    try:
+        return np.dtype(name)
+    except TypeError:
+        raise InputError(f"samples of type {values.dtype} are not supported: use float32 or uint8") from None

@@ -15,9 +15,9 @@ from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
 from vcc.engines.smear import tent_matrix
-from vcc.light_field import to_dtype
 from vcc.plan.footprint import reach_in_pixels, refinement_matrix, shares
 from vcc.plan.model import MaskLookup, Plan
+from vcc.sampled import to_dtype
 
 
 def run(plan: Plan, values: Any, progress: Callable[[int, int], None] | None = None) -> Any:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vcc.light_field import LightField, describe_geometry, to_dtype
+from vcc.light_field import LightField, describe_geometry
 from vcc.plan.model import Plan
+from vcc.sampled import to_dtype
 from vcc.units import text
 
 if TYPE_CHECKING:

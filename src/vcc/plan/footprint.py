@@ -119,8 +119,11 @@ class Taps:
 
     def mirrored(self) -> Taps:
         """The table for pixels counted from the other end."""
-        parts = (self.first[..., ::-1], self.count[..., ::-1], self.weights[..., ::-1, :])
-        return Taps(*(np.ascontiguousarray(part) for part in parts))
+        return Taps(
+            np.ascontiguousarray(self.first[..., ::-1]),
+            np.ascontiguousarray(self.count[..., ::-1]),
+            np.ascontiguousarray(self.weights[..., ::-1, :]),
+        )
 
 
 def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: int) -> Taps:
