@@ -17,7 +17,7 @@ _inlined = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy
 
 @_compiled
 def sum_rows(values, view_rows, column, weights, first, shares, start, stop, sums):  # type: ignore[no-untyped-def]
-    """Add to sums[y − start] the rows of all views of one column that fall on raster row y.
+    """sums[y − start] = the rows of all views of one column that fall on raster row y.
 
     values: (v, u, t, n), n = columns × channels; view_rows, weights: (taps,); first: (taps, rows);
     shares: (taps, rows, width), width a multiple of 3, zero where a pixel gathers fewer rows.
@@ -34,6 +34,8 @@ def sum_rows(values, view_rows, column, weights, first, shares, start, stop, sum
         for t in range(0, shares.shape[2], 3):
             for y in range(start, stop):
                 line = sums[y - start]
+                if group == 0 and t == 0:
+                    line[:n] = 0  # here rather than all at once: the line stays in the nearest cache
                 for g in range(4):
                     b = used[min(group + g, used.size - 1)]
                     weight = weights[b] if group + g < used.size else np.float32(0)
@@ -262,11 +264,10 @@ def add_band(  # type: ignore[no-untyped-def]
     of taps, raster columns); shares with one axis more; raster: (rows, columns × channels).
     """
     n = values.shape[3]
-    sums = np.empty((stop - start, n + column_shares.shape[2] * channels), np.float32)
+    sums = np.zeros((stop - start, n + column_shares.shape[2] * channels), np.float32)
     for a in range(view_columns.size):
         if not weights[:, a].any():
             continue
-        sums[:] = 0
         sum_rows(
             values,
             view_rows,
