@@ -15,7 +15,7 @@ from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
 from vcc.engines.smear import tent_matrix
-from vcc.plan.footprint import reach_in_pixels, refinement_matrix, shares
+from vcc.plan.footprint import Division, reach_in_pixels, shares
 from vcc.plan.model import MaskLookup, Plan
 from vcc.sampled import to_dtype
 
@@ -74,13 +74,14 @@ class _Run:
         view = xp.reshape(xp.astype(view, self.float), (*plan.samples, self.channels))
         l, k = (np.arange(n, dtype=np.float64) for n in plan.samples)
         if plan.refine > 1:
-            down, first_l = refinement_matrix(plan.interpolation, plan.samples[0], plan.refine)
-            across, first_k = refinement_matrix(plan.interpolation, plan.samples[1], plan.refine)
-            view = self.rows_mixed(self.constant(down), view)
-            view = self.rows_mixed(self.constant(across), xp.permute_dims(view, (1, 0, 2)))
+            rows, columns = plan.samples
+            down = Division.of(plan.interpolation, rows, plan.refine)
+            across = Division.of(plan.interpolation, columns, plan.refine)
+            view = self.rows_mixed(self.constant(down.matrix(rows)), view)
+            view = self.rows_mixed(self.constant(across.matrix(columns)), xp.permute_dims(view, (1, 0, 2)))
             view = xp.permute_dims(view, (1, 0, 2))
-            k = first_k + np.arange(across.shape[0]) / plan.refine
-            l = first_l + np.arange(down.shape[0]) / plan.refine
+            k = across.start + np.arange(len(across.first)) / plan.refine
+            l = down.start + np.arange(len(down.first)) / plan.refine
         view = view * float(plan.weights[b, a])
         for mask in plan.masks:
             view = view * self.mask_weights(mask, b, a, k, l)[:, :, None]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from vcc.engines import numba_kernels as kernels
 from vcc.engines.smear import finish
-from vcc.plan.footprint import REACH, Taps, refinement_matrix, taps
+from vcc.plan.footprint import REACH, Division, taps
 from vcc.plan.model import Plan
 
 Progress = Callable[[int, int], None]
@@ -73,33 +73,23 @@ class _FineGrid:
     def __init__(self, plan: Plan, channels: int) -> None:
         self.rows, self.columns = plan.samples
         self.first_row = self.first_column = 0.0
-        down = across = np.zeros((0, 0))
+        self.divided_as: tuple[Division, Division] | None = None
+        nothing = (np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.float32))
+        self.tables = (*nothing, *nothing, channels)
         if plan.refine > 1:
-            down, self.first_row = refinement_matrix(plan.interpolation, plan.samples[0], plan.refine)
-            across, self.first_column = refinement_matrix(plan.interpolation, plan.samples[1], plan.refine)
-            self.rows, self.columns = len(down), len(across)
-        self.tables = (*_as_taps(down), *_as_taps(across), channels)
-        self._down, self._across = down, across
+            down, across = (Division.of(plan.interpolation, n, plan.refine) for n in plan.samples)
+            self.rows, self.columns = len(down.first), len(across.first)
+            self.first_row, self.first_column = down.start, across.start
+            self.divided_as = down, across
+            self.tables = (down.first, _in_threes(down.shares), across.first, _in_threes(across.shares), channels)
 
     def divided(self, view: NDArray[Any]) -> NDArray[np.float32]:
         """A view (t, s, channels) with its samples divided, for plans in which rows and columns do not part."""
-        if not self._down.size:
+        if self.divided_as is None:
             return np.ascontiguousarray(view, dtype=np.float32)
-        fine = np.einsum("at,bs,tsc->abc", self._down, self._across, view.astype(np.float32), optimize=True)
+        down, across = (part.matrix(n) for part, n in zip(self.divided_as, view.shape[:2], strict=True))
+        fine = np.einsum("at,bs,tsc->abc", down, across, view.astype(np.float32), optimize=True)
         return np.ascontiguousarray(fine, dtype=np.float32)
-
-
-def _as_taps(matrix: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """A banded matrix by rows: the first column that counts, and the numbers from there on, in threes."""
-    if not matrix.size:
-        return np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.float32)
-    first = (matrix != 0).argmax(axis=1)
-    counts = matrix.shape[1] - (matrix[:, ::-1] != 0).argmax(axis=1) - first
-    index = first[:, None] + np.arange(-(-int(counts.max()) // 3) * 3)
-    inside = index < matrix.shape[1]
-    rows = np.arange(len(matrix))[:, None]
-    shares = np.where(inside, matrix[rows, np.where(inside, index, 0)], 0.0)
-    return first, np.ascontiguousarray(shares, dtype=np.float32)
 
 
 def _blocks(plan: Plan, values: NDArray[Any], by_column: bool) -> Iterator[_Block]:
@@ -137,8 +127,11 @@ class _Separable:
         self.mirrored = column_step < 0
         if self.mirrored:
             self.across = self.across.mirrored()
-        self.down_shares, self.across_shares = _in_threes(self.down), _in_threes(self.across)
+        self.down_shares, self.across_shares = _in_threes(self.down.weights), _in_threes(self.across.weights)
         self.alike = _alike(self.across.first, self.across_shares)
+        self.masked = bool(plan.masks) or plan.refine > 1
+        # Finer samples make more rows for the same band of the raster.
+        self.band_rows = max(MASKED_BAND // plan.refine, 8) if self.masked else BAND
         self.weights = (plan.weights * plan.scale).astype(np.float32)
         # Masks' textures one after another: how many rows each has, where they begin, and which mask row the
         # first row of samples of each tap row looks up, and the step from there.
@@ -156,12 +149,15 @@ class _Separable:
         progress: Progress | None,
     ) -> None:
         """Add all samples to the raster (rows, columns × channels)."""
-        masked, total, done = bool(self.plan.masks) or self.plan.refine > 1, self.plan.taps_used, 0
+        masked, total, done = self.masked, self.plan.taps_used, 0
         by_column = masked or progress is not None
+        width = self.fine.columns * self.channels
+        room = np.empty((int(self.mask_rows.sum()), width), dtype=np.float32) if masked else None
         for block in _blocks(self.plan, values, by_column):
-            masks = self.mask_columns(int(block.tap_columns[0]), pool) if masked else None
-            starts = range(0, len(raster), MASKED_BAND if masked else BAND)
-            list(pool.map(partial(self.band, block, masks, raster), starts))
+            if room is not None:
+                self.sample_mask_columns(int(block.tap_columns[0]), pool, room)
+            starts = range(0, len(raster), self.band_rows)
+            list(pool.map(partial(self.band, block, room, raster), starts))
             if progress is not None:
                 done += int(np.count_nonzero(self.weights[np.ix_(block.tap_rows, block.tap_columns)]))
                 progress(done, total)
@@ -170,7 +166,7 @@ class _Separable:
         self, block: _Block, masks: NDArray[np.float32] | None, raster: NDArray[np.float32], start: int
     ) -> None:
         """Add one block's samples to a band of raster rows."""
-        stop = min(start + (BAND if masks is None else MASKED_BAND), len(raster))
+        stop = min(start + self.band_rows, len(raster))
         rows, columns = block.tap_rows, block.tap_columns
         first_row, row_shares = self.down.first[rows], self.down_shares[rows]
         weights = self.weights[np.ix_(rows, columns)]
@@ -188,9 +184,8 @@ class _Separable:
             self.across.first[a], self.across_shares[a], self.alike[a], self.channels, start, stop, raster,
         )  # fmt: skip
 
-    def mask_columns(self, a: int, pool: ThreadPoolExecutor) -> NDArray[np.float32]:
-        """All masks' rows, one mask after another, sampled at the columns of the samples of tap column a."""
-        out = np.empty((int(self.mask_rows.sum()), self.fine.columns * self.channels), dtype=np.float32)
+    def sample_mask_columns(self, a: int, pool: ThreadPoolExecutor, out: NDArray[np.float32]) -> None:
+        """Fill ``out`` with all masks' rows, one mask after another, at the samples' columns of tap column a."""
         index = self.fine.first_column + np.arange(self.fine.columns) / self.plan.refine
 
         def sample(mask_and_start: tuple[int, int]) -> None:
@@ -205,13 +200,13 @@ class _Separable:
 
         pieces = [(n, begin) for n in range(len(self.plan.masks)) for begin in range(0, self.mask_rows[n], 100)]
         list(pool.map(sample, pieces))
-        return out
 
 
-def _in_threes(table: Taps) -> NDArray[np.float32]:
-    """The shares with zeros added until their number is a multiple of three, as the kernels want them."""
-    extra = -table.weights.shape[-1] % 3
-    return np.ascontiguousarray(np.pad(table.weights, [(0, 0)] * (table.weights.ndim - 1) + [(0, extra)]))
+def _in_threes(shares: NDArray[Any]) -> NDArray[np.float32]:
+    """Shares (…, width) with zeros added until their number is a multiple of three, as the kernels want them."""
+    extra = -shares.shape[-1] % 3
+    padded = np.pad(shares, [(0, 0)] * (shares.ndim - 1) + [(0, extra)])
+    return np.ascontiguousarray(padded, dtype=np.float32)
 
 
 def _alike(first: NDArray[np.int64], shares: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -220,17 +215,14 @@ def _alike(first: NDArray[np.int64], shares: NDArray[np.float32]) -> NDArray[np.
     They are all but the borders where a sample is as large as a pixel, a common choice; else there are none.
     """
     columns = first.shape[1]
-    middle = columns // 2
-    place = first - np.arange(columns)
-    same = (place == place[:, middle : middle + 1]) & (
-        np.abs(shares - shares[:, middle : middle + 1]).max(axis=-1) < 1e-6
+    column, middle = np.arange(columns), columns // 2
+    place = first - column
+    same = (place == place[:, middle : middle + 1]) & (np.abs(shares - shares[:, middle : middle + 1]) < 1e-6).all(
+        axis=-1
     )
-    runs = np.zeros((len(first), 2), dtype=np.int64)
-    for row, run in zip(same, runs, strict=True):
-        others = np.flatnonzero(~row)
-        run[0] = others[others < middle].max(initial=-1) + 1
-        run[1] = others[others > middle].min(initial=columns)
-    return runs
+    begin = np.where(~same & (column < middle), column, -1).max(axis=1) + 1
+    end = np.where(~same & (column > middle), column, columns).min(axis=1)
+    return np.stack([begin, end], axis=1)
 
 
 def _add_sheared(

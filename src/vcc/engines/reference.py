@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.engines.smear import finish
-from vcc.plan.footprint import refinement_matrix, shares
+from vcc.plan.footprint import Division, shares
 from vcc.plan.model import Plan
 
 Array = NDArray[np.float64]
@@ -48,11 +48,12 @@ def _samples_of(plan: Plan, view: Array) -> tuple[Array, Array, Array]:
     """The samples of a view, divided where the plan says so, with their column and row indices k, l."""
     if plan.refine == 1:
         return view, np.arange(view.shape[1], dtype=float), np.arange(view.shape[0], dtype=float)
-    down, first_l = refinement_matrix(plan.interpolation, view.shape[0], plan.refine)
-    across, first_k = refinement_matrix(plan.interpolation, view.shape[1], plan.refine)
-    fine = np.einsum("al,bk,lkc->abc", down, across, view, optimize=True)
-    k = first_k + np.arange(fine.shape[1]) / plan.refine
-    l = first_l + np.arange(fine.shape[0]) / plan.refine
+    rows, columns = view.shape[:2]
+    down = Division.of(plan.interpolation, rows, plan.refine)
+    across = Division.of(plan.interpolation, columns, plan.refine)
+    fine = np.einsum("al,bk,lkc->abc", down.matrix(rows), across.matrix(columns), view, optimize=True)
+    k = across.start + np.arange(fine.shape[1]) / plan.refine
+    l = down.start + np.arange(fine.shape[0]) / plan.refine
     return fine, k, l
 
 

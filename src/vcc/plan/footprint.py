@@ -13,6 +13,7 @@ backward evaluation (interpolating, then averaging over the pixel); the shares a
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -153,21 +154,39 @@ def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: i
     return Taps(first, count, np.ascontiguousarray(table, dtype=np.float32))
 
 
-def refinement_matrix(interpolation: str, samples: int, refine: int) -> tuple[Array, float]:
-    """Each sample split into finer ones: a matrix (fine, samples) and the index of fine sample 0.
+@dataclass(frozen=True)
+class Division:
+    """Samples along one axis divided into finer ones: fine sample n takes shares of a few samples.
 
     Fine samples stand ``1/refine`` apart, from half a footprint before the first sample to half a footprint
-    after the last; each takes φ(distance)/refine of a sample, so that a sample's light is only spread, and
-    pieces of a light field refine as the whole does.
+    after the last; each takes φ(distance)/refine of a sample. So a sample's light is only spread, and pieces
+    of a light field divide as the whole does.
 
     Args:
-        interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
-        samples: how many samples there are.
-        refine: how many fine samples replace one.
+        start: index, in samples, of fine sample 0.
+        first: for each fine sample, the first sample that it takes from, 0 or more.
+        shares: (fine samples, width), zero beyond the last sample.
     """
-    reach = REACH[interpolation]
-    fine = round((samples - 1 + 2 * reach) * refine)
-    start = -reach + 0.5 / refine
-    place = start + np.arange(fine) / refine
-    matrix = weight(interpolation, place[:, None] - np.arange(samples)) / refine
-    return matrix / matrix.sum(axis=0), start
+
+    start: float
+    first: NDArray[np.int64]
+    shares: Array
+
+    @classmethod
+    def of(cls, interpolation: str, samples: int, refine: int) -> Division:
+        """``samples`` samples, each divided into ``refine``, interpolated as named."""
+        reach = REACH[interpolation]
+        fine = round((samples - 1 + 2 * reach) * refine)
+        start = -reach + 0.5 / refine
+        place = start + np.arange(fine) / refine
+        first = np.clip(np.ceil(place - reach), 0, samples - 1).astype(np.int64)
+        index = first[:, None] + np.arange(math.ceil(2 * reach))
+        shares = weight(interpolation, place[:, None] - index) / refine
+        return cls(start, first, np.where(index < samples, shares, 0.0))
+
+    def matrix(self, samples: int) -> Array:
+        """The shares as a matrix (fine samples, samples)."""
+        dense = np.zeros((len(self.first), samples + self.shares.shape[1]))
+        rows = np.arange(len(self.first))[:, None]
+        dense[rows, self.first[:, None] + np.arange(self.shares.shape[1])] = self.shares
+        return dense[:, :samples]

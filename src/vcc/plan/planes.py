@@ -16,6 +16,8 @@ TEXTURE_POINTS_PER_FOOTPRINT = 6
 """Weights are looked up linearly between texture points this fine: the error is below 1/6² of a curvature."""
 LARGEST_TEXTURE = 2048
 """Points a side of a mask texture: 16 MiB."""
+POINTS_AT_ONCE = 2**20
+"""Points of a texture that are averaged at once, in float64: 8 MiB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +84,11 @@ def mask_lookup(
     start = first * spacing
     grid_x = np.arange(first[0], last[0] + 1) * spacing[0]
     grid_y = np.arange(first[1], last[1] + 1) * spacing[1]
-    texture = plane.pattern.mean(grid_x[None, :], grid_y[:, None], footprint[0], footprint[1])
+    texture = np.empty((grid_y.size, grid_x.size), dtype=np.float32)
+    for rows in np.array_split(np.arange(grid_y.size), -(-texture.size // POINTS_AT_ONCE)):
+        texture[rows] = plane.pattern.mean(grid_x[None, :], grid_y[rows, None], footprint[0], footprint[1])
     return MaskLookup(
-        texture=np.ascontiguousarray(texture, dtype=np.float32),
+        texture=texture,
         column=(place[..., 0] - start[0]) / spacing[0],
         row=(place[..., 1] - start[1]) / spacing[1],
         step=_cleaned_lookup(step / spacing[:, None], samples),
