@@ -149,3 +149,15 @@ def test_a_picture_keeps_the_sensors_frame_and_is_upside_down():
     assert image.frame == SENSOR.frame
     assert image.inverted
     assert image.values.dtype == np.float32
+
+
+def test_the_light_field_behind_a_mask_is_dimmed_and_moved():
+    field = light_field()
+    mask = vcc.Mask(np.full((2, 2), 0.25), width=1.0, z=20 * mm)
+    camera = vcc.Camera([vcc.Lens(50 * mm), mask], vcc.Sensor(z=52 * mm, shape=(4, 4), pitch=1 * mm))
+    before, behind = (camera.light_field_at(field, 20 * mm, before=b) for b in (True, False))
+    assert before.values is field.values  # no mask on the way: nothing is allocated
+    assert np.allclose(behind.values, field.values * 0.25, rtol=1e-6)
+    assert behind.frame == before.frame
+    rays = vcc.Affine.propagation(20 * mm) @ vcc.Affine.lens(50 * mm)
+    assert behind.frame.isclose(rays @ field.frame)

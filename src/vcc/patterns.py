@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.affine import Affine
 from vcc.errors import InputError
 
 Array = NDArray[np.float64]
@@ -199,7 +200,7 @@ class Polygon(Pattern):
 
 @dataclass(frozen=True, eq=False)
 class Cells(Pattern):
-    """A transmission array: uniform rectangular cells side by side, opaque outside.
+    """A transmission array, values and a frame: uniform rectangular cells side by side, opaque outside.
 
     Args:
         values: transmission of each cell, 0 to 1, shape (rows, columns), row 0 at the top.
@@ -242,6 +243,17 @@ class Cells(Pattern):
         # A bound around the axis, so that an array off the axis is not cut.
         return self.width + 2 * abs(self.middle[0]), self.height + 2 * abs(self.middle[1])
 
+    @property
+    def frame(self) -> Affine:
+        """Maps (column, row, 1) to (x, y, 1) of the middle of a cell, metres."""
+        assert self.height is not None
+        rows, columns = self.values.shape
+        return (
+            Affine.translation(*self.middle)
+            @ Affine.scaling(self.width / columns, self.height / rows)
+            @ Affine.translation(-(columns - 1) / 2, -(rows - 1) / 2)
+        )
+
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The value of the cell that holds each position; zero outside the array."""
         row, column = self._index(np.asarray(x, float), np.asarray(y, float))
@@ -263,11 +275,9 @@ class Cells(Pattern):
         return _mean_from_integral(self._integral, x, y, width, height)
 
     def _index(self, x: Array, y: Array) -> tuple[Array, Array]:
-        assert self.height is not None
-        rows, columns = self.values.shape
-        column = ((x - self.middle[0]) / self.width + 0.5) * columns
-        row = ((y - self.middle[1]) / self.height + 0.5) * rows
-        return row, column
+        """(row, column) counted from the array's top left corner, cells as units."""
+        place = self.frame.inverse()
+        return y * place.matrix[1, 1] + place.offset[1] + 0.5, x * place.matrix[0, 0] + place.offset[0] + 0.5
 
     def _overlaps(self, centres: Array, length: float, axis: int) -> Any:
         """Share of each interval that each cell along an axis fills: a sparse matrix (intervals, cells)."""

@@ -83,6 +83,7 @@ def capture(
     interpolation: given.Interpolation = "linear",
     between_views: given.BetweenViews = "auto",
     scene_distance: given.SceneDistance = None,
+    refine: given.Refine = "auto",
     engine: given.Engine = "numba",
     transfer: given.Transfer = "srgb",
     spacing: given.Spacing = None,
@@ -93,6 +94,7 @@ def capture(
     """Make the picture that a camera records of a light field."""
     factor = given.exposure_of(exposure)
     distance = given.length(scene_distance, "--scene-distance")
+    division = given.refinement(refine)
     from vcc.camera_file import load_camera
     from vcc.formats.pictures import WRITE_ENDINGS
 
@@ -104,6 +106,7 @@ def capture(
         interpolation=interpolation,
         between_views=between_views,
         scene_distance=distance,
+        refine=division,
     )
     expensive = plan.samples_touched * (field.channels or 1) > SAMPLES_WORTH_A_BAR
     with progress("Capturing") as advance:
@@ -112,6 +115,7 @@ def capture(
             interpolation=interpolation,
             between_views=between_views,
             scene_distance=distance,
+            refine=division,
             engine=engine,
             progress=advance if expensive else None,
         )
@@ -125,6 +129,7 @@ def explain(
     interpolation: given.Interpolation = "linear",
     between_views: given.BetweenViews = "auto",
     scene_distance: given.SceneDistance = None,
+    refine: given.Refine = "auto",
     engine: given.Engine = "numba",
     transfer: given.Transfer = "srgb",
     spacing: given.Spacing = None,
@@ -134,6 +139,7 @@ def explain(
 ) -> None:
     """Say how a picture would be made, what it costs and what to beware of."""
     distance = given.length(scene_distance, "--scene-distance")
+    division = given.refinement(refine)
     from vcc.camera_file import load_camera
 
     optics = load_camera(camera)
@@ -143,6 +149,7 @@ def explain(
         interpolation=interpolation,
         between_views=between_views,
         scene_distance=distance,
+        refine=division,
         engine=engine,
     )
     show(str(words))

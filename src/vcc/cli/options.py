@@ -87,6 +87,15 @@ SceneDistance = Annotated[
         rich_help_panel=_CAPTURING,
     ),
 ]
+Refine = Annotated[
+    str,
+    typer.Option(
+        metavar="NUMBER",
+        help="Divide samples by this number each way where a mask is finer than they are, 1 to 8. "
+        "auto decides, and explain says what it costs.",
+        rich_help_panel=_CAPTURING,
+    ),
+]
 Engine = Annotated[
     Literal["numba", "array_api", "reference"],
     typer.Option(
@@ -94,6 +103,20 @@ Engine = Annotated[
         rich_help_panel=_CAPTURING,
     ),
 ]
+
+
+def refinement(given: str) -> int | str:
+    """What --refine says: "auto" or a whole number (whose range the camera checks).
+
+    Raises:
+        InputError: neither.
+    """
+    if given == "auto":
+        return given
+    try:
+        return int(given)
+    except ValueError:
+        raise InputError(f'--refine is "auto" or a whole number, not "{given}"') from None
 
 
 def length(given: str | None, option: str) -> float | None:

@@ -129,15 +129,14 @@ def expected_memory(plan: Plan, light_field: LightField) -> int:
     """Bytes that a run of the plan takes beside the light field and the picture, estimated."""
     import os
 
-    from vcc.engines.numba_cpu import BAND
+    from vcc.engines.numba_cpu import BAND, MASKED_BAND
 
     channels = light_field.channels or 1
     line = 4 * channels * plan.samples[1] * plan.refine
     raster = 4 * channels * plan.raster_shape[0] * plan.raster_shape[1]
-    bands = (os.cpu_count() or 1) * BAND * line
+    bands = (os.cpu_count() or 1) * (2 * MASKED_BAND if plan.masks else BAND) * line
     textures = sum(mask.texture.nbytes + len(mask.texture) * line for mask in plan.masks)
-    views = 3 * plan.samples[0] * plan.refine * line if plan.refine > 1 else 0
-    return int(2 * raster + bands + textures + views)
+    return int(2 * raster + bands + textures)
 
 
 def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) -> float | None:

@@ -1,0 +1,56 @@
+"""Shares of samples on pixels: they integrate the footprint, and they sum to one both ways."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from vcc.plan.footprint import Division, cumulative, shares, taps, weight
+
+STEPS = st.floats(0.05, 7.0).flatmap(lambda step: st.sampled_from([step, -step]))
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+@pytest.mark.parametrize("a", [-2.3, -1.4, -0.6, 0.0, 0.3, 1.2, 1.9, 2.5])
+def test_cumulative_is_the_integral_of_the_weight(interpolation, a):
+    knots = [p for p in (-2.0, -1.0, 0.0, 1.0, 2.0) if p < a]
+    truth = quad(lambda x: float(weight(interpolation, np.float64(x))), -3, a, points=knots or None)[0]
+    assert float(cumulative(interpolation, np.float64(a))) == pytest.approx(truth, abs=1e-9)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+@given(step=STEPS, origin=st.floats(-3, 3))
+def test_no_light_is_lost_and_uniform_light_stays_uniform(interpolation, step, origin):
+    pixel, index = np.arange(-60.0, 60.0), np.arange(-400.0, 400.0)
+    near = np.abs(origin + step * index) < 40
+    table = shares(interpolation, pixel[:, None], origin + step * index[near], step)
+    assert np.allclose(table.sum(axis=0), 1, atol=1e-9)
+    # Pixels that have samples on all sides, within the reach of a footprint.
+    border = 2 * abs(step) + 1
+    middle = (np.abs(pixel) < 40 - border) & (np.abs(pixel - origin) < abs(step) * 399 - border)
+    assert np.allclose(table[middle].sum(axis=1), 1 / abs(step), atol=1e-9)
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+@given(step=STEPS, origin=st.floats(-5, 25))
+def test_tables_hold_every_share(interpolation, step, origin):
+    samples, pixels = 17, 23
+    table = taps(interpolation, np.array([origin]), step, samples, pixels)
+    pixel, index = np.arange(float(pixels)), np.arange(float(samples))
+    truth = shares(interpolation, pixel[:, None], origin + step * index, step)
+    dense = np.zeros((pixels, samples))
+    for m in range(pixels):
+        for n in range(table.count[0, m]):
+            dense[m, table.first[0, m] + n] = table.weights[0, m, n]
+    assert np.allclose(dense, truth, atol=1e-6)
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+@pytest.mark.parametrize("refine", [2, 3, 8])
+def test_dividing_samples_only_spreads_their_light(interpolation, refine):
+    division = Division.of(interpolation, 9, refine)
+    matrix = division.matrix(9)
+    assert np.allclose(matrix.sum(axis=0), 1, atol=1e-12)
+    place = division.start + np.arange(len(matrix)) / refine
+    assert np.allclose(matrix.T @ place, np.arange(9), atol=1e-12)  # around where it was
