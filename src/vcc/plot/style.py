@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -19,7 +20,10 @@ TITLE, TEXT, SMALL = 12, 11, 10
 
 
 def new_axes(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:
-    """Axes on a new figure that no global state knows of.
+    """Axes on a new figure.
+
+    Where someone uses pyplot, and in notebooks, the figure is one of pyplot's, so that it shows itself and
+    ``plt.show()`` knows it; elsewhere no global state knows of it, and nothing piles up.
 
     Args:
         width: of the figure, inches.
@@ -31,10 +35,21 @@ def new_axes(width: float, height: float, rows: int = 1, columns: int = 1, **opt
     Returns:
         Axes, or a (rows, columns) array of them if ``squeeze=False`` is given.
     """
+    shape: dict[str, Any] = {"figsize": (width, height), "dpi": 100, "layout": "constrained"}
+    if "matplotlib.pyplot" in sys.modules or _in_notebook():
+        from matplotlib import pyplot
+
+        return pyplot.figure(**shape).subplots(rows, columns, **options)
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), dpi=100, layout="constrained")
-    return figure.subplots(rows, columns, **options)
+    return Figure(**shape).subplots(rows, columns, **options)
+
+
+def _in_notebook() -> bool:
+    """Whether a notebook's kernel runs this code."""
+    ipython = sys.modules.get("IPython")
+    shell = ipython.get_ipython() if ipython is not None else None
+    return shell is not None and getattr(shell, "kernel", None) is not None
 
 
 def tidy(axes: Axes, horizontal: str, vertical: str) -> None:
