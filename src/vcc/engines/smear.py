@@ -33,13 +33,27 @@ def tent_matrix(half_width: float, pixels: int, guard: int) -> NDArray[np.float6
     return matrix
 
 
+LONG = 64
+"""Weights from which on a blur is quicker through Fourier transforms."""
+
+
+def blurred(raster: NDArray[Any], weights: NDArray[np.float64], axis: int) -> NDArray[Any]:
+    """The raster (rows, columns, channels) blurred along one axis, dark beyond its border."""
+    if len(weights) < LONG:
+        from scipy.ndimage import convolve1d
+
+        return np.asarray(convolve1d(raster, weights, axis=axis, mode="constant"))
+    from scipy.signal import oaconvolve
+
+    kernel = np.expand_dims(weights, [other for other in range(3) if other != axis])
+    wide = oaconvolve(raster.astype(np.float64), kernel, mode="same", axes=axis)
+    return np.asarray(np.maximum(wide, 0) if raster.min(initial=0) >= 0 else wide)  # no light stays no light
+
+
 def finish(plan: Plan, raster: NDArray[Any]) -> NDArray[np.float32]:
     """The picture from the raster (rows, columns, channels) of NumPy numbers."""
     if any(plan.smear):
-        from scipy.ndimage import convolve1d
-
-        raster = convolve1d(raster, tent(plan.smear[0]), axis=0, mode="constant")
-        raster = convolve1d(raster, tent(plan.smear[1]), axis=1, mode="constant")
+        raster = blurred(blurred(raster, tent(plan.smear[0]), 0), tent(plan.smear[1]), 1)
     if plan.guard:
         raster = raster[plan.guard : -plan.guard, plan.guard : -plan.guard]
     if plan.sensor_transmission is not None:

@@ -32,6 +32,8 @@ FINE_DETAIL_IN_VIEW = 0.15
 FINE_DETAIL_IN_SAMPLE = 0.01
 """Share of a mask's variance that may vanish inside a sample before samples are divided."""
 LARGEST_REFINEMENT = 8
+LARGEST_RASTER = 2**28
+"""Pixels of the sensor and its margin: 1 GiB for each colour channel."""
 LARGEST_CHOSEN_REFINEMENT = 4
 """Beyond this a plan divides samples only when told to: the cost grows with the square."""
 
@@ -87,6 +89,7 @@ def compile_plan(
 
     tap = tap_origin(on_sensor, origin, index, shift, between.motion)
     guard, smear = _smear(between, divide)
+    _check_raster(sensor.shape, guard)
     lookups = tuple(
         mask_lookup(plane, index, shift, between.motion, samples, divide, fine) for plane in path_planes
     )
@@ -196,6 +199,16 @@ def _smear(between: BetweenViews, divide: int) -> tuple[int, tuple[float, float]
     vertical, horizontal = (gap / divide for gap in between.gap_filled)
     smear = (vertical if vertical > 1 else 0.0, horizontal if horizontal > 1 else 0.0)
     return (math.ceil(max(smear)) + 1 if any(smear) else 0), smear
+
+
+def _check_raster(sensor_shape: tuple[int, int], guard: int) -> None:
+    rows, columns = (n + 2 * guard for n in sensor_shape)
+    if rows * columns > LARGEST_RASTER:
+        raise InputError(
+            f"neighbouring views' pictures lie {guard} pixels apart on the sensor: closing the gaps takes a "
+            f"margin of as many pixels, {rows}×{columns} in all. Give the sensor larger pixels, move it closer "
+            "to focus, or pass between_views='none'"
+        )
 
 
 def _divide_views(planes: list[Plane], between: BetweenViews, refine: int | str) -> int:
