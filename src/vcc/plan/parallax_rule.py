@@ -125,14 +125,13 @@ def _vergences(light_field: LightField, scene_distance: float | None) -> Array |
     disparities = light_field.measured_disparity_range()
     if disparities is None:
         return None
-    along_u = light_field.frame.linear[[0, 2]]
-    # distance_of, kept as 1/Z so that infinity needs no special case
-    ends = [
-        (along_u[1, 0] - d * along_u[1, 2]) / (along_u[0, 0] - d * along_u[0, 2])
-        for d in disparities
-        if along_u[0, 0] - d * along_u[0, 2] != 0
-    ]
-    return np.linspace(min(ends), max(ends), 33) if ends else None
+    # distance_of, kept as 1/Z so that infinity needs no special case; by disparity rather than by distance,
+    # since behind a lens the scene's images may lie on both sides of infinity
+    disparity = np.linspace(*disparities, 33)
+    position, slope = light_field.frame.linear[0], light_field.frame.linear[2]
+    numerator, denominator = slope[0] - disparity * slope[2], position[0] - disparity * position[2]
+    apart = denominator != 0  # else the scene's image lies in this very plane
+    return np.asarray(numerator[apart] / denominator[apart]) if apart.any() else None
 
 
 def _in_focus(on_sensor: Array) -> Array:
