@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from vcc.units import text
+from vcc.units import short
 
 
 def parameters_in_words(thing: Any, leave_out: tuple[str, ...] = ()) -> str:
@@ -28,6 +28,6 @@ def _value(value: Any, unit: str | None) -> str:
     if isinstance(value, tuple):
         return "(" + ", ".join(_value(part, unit) for part in value) + ")"
     if unit is not None and isinstance(value, int | float):
-        return text(float(f"{value:.6g}"), unit)
+        return short(value, unit)
     described = getattr(value, "described", None)
     return str(value) if described is None else str(described())

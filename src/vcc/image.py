@@ -87,8 +87,8 @@ class Image:
         return save_image(self, path, **options)
 
     def __repr__(self) -> str:
-        from vcc.units import text
+        from vcc.units import short
 
-        pitch = text(float(f"{self.pixel_area**0.5:.6g}"))
+        pitch = short(self.pixel_area**0.5)
         missing = f", {self.missing_rays:.1%} of the rays missing" if self.missing_rays > 0 else ""
         return f"Image({'×'.join(map(str, self.shape))}, pixel {pitch}{missing})"

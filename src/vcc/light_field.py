@@ -8,11 +8,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.errors import InputError
-from vcc.sampled import LIGHT_FIELD_AXES, Index, sliced, to_dtype, to_numpy
+from vcc.sampled import LIGHT_FIELD_AXES, Index, known, sliced, to_dtype, to_numpy
 
 if TYPE_CHECKING:
     from vcc.image import Image
@@ -345,11 +344,8 @@ class LightField:
 
         # Views near the middle are all that is looked at: no need to bring the others from another device.
         rows, columns = (slice(max(n // 2 - 4, 0), n // 2 + 5) for n in self.shape[:2])
-        try:
-            views = to_numpy(self.values[rows, columns, ...])
-        except Exception:  # an array under a tracer has a shape but no values yet
-            return None
-        return disparity_range(views)
+        views = known(self.values[rows, columns, ...])
+        return None if views is None else disparity_range(views)
 
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))
@@ -362,13 +358,11 @@ def describe_geometry(light_field: LightField) -> str:
     separable = np.allclose(linear[[0, 0, 0, 1, 1, 1], [1, 2, 3, 0, 2, 3]], 0)
     if not separable:
         return "general frame"
-    from vcc.units import text
+    from vcc.units import short
 
     focus = math.inf if linear[2, 0] == 0 else linear[0, 0] / linear[2, 0]
-    converging = "parallel views" if math.isinf(focus) else f"converging at {text(float(f'{focus:.6g}'))}"
-    return (
-        f"spacing {text(float(f'{abs(linear[0, 0]):.6g}'))}, slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
-    )
+    converging = "parallel views" if math.isinf(focus) else f"converging at {short(focus)}"
+    return f"spacing {short(abs(linear[0, 0]))}, slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
 
 
 def _check_samples(values: Any) -> None:
@@ -380,14 +374,15 @@ def _check_samples(values: Any) -> None:
         )
     if kind.kind == "u":
         return  # neither negative nor NaN by construction
-    try:
-        known: NDArray[Any] = to_numpy(values)
-    except Exception:  # under a tracer there are no values to look at yet
+    samples = known(values)
+    if samples is None:
         return
-    lowest, highest = known.min(), known.max()  # a NaN anywhere makes both NaN
+    lowest, highest = samples.min(), samples.max()  # a NaN anywhere makes both NaN
     if not (np.isfinite(lowest) and np.isfinite(highest)):
-        bad = tuple(int(n) for n in np.argwhere(~np.isfinite(known))[0])
-        raise InputError(f"a light field needs finite samples; at index {bad} (v, u, t, s, …) it has {known[bad]}")
+        bad = tuple(int(n) for n in np.argwhere(~np.isfinite(samples))[0])
+        raise InputError(
+            f"a light field needs finite samples; at index {bad} (v, u, t, s, …) it has {samples[bad]}"
+        )
     if lowest < 0:
-        bad = tuple(int(n) for n in np.unravel_index(known.argmin(), known.shape))
+        bad = tuple(int(n) for n in np.unravel_index(samples.argmin(), samples.shape))
         raise InputError(f"radiance is not negative; at index {bad} (v, u, t, s, …) it is {lowest}")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.patterns import Pattern
-from vcc.plan.planes import Plane, depends_on_view_only, mask_lookup, tap_origin
+from vcc.plan.planes import Plane, depends_on_view_only, mask_lookup
 from vcc.sampled import LIGHT_FIELD_AXES, to_numpy
 
 if TYPE_CHECKING:
@@ -68,15 +68,11 @@ def masked_at(
 def _weight_table(light_field: LightField, pattern: Pattern, decentre: tuple[float, float], rays: Affine) -> Any:
     """One weight for each view where the pattern tells views apart only, else a lookup for samples."""
     nv, nu, nt, ns = light_field.shape[:4]
-    place = (rays @ light_field.frame).matrix[:2]
-    plane = Plane(pattern, "pattern", decentre, place[:, :4], place[:, 4] - np.array(decentre))
+    plane = Plane.met_by(light_field.frame, rays, pattern, decentre, "pattern")
     index = np.stack(np.meshgrid(np.arange(float(nu)), np.arange(float(nv))), axis=-1)
     still = np.zeros((2, 2))
     if depends_on_view_only(plane, (nt, ns), still):
-        middle = tap_origin(plane.at_index, plane.offset, index, np.zeros_like(index), still)
-        middle = middle + plane.sample_step @ np.array([(ns - 1) / 2, (nt - 1) / 2])
-        width, height = np.abs(plane.view_step(still)).sum(axis=1)
-        return pattern.mean(middle[..., 0], middle[..., 1], width, height)
+        return plane.view_weights(index, np.zeros_like(index), still, (nt, ns))
     return mask_lookup(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
 
 

@@ -77,6 +77,17 @@ def to_numpy(values: Any) -> np.ndarray[Any, Any]:
         return np.from_dlpack(values)
 
 
+def known(values: Any) -> np.ndarray[Any, Any] | None:
+    """`to_numpy`, or None for an array under a tracer, which has a shape and a type but no values yet.
+
+    Under a tracer, libraries refuse to give numbers, each with an error of its own.
+    """
+    try:
+        return to_numpy(values)
+    except Exception:
+        return None
+
+
 def to_dtype(values: Any) -> np.dtype[Any]:
     """The NumPy dtype that corresponds to that of an array of any library."""
     name = str(values.dtype).rsplit(".", 1)[-1]

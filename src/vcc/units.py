@@ -119,6 +119,11 @@ def text(value: float, dimension: str = "length", *, exact: bool = False) -> str
     return faithful[0] if faithful[0] == candidates[0] else min(short or faithful, key=len)
 
 
+def short(value: float, dimension: str = "length", digits: int = 6) -> str:
+    """A value for people to read, rounded to so many digits: ``"59.4562 mm"``; see `text`."""
+    return text(float(f"{value:.{digits}g}"), dimension)
+
+
 def _best_unit(value: float, names: tuple[str, ...], dimension: str) -> str:
     """The largest unit in which the number is at least 1."""
     for name in names:

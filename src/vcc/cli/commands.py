@@ -180,7 +180,7 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
     """What the folder states and what is taken for granted, line by line."""
     import math
 
-    from vcc.units import text
+    from vcc.units import short
 
     def assumed(name: str) -> str:
         return "  (not stated: assumed)" if name in facts.unknown else ""
@@ -189,11 +189,11 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
     colour = "grey" if facts.channels is None else f"{facts.channels} channels"
     samples = facts.rows * facts.columns * facts.height * facts.width * (facts.channels or 1)
     vertical, horizontal = facts.spacing
-    apart = text(float(f"{vertical:.6g}"))
+    apart = short(vertical)
     if vertical != horizontal:
-        apart = f"{apart} (rows), {text(float(f'{horizontal:.6g}'))} (columns)"
+        apart = f"{apart} (rows), {short(horizontal)} (columns)"
     focus = facts.focus_distance
-    converge = "parallel" if math.isinf(focus) else f"converge {text(float(f'{focus:.6g}'))} away"
+    converge = "parallel" if math.isinf(focus) else f"converge {short(focus)} away"
     lines = {
         "format": facts.format,
         "views": f"{facts.rows} × {facts.columns} (rows × columns)",
@@ -212,7 +212,7 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
 
 def _disparities(field: LightField, facts: FolderInfo) -> str:
     """The disparities and what they mean in metres."""
-    from vcc.units import text
+    from vcc.units import short
 
     known = field.measured_disparity_range()
     if known is None:
@@ -222,7 +222,7 @@ def _disparities(field: LightField, facts: FolderInfo) -> str:
     words = f"{low:.3g} to {high:.3g} pixels per view ({source})"
     near, far = field.distance_of(high), field.distance_of(low)
     if 0 < near < far:
-        places = f"{text(float(f'{near:.3g}'))} to {text(float(f'{far:.3g}'))}"
+        places = f"{short(near, digits=3)} to {short(far, digits=3)}"
         words += f": things {places} away"
         words += " if what is assumed is right" if facts.unknown else ""
     return words

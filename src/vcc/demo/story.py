@@ -10,7 +10,7 @@ from vcc.demo.bench import Bench
 from vcc.demo.page import Panel, Section, psnr_table, timings_table
 from vcc.demo.report import Timing, duration, speed_up
 from vcc.demo.scene import FAR, MIDDLE, NEAR
-from vcc.units import mm, text
+from vcc.units import mm, short
 
 TITLE = "A virtual computational camera at work"
 
@@ -36,7 +36,7 @@ _COMMENTS = {
 
 def length(metres: float) -> str:
     """A length as people read it, three digits."""
-    return text(float(f"{metres:.3g}")).replace("um", "µm")
+    return short(metres, digits=3).replace("um", "µm")
 
 
 def away(distance: float) -> str:

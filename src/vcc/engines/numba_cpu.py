@@ -12,7 +12,7 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -71,7 +71,7 @@ class _FineGrid:
     """The samples of a view after division: how many, the index of the first, and how they are made."""
 
     def __init__(self, plan: Plan, channels: int) -> None:
-        self.rows, self.columns = plan.samples
+        self.samples = self.rows, self.columns = plan.samples
         self.first_row = self.first_column = 0.0
         self.divided_as: tuple[Division, Division] | None = None
         nothing = (np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.float32))
@@ -83,11 +83,17 @@ class _FineGrid:
             self.divided_as = down, across
             self.tables = (down.first, _in_threes(down.shares), across.first, _in_threes(across.shares), channels)
 
+    @cached_property
+    def matrices(self) -> tuple[NDArray[np.float64], ...]:
+        """The division of rows and of columns as matrices, made once for all views."""
+        assert self.divided_as is not None
+        return tuple(part.matrix(n) for part, n in zip(self.divided_as, self.samples, strict=True))
+
     def divided(self, view: NDArray[Any]) -> NDArray[np.float32]:
         """A view (t, s, channels) with its samples divided, for plans in which rows and columns do not part."""
         if self.divided_as is None:
             return np.ascontiguousarray(view, dtype=np.float32)
-        down, across = (part.matrix(n) for part, n in zip(self.divided_as, view.shape[:2], strict=True))
+        down, across = self.matrices
         fine = np.einsum("at,bs,tsc->abc", down, across, view.astype(np.float32), optimize=True)
         return np.ascontiguousarray(fine, dtype=np.float32)
 

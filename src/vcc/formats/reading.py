@@ -405,7 +405,7 @@ def _assumed_remark(info: FolderInfo, assumed: list[str]) -> str:
 
 
 def _spacing_text(info: FolderInfo) -> str:
-    dv, du = (units.text(float(f"{step:.6g}")) for step in info.spacing)
+    dv, du = (units.short(step) for step in info.spacing)
     if info.directions is None:
         return f"a spacing of {du}"
     return f"a spacing of {dv} (rows) and {du} (columns), from positions whose unit is taken as mm"

@@ -77,12 +77,8 @@ def compile_plan(
     shift = np.stack(np.broadcast_arrays(column_shift[None, :], row_shift[:, None]), axis=-1)
 
     weights = row_share[:, None] * column_share[None, :]
-    centre = np.array([(samples[1] - 1) / 2, (samples[0] - 1) / 2])
     for plane in view_planes:
-        place = tap_origin(plane.at_index, plane.offset, index, shift, between.motion)
-        place = place + plane.sample_step @ centre
-        width, height = np.abs(plane.view_step(between.motion)).sum(axis=1) / divide
-        weights = weights * plane.pattern.mean(place[..., 0], place[..., 1], width, height)
+        weights = weights * plane.view_weights(index, shift, between.motion, samples, divide)
     used_rows, used_columns = _used(weights)
     keep = np.ix_(used_rows, used_columns)
     index, shift, weights = index[keep], shift[keep], weights[keep]
@@ -162,14 +158,9 @@ def _absorbing_planes(camera: Camera, frame: Affine, sensor_place: Array) -> tup
         pattern = element.faces().pattern
         if pattern is None:
             continue
-        place = (camera.rays_at(element.z, before=True) @ frame).matrix[:2]
-        plane = Plane(
-            pattern,
-            element.label,
-            element.decentre,
-            place[:, :4],
-            place[:, 4] - np.array(element.decentre),
-        )
+        rays = camera.rays_at(element.z, before=True)
+        plane = Plane.met_by(frame, rays, pattern, element.decentre, element.label)
+        place = (rays @ frame).matrix[:2]
         same = np.allclose(place, sensor_place, rtol=1e-9, atol=1e-9 * np.abs(sensor_place).max())
         (against_sensor if same else in_path).append(plane)
     return in_path, against_sensor
@@ -292,17 +283,15 @@ def _aperture_outside_views(planes: list[Plane], shape: tuple[int, ...]) -> floa
     points = (np.arange(128) + 0.5) / 128 - 0.5
     x, y = np.meshgrid(points * plane.pattern.size[0], points * plane.pattern.size[1])
     to_view = np.linalg.inv(plane.at_index[:, :2])
-    middle = plane.offset + plane.sample_step @ np.array([(shape[3] - 1) / 2, (shape[2] - 1) / 2])
-    view = (np.stack([x, y], axis=-1) - middle) @ to_view.T
+    samples = (shape[2], shape[3])
+    view = (np.stack([x, y], axis=-1) - plane.middle_of_view(samples)) @ to_view.T
     open_here = np.ones_like(x)
     for other in planes:
-        here = view @ other.at_index[:, :2].T + other.offset
-        here = here + other.sample_step @ np.array([(shape[3] - 1) / 2, (shape[2] - 1) / 2])
+        here = view @ other.at_index[:, :2].T + other.middle_of_view(samples)
         open_here = open_here * other.pattern(here[..., 0], here[..., 1])
     # Half a raster step of grace: an aperture as wide as the grid misses nothing.
-    inside = (np.abs(view - (np.array([shape[1], shape[0]]) - 1) / 2) <= np.array([shape[1], shape[0]]) / 2).all(
-        -1
-    )
+    views = np.array([shape[1], shape[0]])
+    inside = (np.abs(view - (views - 1) / 2) <= views / 2).all(axis=-1)
     total = open_here.sum()
     return float(1 - (open_here * inside).sum() / total) if total > 0 else 0.0
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from vcc.light_field import LightField, describe_geometry
 from vcc.plan.model import Plan
-from vcc.sampled import to_dtype
-from vcc.units import text
+from vcc.sampled import known, to_dtype
+from vcc.units import short
 
 if TYPE_CHECKING:
     from vcc.camera import Camera
@@ -63,21 +63,16 @@ def _what(camera: Camera, light_field: LightField) -> str:
         f"{to_dtype(light_field.values)}; {describe_geometry(light_field)}"
     ]
     lines += [
-        f"  z = {_short(element.z):>9}  {element.kind}"
+        f"  z = {short(element.z):>9}  {element.kind}"
         + (f' "{element.name}"' if element.name else "")
         + (f", {element.described()}" if element.described() else "")
         for element in camera.elements
     ]
     rows, columns = camera.sensor.shape
     vertical, horizontal = camera.sensor.pitches
-    pitch = _short(vertical) if vertical == horizontal else f"{_short(vertical)} × {_short(horizontal)}"
-    lines.append(f"  z = {_short(camera.sensor.z):>9}  sensor, {rows}×{columns} pixels of {pitch}")
+    pitch = short(vertical) if vertical == horizontal else f"{short(vertical)} × {short(horizontal)}"
+    lines.append(f"  z = {short(camera.sensor.z):>9}  sensor, {rows}×{columns} pixels of {pitch}")
     return "\n".join(lines)
-
-
-def _short(length: float) -> str:
-    """A length for people to read: six digits are more than any of them will build."""
-    return text(float(f"{length:.6g}"))
 
 
 def _sampling(plan: Plan) -> str:
@@ -146,6 +141,8 @@ def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) ->
     """
     from vcc.engines import run_plan
 
+    if known(light_field.values[:1, :1, :1, :1]) is None:
+        return None
     if plan.taps_used == 0:
         return 0.0
     used = np.count_nonzero(plan.weights, axis=0)
@@ -160,10 +157,7 @@ def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) ->
         step = partial(run_plan, plan, light_field.values, engine=engine)
         return min(_timed(step) for _ in range(3))  # the first run may compile
 
-    try:
-        whole, fixed = least_seconds(piece), least_seconds(nothing)
-    except Exception:  # an array under a tracer has no values to run
-        return None
+    whole, fixed = least_seconds(piece), least_seconds(nothing)
     return fixed + max(whole - fixed, 0.0) * plan.taps_used / piece.taps_used
 
 

@@ -110,19 +110,16 @@ class Taps:
 
     Args:
         first: index of the first sample that reaches each pixel, within the samples there are.
-        count: how many samples reach it, one after another.
-        weights: their shares, zero beyond ``count``.
+        weights: the shares of the samples from there on, zero where none is left.
     """
 
     first: NDArray[np.int64]
-    count: NDArray[np.int64]
     weights: NDArray[np.float32]
 
     def mirrored(self) -> Taps:
         """The table for pixels counted from the other end."""
         return Taps(
             np.ascontiguousarray(self.first[..., ::-1]),
-            np.ascontiguousarray(self.count[..., ::-1]),
             np.ascontiguousarray(self.weights[..., ::-1, :]),
         )
 
@@ -151,7 +148,7 @@ def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: i
     table = shares(interpolation, pixel[:, None], position, step)
     table = np.where(np.arange(width) < count[..., None], table, 0.0)
     first = np.minimum(first, samples - 1)
-    return Taps(first, count, np.ascontiguousarray(table, dtype=np.float32))
+    return Taps(first, np.ascontiguousarray(table, dtype=np.float32))
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.affine import Affine
 from vcc.patterns import Pattern
 from vcc.plan.model import MaskLookup
 
@@ -32,6 +33,27 @@ class Plane:
     decentre: tuple[float, float]
     at_index: Array
     offset: Array
+
+    @classmethod
+    def met_by(
+        cls, frame: Affine, rays: Affine, pattern: Pattern, decentre: tuple[float, float], label: str
+    ) -> Plane:
+        """The plane of a pattern as samples of this frame meet it, ``rays`` leading from them to the plane."""
+        place = (rays @ frame).matrix[:2]
+        return cls(pattern, label, decentre, place[:, :4], place[:, 4] - np.array(decentre))
+
+    def middle_of_view(self, samples: tuple[int, int]) -> Array:
+        """Where the middle of view (0, 0) falls, (x, y) in metres; views have (rows, columns) of samples."""
+        rows, columns = samples
+        return np.asarray(self.offset + self.sample_step @ np.array([(columns - 1) / 2, (rows - 1) / 2]))
+
+    def view_weights(
+        self, index: Array, shift: Array, motion: Array, samples: tuple[int, int], divide: int = 1
+    ) -> Array:
+        """The open share of each tap's cell, for a plane that tells views apart only; see `tap_origin`."""
+        place = tap_origin(self.at_index, self.middle_of_view(samples), index, shift, motion)
+        width, height = np.abs(self.view_step(motion)).sum(axis=1) / divide
+        return self.pattern.mean(place[..., 0], place[..., 1], width, height)
 
     def view_step(self, motion: Array) -> Array:
         """2×2: metres moved here per view, a point of the scene being followed."""

@@ -16,7 +16,7 @@ from vcc.light_field import LightField
 from vcc.optics import Element, Lens, Prism
 from vcc.plot import style
 from vcc.plot.tracing import Paths, fan, trace
-from vcc.units import mm, text
+from vcc.units import mm, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -160,7 +160,7 @@ def _rounded(length: float) -> float:
 
 
 def _away(distance: float) -> str:
-    return "parallel light" if math.isinf(distance) else f"{text(float(f'{distance:.3g}'))} away"
+    return "parallel light" if math.isinf(distance) else f"{short(distance, digits=3)} away"
 
 
 def _scene_length(camera: Camera, points: list[_Point]) -> float:
@@ -404,7 +404,7 @@ def _draw_labels(pen: _Pen, camera: Camera) -> None:
     """What each thing is, side by side above the drawing, each with a line to its place."""
     sensor = camera.sensor
     rows, columns = sensor.shape
-    pitch = text(float(f"{sensor.pitches[1 - pen.axis]:.4g}")).replace("um", "µm")
+    pitch = short(sensor.pitches[1 - pen.axis], digits=4).replace("um", "µm")
     things = [(element.z, _describe(element)) for element in camera.elements]
     things.append((sensor.z, f"sensor\n{rows} × {columns}, {pitch}"))
     frame = pen.axes.get_xaxis_transform()
@@ -473,7 +473,7 @@ def _merged(things: list[tuple[float, str]]) -> list[tuple[float, str]]:
 def _describe(element: Element) -> str:
     first = f"{element.kind} {element.name}".strip()
     if isinstance(element, Lens):
-        focal_length = text(float(f"{element.focal_length:.4g}")).replace("-", "−")
+        focal_length = short(element.focal_length, digits=4).replace("-", "−")
         return f"{first}\nf = {focal_length}"
     if isinstance(element, Prism):
         return f"{first}\nδ = {element.deflection[0]:.3g}, {element.deflection[1]:.3g}".replace("-", "−")
