@@ -148,3 +148,16 @@ def test_durations_read_well() -> None:
     ]
     assert speed_up(Timing("a", 0.156, compared=True)) == "3,100 ×"
     assert speed_up(Timing("a", 0.156)) == ""
+
+
+def test_the_warm_up_runs_every_loop_that_is_timed_later(monkeypatch):
+    """A plan that lets no view through runs nothing, and what is timed next would be compiling."""
+    from vcc import engines
+    from vcc.demo import run
+    from vcc.demo.bench import built_in
+
+    used = []
+    monkeypatch.setattr(engines, "run_plan", lambda plan, values: used.append((plan.taps_used, len(plan.masks))))
+    run._warm_up(built_in(small=True))
+    assert all(taps > 0 for taps, _ in used)
+    assert {masks for _, masks in used} == {0, 1}
