@@ -151,13 +151,21 @@ def test_durations_read_well() -> None:
 
 
 def test_the_warm_up_runs_every_loop_that_is_timed_later(monkeypatch):
-    """A plan that lets no view through runs nothing, and what is timed next would be compiling."""
+    """A plan that lets no view through runs nothing, and what is timed next would be compiling.
+
+    With 20×20 views, as the full demo has, those of the corners lie outside the round lens.
+    """
+    from dataclasses import replace
+
     from vcc import engines
     from vcc.demo import run
     from vcc.demo.bench import built_in
 
+    small = built_in(small=True)
+    assert small.scene is not None
+    views = small.scene.light_field((20, 20), (16, 16), spacing=1e-3, slope_per_pixel=0.03, focus_distance=1.3)
     used = []
     monkeypatch.setattr(engines, "run_plan", lambda plan, values: used.append((plan.taps_used, len(plan.masks))))
-    run._warm_up(built_in(small=True))
+    run._warm_up(replace(small, light_field=views))
     assert all(taps > 0 for taps, _ in used)
     assert {masks for _, masks in used} == {0, 1}
