@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import itertools
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.light_field import LightField
-from vcc.optics.faces import Element
+from vcc.optics.faces import Element, Faces
 from vcc.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -21,9 +27,53 @@ if TYPE_CHECKING:
     from vcc.plan.model import Plan
 
 
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One thing that light meets on its way through a camera.
+
+    Args:
+        element: what it is, or is a part of.
+        z: where it stands, metres (for an inner part of a thick element, where that element begins).
+        approach: rays from just behind the stage before (at first: from the entrance plane) to just before
+            this one, elements' own affine steps included; None of the lenses and prisms, which are faces.
+        faces: what it does, in coordinates centred on the element.
+    """
+
+    element: Element
+    z: float
+    approach: Affine
+    faces: Faces
+
+    @property
+    def centred(self) -> Affine | None:
+        """The affine deflection about the element's own middle, on rays of the camera."""
+        return None if self.faces.affine is None else about(self.element.decentre, self.faces.affine)
+
+    def bent(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Any, Any]:
+        """(Δs, Δt) of the deflection that is not affine, at camera places x, y; errors name the element."""
+        bending = self.faces.bending
+        assert bending is not None
+        with self.named():
+            return bending(x - self.element.decentre[0], y - self.element.decentre[1])
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Errors raised within name the element."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(f"{self.element.label}: {error}") from None
+
+
+def about(middle: tuple[float, float], ray_map: Affine) -> Affine:
+    """A map of rays given in coordinates centred on ``middle``, on rays of the camera."""
+    x, y = middle
+    return Affine.translation(x, y, 0, 0) @ ray_map @ Affine.translation(-x, -y, 0, 0)
+
+
 @dataclass(frozen=True, init=False)
 class Camera:
-    """Thin elements along an axis and a sensor behind them.
+    """Elements along an axis and a sensor behind them.
 
     A light field given to the camera is taken to lie at the entrance plane, z = 0.
 
@@ -53,24 +103,64 @@ class Camera:
                     f"{element.label} (z = {element.z * 1e3:g} mm) stands behind the sensor "
                     f"(z = {sensor.z * 1e3:g} mm): light never reaches it"
                 )
+            if element.z + element.length > sensor.z:
+                raise InputError(
+                    f"{element.label} ends at z = {(element.z + element.length) * 1e3:g} mm, behind the sensor "
+                    f"at z = {sensor.z * 1e3:g} mm"
+                )
         if sensor.z < 0:
             raise InputError(f"the sensor stands before the entrance plane: z = {sensor.z * 1e3:g} mm")
         names = [element.name for element in listed if element.name]
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f'{names.count(name)} elements are named "{name}": names must differ')
-        object.__setattr__(self, "elements", tuple(sorted(listed, key=lambda element: element.z)))
+        ordered = tuple(sorted(listed, key=lambda element: (element.z, element.length)))
+        for before, after in itertools.pairwise(ordered):
+            if after.z < before.z + before.length:
+                raise InputError(
+                    f"{after.label} stands inside {before.label}, which reaches from z = {before.z * 1e3:g} mm to "
+                    f"{(before.z + before.length) * 1e3:g} mm"
+                )
+        object.__setattr__(self, "elements", ordered)
         object.__setattr__(self, "sensor", sensor)
 
+    @cached_property
+    def _path(self) -> tuple[tuple[Stage, ...], Affine]:
+        stages = []
+        approach, here = Affine.identity(), 0.0
+        for element in self.elements:
+            approach = Affine.propagation(element.z - here) @ approach
+            here = element.z
+            for part in element.parts():
+                if isinstance(part, Affine):
+                    approach = about(element.decentre, part) @ approach
+                    continue
+                stages.append(Stage(element, here, approach, part))
+                approach = Affine.identity()
+            here += element.length
+        return tuple(stages), Affine.propagation(self.sensor.z - here) @ approach
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """All that light meets on its way to the sensor, in order."""
+        return self._path[0]
+
+    @property
+    def approach_to_sensor(self) -> Affine:
+        """Rays from just behind the last stage (or from the entrance plane) to the sensor."""
+        return self._path[1]
+
     def rays_at(self, z: float, *, before: bool = False) -> Affine:
-        """The map of rays from the entrance plane to the plane at z, all linear optics on the way folded.
+        """The map of rays from the entrance plane to the plane at z, all affine optics on the way folded.
+
+        What bends rays otherwise (lens arrays, phase plates) and what scatters them is passed over.
 
         Args:
             z: place on the axis, metres, 0 or more.
             before: whether to stop before the elements that stand exactly at z, rather than behind them.
 
         Raises:
-            InputError: z is before the entrance plane.
+            InputError: z is before the entrance plane, or inside a thick element.
         """
         if z < 0:
             raise InputError(f"z = {z * 1e3:g} mm lies before the entrance plane of the camera")
@@ -78,13 +168,16 @@ class Camera:
         for element in self.elements:
             if element.z > z or (before and element.z == z):
                 break
-            deflection = element.faces().deflection
-            if deflection is None:
-                continue
-            x, y = element.decentre
-            centred = Affine.translation(x, y, 0, 0) @ deflection @ Affine.translation(-x, -y, 0, 0)
-            ray = centred @ Affine.propagation(element.z - here) @ ray
-            here = element.z
+            if z < element.z + element.length:
+                raise InputError(
+                    f"z = {z * 1e3:g} mm lies inside {element.label}, which is known by its two ends only"
+                )
+            ray = Affine.propagation(element.z - here) @ ray
+            here = element.z + element.length
+            for part in element.parts():
+                step = part if isinstance(part, Affine) else part.affine
+                if step is not None:
+                    ray = about(element.decentre, step) @ ray
         return Affine.propagation(z - here) @ ray
 
     def compile(

@@ -2,7 +2,7 @@
 
 Layers, lowest first; a module may import from its own layer and from those below::
 
-    errors < units < describe < affine < sampled < light_field, image, sensor < patterns < optics < camera
+    errors < units < describe < affine < sampled < light_field, image, sensor < patterns, kernels < optics < camera
     < plan < engines < operators, formats, sources, parallax, plot, cli, demo, ...
 
 Imports inside functions that go up are allowed only from the list below, each with its reason.
@@ -28,7 +28,7 @@ LAYERS: list[set[str]] = [
     {"affine"},
     {"sampled"},
     {"light_field", "image", "sensor"},
-    {"patterns"},
+    {"patterns", "kernels"},
     {"optics"},
     {"camera"},
     {"plan"},

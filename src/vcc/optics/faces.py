@@ -9,56 +9,93 @@ from __future__ import annotations
 
 import abc
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.affine import Affine
 from vcc.errors import InputError
+from vcc.kernels import Kernel
+from vcc.optics.deflections import Deflection, as_deflection
+from vcc.optics.scatter import Scatter
 from vcc.patterns import Pattern, as_pattern
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Faces:
-    """The faces of a thin element, in coordinates centred on the element.
+    """The faces of a thin element, in coordinates centred on the element. They commute.
 
     Args:
-        deflection: a 5×5 map of rays that leaves positions alone and adds to slopes an affine function of
-            position; None deflects nothing.
+        deflection: what is added to the slopes of rays, by position: a 5×5 `Affine` that leaves positions
+            alone (lens, prism), a `Deflection` (arrays, plates), or a function of (x, y) in metres that
+            returns (Δs, Δt); None deflects nothing.
         transmission: the share of light that passes, by position: a `vcc.patterns.Pattern` or a function of
             (x, y) in metres; None lets all light pass.
+        scatter: how light is spread over slopes: a `Kernel`, or a `Scatter` whose kernel varies with the
+            position; None spreads nothing.
 
     Raises:
-        InputError: a deflection that moves positions or mixes slopes: then the element is not thin.
+        InputError: an affine deflection that moves positions or mixes slopes (then the element is not thin),
+            or a face of another type.
     """
 
-    deflection: Affine | None = None
-    transmission: Pattern | Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike] | None = None
+    deflection: Affine | Deflection | Callable[[Array, Array], Any] | None = None
+    transmission: Pattern | Callable[[Array, Array], ArrayLike] | None = None
+    scatter: Scatter | Kernel | None = None
 
     def __post_init__(self) -> None:
-        if self.deflection is not None:
-            if self.deflection.dimensions != 4:
-                raise InputError("a deflection is a 5×5 map of rays")
-            kept = np.array_equal(self.deflection.matrix[:2], np.eye(5)[:2])
-            if not kept or not np.array_equal(self.deflection.linear[2:, 2:], np.eye(2)):
-                raise InputError(
-                    "a thin element leaves positions alone and adds to slopes a function of position; "
-                    f"this deflection does more:\n{self.deflection!r}"
-                )
+        if isinstance(self.deflection, Affine):
+            _check_thin(self.deflection)
+        elif self.deflection is not None:
+            object.__setattr__(self, "deflection", as_deflection(self.deflection))
         if self.transmission is not None:
             object.__setattr__(self, "transmission", as_pattern(self.transmission))
+        if isinstance(self.scatter, Kernel):
+            object.__setattr__(self, "scatter", Scatter((self.scatter,)))
+        elif not isinstance(self.scatter, Scatter | None):
+            raise InputError(f"scatter is a Kernel or a Scatter, not {type(self.scatter).__name__}")
 
     @property
     def pattern(self) -> Pattern | None:
         """The transmission as a pattern."""
         return None if self.transmission is None else as_pattern(self.transmission)
 
+    @property
+    def affine(self) -> Affine | None:
+        """The deflection if it is an affine map of rays."""
+        return self.deflection if isinstance(self.deflection, Affine) else None
+
+    @property
+    def bending(self) -> Deflection | None:
+        """The deflection if it is not affine."""
+        return self.deflection if isinstance(self.deflection, Deflection) else None
+
+    @property
+    def spread(self) -> Scatter | None:
+        """The scatter, a single kernel made uniform over the surface."""
+        return self.scatter if isinstance(self.scatter, Scatter) else None
+
+
+def _check_thin(deflection: Affine) -> None:
+    if deflection.dimensions != 4:
+        raise InputError("a deflection is a 5×5 map of rays")
+    kept = np.array_equal(deflection.matrix[:2], np.eye(5)[:2])
+    if not kept or not np.array_equal(deflection.linear[2:, 2:], np.eye(2)):
+        raise InputError(
+            "a thin element leaves positions alone and adds to slopes a function of position; "
+            f"this deflection does more:\n{deflection!r}"
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class Element(abc.ABC):
-    """A thin element on the axis. A new one is a frozen dataclass with parameters and one method, `faces`.
+    """An element on the axis. A new one is a frozen dataclass with parameters and one method, `faces`.
 
     Args:
         z: place on the axis, metres behind the entrance plane.
@@ -85,9 +122,25 @@ class Element(abc.ABC):
         """What this element does, in coordinates centred on it."""
 
     @property
+    def length(self) -> float:
+        """How far along the axis the element reaches from z on, metres; 0 for a thin one."""
+        return 0.0
+
+    def parts(self) -> tuple[Part, ...]:
+        """What light meets in turn, in coordinates centred on the element: for a thin one, its faces alone.
+
+        A thick element lists `Faces` and, between them, the `Affine` steps by which rays get from one to the
+        next; the first starts at z, the last ends at z + `length`.
+        """
+        faces = self.faces()
+        if not isinstance(faces, Faces):
+            raise InputError(f"faces() of {self.label} must return vcc.Faces, not {type(faces).__name__}")
+        return (faces,)
+
+    @property
     def kind(self) -> str:
-        """The kind of element in small letters, as camera files name it."""
-        return type(self).__name__.lower()
+        """The kind of element in words, small letters."""
+        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", type(self).__name__).lower()
 
     @property
     def label(self) -> str:
@@ -99,3 +152,7 @@ class Element(abc.ABC):
         from vcc.describe import parameters_in_words
 
         return parameters_in_words(self, leave_out=("z", "name", "source"))
+
+
+Part = Faces | Affine
+"""One thing that light meets: the faces of something thin, or a step to another plane."""

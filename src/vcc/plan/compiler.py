@@ -154,13 +154,17 @@ def _absorbing_planes(camera: Camera, frame: Affine, sensor_place: Array) -> tup
     """
     in_path: list[Plane] = []
     against_sensor: list[Plane] = []
-    for element in camera.elements:
-        pattern = element.faces().pattern
+    rays = Affine.identity()
+    for stage in camera.stages:
+        rays = stage.approach @ rays
+        arriving = rays
+        if stage.centred is not None:
+            rays = stage.centred @ rays
+        pattern, element = stage.faces.pattern, stage.element
         if pattern is None:
             continue
-        rays = camera.rays_at(element.z, before=True)
-        plane = Plane.met_by(frame, rays, pattern, element.decentre, element.label)
-        place = (rays @ frame).matrix[:2]
+        plane = Plane.met_by(frame, arriving, pattern, element.decentre, element.label)
+        place = (arriving @ frame).matrix[:2]
         same = np.allclose(place, sensor_place, rtol=1e-9, atol=1e-9 * np.abs(sensor_place).max())
         (against_sensor if same else in_path).append(plane)
     return in_path, against_sensor
@@ -337,7 +341,11 @@ def _notes(
     fine: int,
     swapped: bool,
 ) -> tuple[str, ...]:
-    linear = [element.label for element in camera.elements if element.faces().deflection is not None]
+    linear = [
+        element.label
+        for element in camera.elements
+        if any(isinstance(part, Affine) or part.affine is not None for part in element.parts())
+    ]
     notes = [
         f"folded into one matrix: {', '.join(linear) or 'no linear element'}, and the flight to the sensor at "
         f"z = {camera.sensor.z * 1e3:g} mm"

@@ -40,22 +40,19 @@ def trace(camera: Camera, rays: ArrayLike, start: float = 0.0) -> Paths:
     rays = np.asarray(rays, dtype=np.float64)
     share = np.ones(len(rays))
     places, positions, shares = [start], [Affine.propagation(start)(rays)[:, :2]], [share]
-    here = 0.0
-    for element in camera.elements:
-        rays = Affine.propagation(element.z - here)(rays)
-        here = element.z
-        places.append(here)
+    for stage in camera.stages:
+        rays = stage.approach(rays)
+        places.append(stage.z)
         positions.append(rays[:, :2])
         shares.append(share)
-        faces = element.faces()
-        x, y = (rays[:, :2] - element.decentre).T
-        if faces.pattern is not None:
-            share = share * faces.pattern(x, y)
-        if faces.deflection is not None:
-            centre = Affine.translation(*element.decentre, 0, 0)
-            back = Affine.translation(*(-offset for offset in element.decentre), 0, 0)
-            rays = (centre @ faces.deflection @ back)(rays)
-    rays = Affine.propagation(camera.sensor.z - here)(rays)
+        x, y = (rays[:, :2] - stage.element.decentre).T
+        if stage.faces.pattern is not None:
+            share = share * stage.faces.pattern(x, y)
+        if stage.centred is not None:
+            rays = stage.centred(rays)
+        elif stage.faces.bending is not None:
+            rays = rays + np.column_stack([np.zeros((len(rays), 2)), *stage.bent(*rays[:, :2].T)])
+    rays = camera.approach_to_sensor(rays)
     places.append(camera.sensor.z)
     positions.append(rays[:, :2])
     shares.append(share)

@@ -1,0 +1,173 @@
+"""Deflections that are not affine: how a thin element changes the slopes of rays, by position.
+
+A lens or a prism is an affine map (`vcc.Affine`). What is affine only piece by piece (arrays of lenslets, a
+biprism) or not at all (a phase plate) is one of the classes here. Each is a function of the position (x, y)
+from the element's middle and returns the slopes (Δs, Δt) that it adds.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.errors import InputError
+from vcc.optics.lattice import Lattice
+
+Array = NDArray[np.float64]
+
+
+class Deflection(abc.ABC):
+    """Slopes (Δs, Δt) added to rays by position (x, y), metres from the element's middle."""
+
+    @abc.abstractmethod
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """(Δs, Δt) at positions x, y in metres (arrays that broadcast against each other)."""
+
+    @abc.abstractmethod
+    def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
+        """Bounds of (|Δs|, |Δt|) over the rectangle of these half sizes around the middle, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellDeflection(Deflection):
+    """Each cell of a lattice a lens and a prism of its own: Δs = −(x − x_cell)/f_cell + δs_cell.
+
+    Cell (row, column) takes entry (row mod rows, column mod columns) of the tables.
+
+    Args:
+        lattice: the cells.
+        powers: 1/f of the cells, 1/m, table (rows, columns); 0 for no lens.
+        slopes: (δs, δt) of the cells, table (rows, columns, 2).
+    """
+
+    lattice: Lattice
+    powers: Array
+    slopes: Array
+
+    def __post_init__(self) -> None:
+        powers, slopes = np.asarray(self.powers, dtype=np.float64), np.asarray(self.slopes, dtype=np.float64)
+        if powers.ndim != 2 or slopes.shape != (*powers.shape, 2) or powers.size == 0:
+            raise InputError(
+                "cells have tables of powers (rows, columns) and of slopes (rows, columns, 2), "
+                f"not {powers.shape} and {slopes.shape}"
+            )
+        if not (np.isfinite(powers).all() and np.isfinite(slopes).all()):
+            raise InputError("powers and slopes of cells must be finite numbers")
+        object.__setattr__(self, "powers", powers)
+        object.__setattr__(self, "slopes", slopes)
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """The deflection by the cells that hold the places."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        row, column = self.lattice.cell_of(x, y)
+        centre_x, centre_y = self.lattice.centre_of(row, column)
+        rows, columns = self.powers.shape
+        power = self.powers[row % rows, column % columns]
+        slope = self.slopes[row % rows, column % columns]
+        return slope[..., 0] - power * (x - centre_x), slope[..., 1] - power * (y - centre_y)
+
+    def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
+        """The steepest edge of a cell and the largest prism among the cells."""
+        corner = math.hypot(*self.lattice.half_size)
+        lens = float(np.abs(self.powers).max()) * corner
+        s, t = np.abs(self.slopes).reshape(-1, 2).max(axis=0)
+        return lens + float(s), lens + float(t)
+
+
+@dataclass(frozen=True, eq=False)
+class FacetDeflection(Deflection):
+    """Plane facets that meet in the middle: rays in the sector around a direction are bent by its slopes.
+
+    Args:
+        directions: unit vectors (x, y) of the sectors' middles, (n, 2); a place belongs to the direction
+            along which it lies furthest out.
+        slopes: (δs, δt) that each sector adds, (n, 2).
+    """
+
+    directions: Array
+    slopes: Array
+
+    def __post_init__(self) -> None:
+        for name in ("directions", "slopes"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64).reshape(-1, 2))
+        if len(self.directions) != len(self.slopes) or len(self.directions) < 1:
+            raise InputError("facets have as many directions as slopes, at least one")
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """The slopes of the facet that each place lies on."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        outward = x[..., None] * self.directions[:, 0] + y[..., None] * self.directions[:, 1]
+        slope = self.slopes[np.argmax(outward, axis=-1)]
+        return slope[..., 0], slope[..., 1]
+
+    def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
+        """The largest slopes among the facets."""
+        s, t = np.abs(self.slopes).max(axis=0)
+        return float(s), float(t)
+
+
+@dataclass(frozen=True, eq=False)
+class SlopeFunction(Deflection):
+    """A deflection from any smooth function of position.
+
+    Args:
+        function: called with x and y in metres (arrays that broadcast); returns the slopes (Δs, Δt).
+    """
+
+    function: Callable[[Array, Array], Any]
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """What the function returns, checked."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        shape = np.broadcast_shapes(x.shape, y.shape)
+        returned = self.function(x, y)
+        try:
+            s, t = returned
+        except (TypeError, ValueError):
+            raise InputError(
+                f"the deflection must return two arrays, the slopes (Δs, Δt), not {_in_words(returned)}"
+            ) from None
+        s, t = (np.asarray(slope, dtype=np.float64) for slope in (s, t))
+        for slope in (s, t):
+            if slope.shape not in (shape, ()):
+                raise InputError(f"the deflection returned shape {slope.shape} for positions of shape {shape}")
+            if not np.isfinite(slope).all():
+                bad = np.argwhere(~np.isfinite(np.broadcast_to(slope, shape)))[0]
+                where = tuple(float(np.broadcast_to(place, shape)[tuple(bad)]) for place in (x, y))
+                raise InputError(
+                    f"the deflection returned a number that is not finite at (x, y) = "
+                    f"({where[0] * 1e3:g}, {where[1] * 1e3:g}) mm"
+                )
+        return np.broadcast_to(s, shape), np.broadcast_to(t, shape)
+
+    def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
+        """The largest slopes on a raster of 257×257 points over the rectangle, and 5 % more."""
+        x, y = np.linspace(-half_width, half_width, 257), np.linspace(-half_height, half_height, 257)
+        s, t = self(x[None, :], y[:, None])
+        return 1.05 * float(np.abs(s).max()), 1.05 * float(np.abs(t).max())
+
+
+def _in_words(returned: Any) -> str:
+    shape = getattr(returned, "shape", None)
+    return type(returned).__name__ if shape is None else f"an array of shape {tuple(shape)}"
+
+
+def as_deflection(given: Any) -> Deflection:
+    """A deflection from a deflection or from any function of (x, y) in metres that returns (Δs, Δt).
+
+    Raises:
+        InputError: neither.
+    """
+    if isinstance(given, Deflection):
+        return given
+    if callable(given):
+        return SlopeFunction(given)
+    raise InputError(
+        f"a deflection is an Affine, a vcc.optics.Deflection or a function of (x, y), not {type(given).__name__}"
+    )
