@@ -12,37 +12,63 @@ if TYPE_CHECKING:
     from vcc.affine import Affine as Affine
     from vcc.camera import Camera as Camera
     from vcc.camera_file import load_camera as load_camera
+    from vcc.electronics import Electronics as Electronics
     from vcc.errors import InputError as InputError
     from vcc.errors import ResultWarning as ResultWarning
     from vcc.formats import open_light_field as open_light_field
     from vcc.image import Image as Image
     from vcc.light_field import LightField as LightField
+    from vcc.optics import Biprism as Biprism
+    from vcc.optics import CodedDiffuser as CodedDiffuser
+    from vcc.optics import Diffuser as Diffuser
     from vcc.optics import Element as Element
     from vcc.optics import Faces as Faces
+    from vcc.optics import FirstOrder as FirstOrder
     from vcc.optics import Lens as Lens
+    from vcc.optics import LensArray as LensArray
     from vcc.optics import Mask as Mask
+    from vcc.optics import PhasePlate as PhasePlate
     from vcc.optics import Prism as Prism
+    from vcc.optics import PrismArray as PrismArray
+    from vcc.optics import Pyramid as Pyramid
+    from vcc.prescriptions import load_lens as load_lens
+    from vcc.recording import Recording as Recording
+    from vcc.recording import expose_image as expose_image
+    from vcc.recording import photon_transfer as photon_transfer
     from vcc.sensor import Sensor as Sensor
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "Affine": "vcc.affine",
+    "Biprism": "vcc.optics",
     "Camera": "vcc.camera",
+    "CodedDiffuser": "vcc.optics",
+    "Diffuser": "vcc.optics",
+    "Electronics": "vcc.electronics",
     "Element": "vcc.optics",
     "Faces": "vcc.optics",
+    "FirstOrder": "vcc.optics",
     "Image": "vcc.image",
     "InputError": "vcc.errors",
     "Lens": "vcc.optics",
+    "LensArray": "vcc.optics",
     "LightField": "vcc.light_field",
     "Mask": "vcc.optics",
+    "PhasePlate": "vcc.optics",
     "Prism": "vcc.optics",
+    "PrismArray": "vcc.optics",
+    "Pyramid": "vcc.optics",
+    "Recording": "vcc.recording",
     "ResultWarning": "vcc.errors",
     "Sensor": "vcc.sensor",
+    "expose_image": "vcc.recording",
     "load_camera": "vcc.camera_file",
+    "load_lens": "vcc.prescriptions",
     "open_light_field": "vcc.formats",
+    "photon_transfer": "vcc.recording",
 }
-_MODULES = {"patterns", "plot", "sources", "units"}
+_MODULES = {"kernels", "patterns", "plot", "prescriptions", "sources", "surfaces", "units"}
 
 __all__ = [*sorted(_HOMES), *sorted(_MODULES)]
 

@@ -114,6 +114,29 @@ class Affine:
         return cls(matrix)
 
     @classmethod
+    def abcd(cls, matrix: ArrayLike) -> Affine:
+        """A rotationally symmetric first-order system: u' = A·u + B·s, s' = C·u + D·s, likewise v and t.
+
+        ::
+
+            ⎡A 0 B 0 0⎤
+            ⎢0 A 0 B 0⎥
+            ⎢C 0 D 0 0⎥     A, D without unit, B in metres, C in 1/metres.
+            ⎢0 C 0 D 0⎥
+            ⎣0 0 0 0 1⎦
+
+        Args:
+            matrix: ((A, B), (C, D)), the ray transfer matrix (Hecht, *Optics*, section 6.2).
+
+        Raises:
+            InputError: not 2×2 numbers.
+        """
+        given = np.asarray(matrix, dtype=np.float64)
+        if given.shape != (2, 2):
+            raise InputError(f"a ray transfer matrix is 2×2, not {'×'.join(map(str, given.shape)) or 'a number'}")
+        return cls.from_parts(np.kron(given, np.eye(2)), np.zeros(4))
+
+    @classmethod
     def translation(cls, *offsets: float) -> Affine:
         """x ↦ x + offsets; four offsets (u, v, s, t) make a map of rays, two a map of points."""
         return cls.from_parts(np.eye(len(offsets)), offsets)

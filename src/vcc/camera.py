@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from vcc.image import Image
     from vcc.plan.explain import Explanation
     from vcc.plan.model import Plan
+    from vcc.plan.rays import RayPlan
+    from vcc.recording import Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,34 +186,44 @@ class Camera:
         self,
         light_field: LightField,
         *,
+        method: str = "auto",
         interpolation: str = "linear",
         between_views: str = "auto",
         scene_distance: float | None = None,
         refine: int | str = "auto",
-    ) -> Plan:
+        samples: int | None = None,
+        seed: int = 0,
+    ) -> Plan | RayPlan:
         """The plan by which an engine makes the picture; `capture` does this for you.
 
         Args: see `capture`.
         """
-        from vcc.plan.compiler import compile_plan
+        from vcc.plan.choice import compile_best
 
-        return compile_plan(
+        return compile_best(
             self,
             light_field,
+            method=method,
             interpolation=interpolation,
             between_views=between_views,
             scene_distance=scene_distance,
             refine=refine,
+            samples=samples,
+            seed=seed,
         )
 
     def capture(
         self,
         light_field: LightField,
         *,
+        method: str = "auto",
         interpolation: str = "linear",
         between_views: str = "auto",
         scene_distance: float | None = None,
         refine: int | str = "auto",
+        samples: int | None = None,
+        tolerance: float | None = None,
+        seed: int = 0,
         engine: EngineName | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> Image:
@@ -219,14 +231,22 @@ class Camera:
 
         Args:
             light_field: given at the entrance plane z = 0.
-            interpolation: within a view: ``"nearest"`` (the paper's, for comparison), ``"linear"`` or
-                ``"cubic"`` (Catmull-Rom: sharper, may undershoot at hard edges).
-            between_views: ``"auto"`` interpolates between views along the scene's parallax where
-                neighbouring views differ by more than about a pixel on the sensor; ``"none"`` never does.
+            method: ``"footprints"`` spreads each sample of the light field over the sensor, exactly, where the
+                optics fold into one matrix; ``"rays"`` traces rays back from the sensor through anything;
+                ``"auto"`` takes footprints where they can be had.
+            interpolation: footprints, within a view: ``"nearest"`` (the paper's, for comparison), ``"linear"``
+                or ``"cubic"`` (Catmull-Rom: sharper, may undershoot at hard edges). Rays are linear.
+            between_views: ``"auto"`` interpolates between views along the scene's parallax (footprints: only
+                where neighbouring views differ by more than about a pixel on the sensor); ``"none"`` never does.
             scene_distance: the distance in metres of the scene before the entrance plane, by which that
                 interpolation goes; None takes the range of distances that the light field states or shows.
-            refine: ``"auto"`` divides cells and samples where a mask is finer than they are, at a cost that
-                `explain` states; a number divides samples by it each way, and 1 divides nothing.
+            refine: footprints: ``"auto"`` divides cells and samples where a mask is finer than they are, at a
+                cost that `explain` states; a number divides samples by it each way, and 1 divides nothing.
+            samples: rays a pixel (through an array of lenses: for each lenslet that the pixel sees), rounded up
+                to a power of two; None takes 64.
+            tolerance: double the samples until the estimated sampling error of the picture, root mean square, is
+                at most this share of its mean; None does not.
+            seed: of the rays' choice of points. The same seed gives the same picture, on any number of threads.
             engine: ``"numba"`` (default for NumPy arrays), ``"array_api"`` (default for PyTorch, JAX and
                 other arrays: carries gradients) or ``"reference"`` (slow; defines what is correct).
             progress: called with (done, total) as the work advances.
@@ -235,33 +255,74 @@ class Camera:
             Irradiance on the sensor, radiance × steradian (paper, eq. 5), as light lands on it (inverted).
 
         Warns:
-            ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field.
+            ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, or the
+                tolerance was not reached.
 
         Raises:
-            InputError: an option that does not exist.
+            InputError: an option that does not exist or does not go with the method, or an element that returns
+                what it must not.
         """
         import warnings
 
-        from vcc.engines import run_plan
+        from vcc.engines import record
         from vcc.errors import ResultWarning
         from vcc.image import Image
 
         plan = self.compile(
             light_field,
+            method=method,
             interpolation=interpolation,
             between_views=between_views,
             scene_distance=scene_distance,
             refine=refine,
+            samples=samples,
+            seed=seed,
         )
-        values = run_plan(plan, light_field.values, engine=engine, progress=progress)
-        if plan.missing_rays > 0.01:
+        recorded = record(plan, light_field.values, engine=engine, tolerance=tolerance, progress=progress)
+        if recorded.missing_rays > 0.01:
             warnings.warn(
-                f"{plan.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
-                f"({plan.missing_reason}); the picture is darker there",
+                f"{recorded.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
+                f"({recorded.missing_reason}); the picture is darker there",
                 ResultWarning,
                 stacklevel=2,
             )
-        return Image(values, self.sensor.frame, missing_rays=plan.missing_rays)
+        return Image(
+            recorded.values,
+            self.sensor.frame,
+            missing_rays=recorded.missing_rays,
+            sampling_error=recorded.sampling_error,
+        )
+
+    def expose(
+        self,
+        light_field: LightField,
+        exposure: float | Literal["auto"],
+        *,
+        seed: int = 0,
+        radiance: float = 1.0,
+        **options: Any,
+    ) -> Recording:
+        """What the sensor records of a light field, as its electronics number it, noise included (EMVA 1288).
+
+        Args:
+            light_field: given at the entrance plane z = 0.
+            exposure: exposure time, seconds, or ``"auto"``: the time after which the brightest 0.1 % of the
+                pixels are at 90 % or more of their full well or of the largest number, whichever comes first.
+            seed: of the sensor's noise, a whole number. Recordings with different seeds are independent; the
+                same seed gives the same numbers, on any number of threads.
+            radiance: what a sample value of 1 stands for, W/(m²·sr), in each channel's band.
+            options: as in `capture`, whose seed (of rays) stays 0 here.
+
+        Raises:
+            InputError: a sensor without electronics, channels that they cannot record, an unusable exposure,
+                seed or radiance, "auto" without light, or what `capture` refuses.
+
+        Warns:
+            ResultWarning: as `capture` and `vcc.expose_image`.
+        """
+        from vcc.recording import expose
+
+        return expose(self, light_field, exposure, seed=seed, radiance=radiance, **options)
 
     def explain(self, light_field: LightField, **options: Any) -> Explanation:
         """The plan for a light field in words: what was folded, pulled to the sensor, chosen, and its cost.
@@ -282,30 +343,32 @@ class Camera:
         before: bool = False,
         memory_limit: int | None = None,
     ) -> LightField:
-        """The light field at a plane inside the camera: all linear optics folded, all masks on the way applied.
+        """The light field at a plane inside the camera: affine optics folded, masks and diffusers applied.
 
         Args:
             light_field: given at the entrance plane.
             z: the plane, metres behind the entrance plane.
             before: whether to stop before the elements that stand exactly at z.
             memory_limit: bytes that new samples may take; None takes `vcc.operators.MEMORY_LIMIT`.
-                Without a mask on the way nothing is allocated.
+                Without a mask or a diffuser on the way nothing is allocated.
 
         Raises:
-            InputError: z outside the camera, or more memory needed than allowed.
+            InputError: z outside the camera, an element on the way that bends rays otherwise than a lens or a
+                prism, or more memory needed than allowed.
         """
-        from vcc.operators import masked_at
-
         if z > self.sensor.z:
             raise InputError(f"z = {z * 1e3:g} mm lies behind the sensor at {self.sensor.z * 1e3:g} mm")
-        planes = []
-        for element in self.elements:
-            if element.z > z or (before and element.z == z):
+        for stage in self.stages:
+            if stage.element.z > z or (before and stage.element.z == z):
                 break
-            pattern = element.faces().pattern
-            if pattern is not None:
-                planes.append((pattern, element.decentre, self.rays_at(element.z, before=True)))
-        return masked_at(light_field, planes, memory_limit).transformed(self.rays_at(z, before=before))
+            if stage.faces.bending is not None:
+                raise InputError(
+                    f"{stage.element.label} is not affine: behind it the light field has no frame. Choose a z "
+                    "before it, or look at the picture (camera.capture)"
+                )
+        from vcc.operators import carried_to
+
+        return carried_to(self, light_field, z, before, memory_limit)
 
     def plot(self, **options: Any) -> Any:
         """Draw the axis, the elements, the sensor and fans of rays. See `vcc.plot.plot_camera`."""

@@ -28,12 +28,15 @@ class Image:
             someone looking at the scene.
         missing_rays: the share of the rays that the camera asked for and the light field did not hold,
             0 to 1.
+        sampling_error: for a picture made by rays, its estimated error from sampling, root mean square over the
+            pixels, in units of the values; 0 where nothing is sampled.
         inverted: whether this is a real, upside-down image (what a camera records), which `upright` turns.
     """
 
     values: Any
     frame: Affine
     missing_rays: float = 0.0
+    sampling_error: float = 0.0
     inverted: bool = True
 
     def __post_init__(self) -> None:

@@ -15,7 +15,7 @@ from vcc.sampled import LIGHT_FIELD_AXES, Index, known, sliced, to_dtype, to_num
 
 if TYPE_CHECKING:
     from vcc.image import Image
-    from vcc.optics import Mask
+    from vcc.optics import Element, Mask
     from vcc.sensor import Sensor
 
 
@@ -248,6 +248,29 @@ class LightField:
         from vcc.operators import masked
 
         return masked(self, mask, memory_limit)
+
+    def scattered(self, diffuser: Element, *, memory_limit: int | None = None) -> LightField:
+        """The light field just behind a diffuser that lies in its plane: the paper's convolution (section 3.2.2).
+
+        L'(u, v, s, t) = ∫ D(δs, δt | u, v) L(u, v, s − δs, t − δt) dδ, within each view, with samples interpolated
+        linearly along the slopes. Each view gets as many more samples on each side as the kernel reaches, so that
+        no light is lost; what lies beyond the given pictures is dark. Where the kernel varies over the diffuser,
+        each view takes the one in the middle of its cell of the aperture. New float32 samples are made; a camera
+        that only wants the picture needs none of this.
+
+        Args:
+            diffuser: a `vcc.Diffuser`, a `vcc.CodedDiffuser` or any element that scatters and does not bend. Its z
+                is not looked at: it lies where the light field is. Its rim absorbs.
+            memory_limit: bytes that the new samples may take; None takes `vcc.operators.MEMORY_LIMIT`.
+
+        Raises:
+            InputError: an element that does not scatter or that bends rays, a frame in which places depend on the
+                pixel and not on the view alone (a field that flew some distance), a kernel over more than 8192
+                samples, more memory needed than allowed.
+        """
+        from vcc.operators import scattered
+
+        return scattered(self, diffuser, memory_limit)
 
     def resampled(
         self,

@@ -9,27 +9,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.affine import Affine
+from vcc.electronics import Electronics, checked_number
 from vcc.errors import InputError
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """A flat sensor across the axis; a pixel records the mean irradiance over its area.
+    """A flat sensor across the axis; a pixel records the mean irradiance over its sensitive area.
 
     Args:
         z: place on the axis, metres behind the entrance plane.
         shape: (rows, columns) of pixels.
         pitch: distance between pixel centres, metres: one number or (vertical, horizontal).
         decentre: place (x, y) of the sensor's middle off the axis, metres.
+        fill_factor: the share of a pixel's area that is sensitive, above 0 and up to 1: a rectangle of the
+            pixel's own proportions in its middle. A smaller one gathers less light, and sharper samples.
+        electronics: how pixels turn light into numbers, for `vcc.Camera.expose`; None where only irradiance
+            is asked for.
 
     Raises:
-        InputError: a pitch of zero or less, fewer than one pixel, or a place that is not finite.
+        InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, or a fill
+            factor outside its range.
     """
 
     z: float = field(metadata={"unit": "length"})
     shape: tuple[int, int]
     pitch: float | tuple[float, float] = field(metadata={"unit": "length"})
     decentre: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
+    fill_factor: float = 1.0
+    electronics: Electronics | None = None
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.z):
@@ -41,6 +49,14 @@ class Sensor:
                 raise InputError(f"the sensor's pitch must be greater than 0 m, not {pitch}")
         if len(self.decentre) != 2 or not all(math.isfinite(offset) for offset in self.decentre):
             raise InputError(f"the sensor's decentre is (x, y) in metres, not {self.decentre}")
+        fill = checked_number(
+            self.fill_factor, "the sensor's fill_factor", "a share of the pixel", above=0, most=1
+        )
+        object.__setattr__(self, "fill_factor", fill)
+        if self.electronics is not None and not isinstance(self.electronics, Electronics):
+            raise InputError(
+                f"the sensor's electronics are a vcc.Electronics, not a {type(self.electronics).__name__}"
+            )
         if not isinstance(self.pitch, int | float):
             object.__setattr__(self, "pitch", self.pitches)
         object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
@@ -54,8 +70,21 @@ class Sensor:
         return float(self.pitch), float(self.pitch)
 
     @property
+    def sensitive_pitches(self) -> tuple[float, float]:
+        """The (height, width) of the sensitive area of one pixel, metres: pitch · √fill factor."""
+        vertical, horizontal = self.pitches
+        side = math.sqrt(self.fill_factor)
+        return vertical * side, horizontal * side
+
+    @property
+    def sensitive_area(self) -> float:
+        """The sensitive area of one pixel, m²."""
+        vertical, horizontal = self.pitches
+        return vertical * horizontal * self.fill_factor
+
+    @property
     def size(self) -> tuple[float, float]:
-        """The (height, width) of the sensitive area, metres."""
+        """The (height, width) of all pixels together, metres."""
         return self.shape[0] * self.pitches[0], self.shape[1] * self.pitches[1]
 
     @property

@@ -160,7 +160,7 @@ def _warm_up(bench: Bench) -> None:
 
     Views of the middle: those of the corners lie outside the round lens, and a plan passes them over.
     """
-    from vcc.engines import run_plan
+    from vcc.engines import record
 
     row, column = (n // 2 for n in bench.light_field.shape[:2])
     middle = bench.light_field[row - 1 : row + 1, column - 1 : column + 1, :8, :8]
@@ -168,7 +168,7 @@ def _warm_up(bench: Bench) -> None:
     for camera in (bench.conventional(bench.near), bench.cosine(), bench.coded()):
         for interpolation in INTERPOLATIONS:
             plan = camera.compile(middle, interpolation=interpolation)
-            run_plan(plan, middle.values)
+            record(plan, middle.values)
 
 
 def _show_light_field(work: _Work, bench: Bench) -> None:

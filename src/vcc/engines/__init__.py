@@ -8,15 +8,96 @@ NumPy arrays. An engine is an argument or follows from the arrays' type; there i
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from vcc.errors import InputError
 from vcc.plan.model import Plan
+from vcc.plan.rays import RayPlan
 
 EngineName = Literal["reference", "array_api", "numba"]
 Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A picture and what is known about it.
+
+    Args:
+        values: irradiance (rows, columns[, channels]), float32; an array of the library of the samples with the
+            ``array_api`` engine, else of NumPy.
+        missing_rays: the share of the rays asked for that the light field does not hold.
+        missing_reason: in words.
+        sampling_error: root mean square over the pixels, in units of the values; 0 for footprints.
+        rays: how many were traced; 0 for footprints.
+        samples: rays a pixel; 0 for footprints.
+    """
+
+    values: Any
+    missing_rays: float
+    missing_reason: str
+    sampling_error: float = 0.0
+    rays: int = 0
+    samples: int = 0
+
+
+def record(
+    plan: Plan | RayPlan,
+    values: Any,
+    *,
+    engine: EngineName | None = None,
+    tolerance: float | None = None,
+    progress: Progress | None = None,
+) -> Recorded:
+    """The picture that either kind of plan makes of a light field's samples; see `run_plan`.
+
+    Args:
+        plan: from `vcc.Camera.compile`.
+        values: samples (v, u, t, s[, channels]).
+        engine: see `vcc.Camera.capture`.
+        tolerance: see `vcc.Camera.capture`; for ray plans only.
+        progress: called with (done, total).
+
+    Raises:
+        InputError: what `run_plan` refuses, or a tolerance that is not a number above 0 or not for rays.
+    """
+    if isinstance(plan, Plan):
+        if tolerance is not None:
+            raise InputError("tolerance is for pictures made by rays; footprints have no sampling error")
+        picture = run_plan(plan, values, engine=engine, progress=progress)
+        return Recorded(picture, plan.missing_rays, plan.missing_reason)
+    if tolerance is not None and not tolerance > 0:
+        raise InputError(f"tolerance is a share of the picture's mean, greater than 0, not {tolerance}")
+    from vcc.engines import rays
+
+    traced = rays.run(plan, values, _chosen(engine, values), tolerance, progress)
+    return Recorded(
+        traced.values,
+        traced.missing_rays,
+        "they fall outside the grid of views or outside the views' pictures",
+        traced.sampling_error,
+        traced.rays,
+        traced.samples,
+    )
+
+
+def _chosen(engine: EngineName | None, values: Any) -> EngineName:
+    """The engine by name, or by the arrays' type.
+
+    Raises:
+        InputError: an unknown engine, or one that does not take arrays of this type.
+    """
+    chosen = engine or ("numba" if isinstance(values, np.ndarray) else "array_api")
+    if chosen not in get_args(EngineName):
+        raise InputError(f"there is no engine {chosen!r}: choose one of {', '.join(get_args(EngineName))}")
+    if chosen != "array_api" and not isinstance(values, np.ndarray):
+        raise InputError(
+            f"engine {chosen!r} takes NumPy arrays, not {type(values).__module__}.{type(values).__name__}: "
+            "use engine='array_api'"
+        )
+    return chosen
 
 
 def run_plan(
@@ -38,14 +119,11 @@ def run_plan(
     Raises:
         InputError: an unknown engine, or one that does not take arrays of this type.
     """
-    chosen = engine or ("numba" if isinstance(values, np.ndarray) else "array_api")
-    if chosen not in get_args(EngineName):
-        raise InputError(f"there is no engine {chosen!r}: choose one of {', '.join(get_args(EngineName))}")
-    if chosen != "array_api" and not isinstance(values, np.ndarray):
-        raise InputError(
-            f"engine {chosen!r} takes NumPy arrays, not {type(values).__module__}.{type(values).__name__}: "
-            "use engine='array_api'"
-        )
+    chosen = _chosen(engine, values)
+    if plan.view_blur is not None:
+        from vcc.engines import view_blur
+
+        return view_blur.run(plan, values, chosen, progress)
     if plan.swap_pixel_axes:
         values = _pixel_axes_swapped(values)
     if chosen == "reference":

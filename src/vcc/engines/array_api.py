@@ -14,7 +14,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
-from vcc.engines.smear import tent_matrix
+from vcc.engines.smear import band_matrix, finishing_terms
 from vcc.plan.footprint import Division, reach_in_pixels, shares
 from vcc.plan.model import MaskLookup, Plan
 from vcc.sampled import to_dtype
@@ -53,10 +53,13 @@ class _Run:
         assert raster is not None  # a plan has at least one column of taps
         raster = raster * plan.scale
         if plan.guard:
-            down = self.constant(tent_matrix(plan.smear[0], plan.sensor_shape[0], plan.guard))
-            across = self.constant(tent_matrix(plan.smear[1], plan.sensor_shape[1], plan.guard))
-            raster = self.rows_mixed(down, raster)
-            raster = xp.permute_dims(self.rows_mixed(across, xp.permute_dims(raster, (1, 0, 2))), (1, 0, 2))
+            finished = None
+            for down, across in finishing_terms(plan):
+                rows = self.constant(band_matrix(down, plan.sensor_shape[0], plan.guard))
+                columns = self.constant(band_matrix(across, plan.sensor_shape[1], plan.guard))
+                part = self.rows_mixed(columns, xp.permute_dims(self.rows_mixed(rows, raster), (1, 0, 2)))
+                finished = part if finished is None else finished + part
+            raster = xp.permute_dims(finished, (1, 0, 2))
         if plan.sensor_transmission is not None:
             raster = raster * self.constant(plan.sensor_transmission)[:, :, None]
         raster = xp.astype(raster, xp.float32)

@@ -1,4 +1,4 @@
-"""The last step of every engine: closing the gaps between views, and what lies against the sensor."""
+"""The last steps of every engine: closing the gaps between views, diffusers, and what lies against the sensor."""
 
 from __future__ import annotations
 
@@ -20,17 +20,47 @@ def tent(half_width: float) -> NDArray[np.float64]:
     return np.diff(edges - np.sign(edges) * edges**2 / 2)
 
 
-def tent_matrix(half_width: float, pixels: int, guard: int) -> NDArray[np.float64]:
-    """The tent as a matrix from raster to sensor pixels along one axis, guard cut off."""
-    weights = tent(half_width)
+def band_matrix(weights: NDArray[np.float64], pixels: int, guard: int) -> NDArray[np.float64]:
+    """An odd number of weights as a matrix from raster to sensor pixels along one axis, guard cut off."""
     reach = len(weights) // 2
     matrix = np.zeros((pixels, pixels + 2 * guard))
     for shift, weight in zip(range(-reach, reach + 1), weights, strict=True):
         here = np.arange(pixels)
-        there = here + guard + shift
+        there = here + guard - shift
         inside = (there >= 0) & (there < pixels + 2 * guard)
         matrix[here[inside], there[inside]] += weight
     return matrix
+
+
+def spreading_matrix(weights: NDArray[np.float64], samples: int) -> NDArray[np.float64]:
+    """An odd number of weights as a matrix from samples to as many more as they reach, along one axis."""
+    matrix = np.zeros((samples + len(weights) - 1, samples))
+    for shift, weight in enumerate(weights):
+        matrix[np.arange(samples) + shift, np.arange(samples)] = weight
+    return matrix
+
+
+def separable_terms(kernel: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """A kernel (rows, columns) as a sum of products of a column and a row, right to `RANK_TOLERANCE`."""
+    down, strength, across = np.linalg.svd(kernel)
+    return [
+        (down[:, n] * strength[n], across[n])
+        for n in range(len(strength))
+        if strength[n] > RANK_TOLERANCE * strength[0]
+    ]
+
+
+RANK_TOLERANCE = 1e-8
+
+
+def finishing_terms(plan: Plan) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """The tents between views and the blur of a plan, as `separable_terms`."""
+    tents = tent(plan.smear[0]), tent(plan.smear[1])
+    if plan.blur is None:
+        return [tents]
+    from scipy.signal import convolve
+
+    return separable_terms(convolve(plan.blur, np.outer(*tents)))
 
 
 LONG = 64
@@ -54,6 +84,12 @@ def finish(plan: Plan, raster: NDArray[Any]) -> NDArray[np.float32]:
     """The picture from the raster (rows, columns, channels) of NumPy numbers."""
     if any(plan.smear):
         raster = blurred(blurred(raster, tent(plan.smear[0]), 0), tent(plan.smear[1]), 1)
+    if plan.blur is not None:
+        from scipy.signal import oaconvolve
+
+        # In double precision: what Fourier transforms round to in the dark would else show.
+        wide = oaconvolve(raster.astype(np.float64), plan.blur[:, :, None], mode="same", axes=(0, 1))
+        raster = np.maximum(wide, 0) if raster.min(initial=0) >= 0 else wide
     if plan.guard:
         raster = raster[plan.guard : -plan.guard, plan.guard : -plan.guard]
     if plan.sensor_transmission is not None:

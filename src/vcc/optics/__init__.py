@@ -1,24 +1,40 @@
 """Optical elements: each a frozen dataclass with parameters and one method, `faces`."""
 
+from vcc.optics.biprism import Biprism, Pyramid
 from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection, SlopeFunction
+from vcc.optics.diffuser import CodedDiffuser, Diffuser
 from vcc.optics.faces import Element, Faces, Part
+from vcc.optics.first_order import FirstOrder, Pupil
 from vcc.optics.lattice import Lattice
 from vcc.optics.lens import Lens
+from vcc.optics.lens_array import LensArray, PrismArray
 from vcc.optics.mask import Mask
+from vcc.optics.phase_plate import PhasePlate, SurfaceDeflection
 from vcc.optics.prism import Prism
-from vcc.optics.scatter import Scatter
+from vcc.optics.scatter import Scatter, SheetMap
 
 __all__ = [
+    "Biprism",
     "CellDeflection",
+    "CodedDiffuser",
     "Deflection",
+    "Diffuser",
     "Element",
     "Faces",
     "FacetDeflection",
+    "FirstOrder",
     "Lattice",
     "Lens",
+    "LensArray",
     "Mask",
     "Part",
+    "PhasePlate",
     "Prism",
+    "PrismArray",
+    "Pupil",
+    "Pyramid",
     "Scatter",
+    "SheetMap",
     "SlopeFunction",
+    "SurfaceDeflection",
 ]

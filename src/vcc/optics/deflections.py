@@ -8,7 +8,6 @@ from the element's middle and returns the slopes (Δs, Δt) that it adds.
 from __future__ import annotations
 
 import abc
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -73,11 +72,10 @@ class CellDeflection(Deflection):
         return slope[..., 0] - power * (x - centre_x), slope[..., 1] - power * (y - centre_y)
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
-        """The steepest edge of a cell and the largest prism among the cells."""
-        corner = math.hypot(*self.lattice.half_size)
-        lens = float(np.abs(self.powers).max()) * corner
-        s, t = np.abs(self.slopes).reshape(-1, 2).max(axis=0)
-        return lens + float(s), lens + float(t)
+        """The slopes at the corners of the cells, of the cells where they are steepest."""
+        at_corners = np.abs(self.powers)[..., None] * np.array(self.lattice.reach) + np.abs(self.slopes)
+        s, t = at_corners.reshape(-1, 2).max(axis=0)
+        return float(s), float(t)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,18 +2,89 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from vcc.kernels import Kernel
+from vcc.errors import InputError
+from vcc.kernels import SUM_TOLERANCE, Kernel
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class SheetMap:
+    """Numbers that vary over a sheet, given in cells side by side: bilinear between the cells' middles.
+
+    From the middles of the outermost cells outwards, values stay as they are there.
+
+    Args:
+        values: one number a cell, shape (rows, columns), or n maps over the same sheet, (n, rows, columns);
+            row 0 at the top.
+        width: of the sheet, metres.
+        height: of the sheet, metres.
+
+    Raises:
+        InputError: another number of axes, no cells, numbers that are not finite, a size of zero or less.
+    """
+
+    values: Array
+    width: float
+    height: float
+
+    def __post_init__(self) -> None:
+        values = np.array(self.values, dtype=np.float64)
+        if values.ndim not in (2, 3) or values.size == 0:
+            raise InputError(
+                f"a map over a sheet has shape (rows, columns) or (n, rows, columns), not {values.shape}"
+            )
+        if not np.isfinite(values).all():
+            bad = tuple(int(n) for n in np.argwhere(~np.isfinite(values))[0])
+            raise InputError(f"a map over a sheet needs finite numbers; at index {bad} it has {values[bad]}")
+        for name in ("width", "height"):
+            size = getattr(self, name)
+            if not (size > 0 and math.isfinite(size)):
+                raise InputError(f"{name} of a map over a sheet must be greater than 0 m, not {size}")
+        values.flags.writeable = False
+        object.__setattr__(self, "values", values)
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Values at places x, y in metres from the sheet's middle (arrays that broadcast to a shape S).
+
+        Returns:
+            Shape S for one map, (*S, n) for n maps.
+        """
+        rows, columns = self.values.shape[-2:]
+        column = np.asarray(x, dtype=np.float64) * (columns / self.width) + (columns - 1) / 2
+        row = np.asarray(y, dtype=np.float64) * (rows / self.height) + (rows - 1) / 2
+        row, column = np.broadcast_arrays(np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1))
+        top, left = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
+        bottom, right = np.minimum(top + 1, rows - 1), np.minimum(left + 1, columns - 1)
+        down, across = row - top, column - left
+        above = self.values[..., top, left] * (1 - across) + self.values[..., top, right] * across
+        below = self.values[..., bottom, left] * (1 - across) + self.values[..., bottom, right] * across
+        mixed = above * (1 - down) + below * down
+        return np.asarray(np.moveaxis(mixed, 0, -1) if self.values.ndim == 3 else mixed)
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, SheetMap)
+            and np.array_equal(self.values, other.values)
+            and (self.width, self.height) == (other.width, other.height)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.values.shape, self.values.tobytes(), self.width, self.height))
+
+    def __repr__(self) -> str:
+        cells = "×".join(map(str, self.values.shape))
+        return f"SheetMap({cells}, width={self.width!r}, height={self.height!r})"
+
+
+@dataclass(frozen=True)
 class Scatter:
     """What a scatterer does by position: one kernel, or kernels mixed and stretched over the surface.
 
@@ -21,17 +92,34 @@ class Scatter:
 
     Args:
         kernels: the kernels Dₙ.
-        weights: function of (x, y) in metres that returns the kernels' shares, shape (..., n), summing to 1;
-            None where there is one kernel.
-        width: function of (x, y) in metres that returns the factor by which the kernels are stretched, 0 or
-            more; None stretches nothing.
+        weights: the kernels' shares by position, summing to 1: a `SheetMap` of n maps, or a function of
+            (x, y) in metres that returns shape (..., n); None where there is one kernel.
+        width: the factor, 0 or more, by which the kernels are stretched, by position: a `SheetMap`, or a
+            function of (x, y) in metres; None stretches nothing.
         largest_width: the largest value that ``width`` takes.
+
+    Raises:
+        InputError: no kernels, what is not a kernel, several kernels without weights, a largest width that is
+            negative or not finite.
     """
 
     kernels: tuple[Kernel, ...]
-    weights: Callable[[Array, Array], Array] | None = None
-    width: Callable[[Array, Array], Array] | None = None
+    weights: SheetMap | Callable[[Array, Array], Array] | None = None
+    width: SheetMap | Callable[[Array, Array], Array] | None = None
     largest_width: float = 1.0
+
+    def __post_init__(self) -> None:
+        kernels = tuple(self.kernels)
+        for kernel in kernels:
+            if not isinstance(kernel, Kernel):
+                raise InputError(f"a scatterer's kernels are vcc.kernels.Kernel, not {type(kernel).__name__}")
+        if not kernels:
+            raise InputError("a scatterer has one kernel or more, not none")
+        if len(kernels) > 1 and self.weights is None:
+            raise InputError(f"a scatterer of {len(kernels)} kernels needs weights: how they mix, by position")
+        if not (self.largest_width >= 0 and math.isfinite(self.largest_width)):
+            raise InputError(f"largest_width is finite and 0 or more, not {self.largest_width}")
+        object.__setattr__(self, "kernels", kernels)
 
     @property
     def uniform(self) -> bool:
@@ -44,3 +132,36 @@ class Scatter:
         reaches = np.array([kernel.reach for kernel in self.kernels]) * self.largest_width
         s, t = reaches.max(axis=0)
         return float(s), float(t)
+
+    def at(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """Shares of the kernels and their stretch at places x, y in metres (arrays that broadcast to shape S).
+
+        Returns:
+            Shares, shape (*S, n), and widths, shape S.
+
+        Raises:
+            InputError: weights or widths of a wrong shape, not finite or negative, weights that do not sum to
+                1, a width above ``largest_width``.
+        """
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        shares, widths = np.ones((*x.shape, len(self.kernels))), np.ones(x.shape)
+        if self.weights is not None:
+            shares = _checked("weights", self.weights(x, y), shares.shape)
+            if abs(shares.sum(axis=-1) - 1).max(initial=0.0) > SUM_TOLERANCE:
+                raise InputError(f"weights of kernels sum to 1 at each place, not to {shares.sum(axis=-1)}")
+        if self.width is not None:
+            widths = _checked("width", self.width(x, y), widths.shape)
+            if widths.max(initial=0.0) > self.largest_width * (1 + SUM_TOLERANCE):
+                raise InputError(f"width reaches {widths.max():g}, above its largest_width {self.largest_width:g}")
+        return shares, widths
+
+
+def _checked(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Array:
+    values = np.asarray(given, dtype=np.float64)
+    if values.shape != shape:
+        raise InputError(f"{name} of a scatterer returned shape {values.shape} where {shape} was asked for")
+    if not np.isfinite(values).all():
+        raise InputError(f"{name} of a scatterer returned a number that is not finite")
+    if values.min(initial=0.0) < 0:
+        raise InputError(f"{name} of a scatterer is 0 or more, not {values.min():g}")
+    return values

@@ -8,6 +8,7 @@ the masks and the projection become one sum.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,10 +17,12 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.light_field import LightField
+from vcc.plan.diffuser_rules import diffusers_as_blurs
 from vcc.plan.footprint import REACH, SMALLEST_STEP
 from vcc.plan.model import Plan
 from vcc.plan.parallax_rule import BetweenViews, choose_between_views
 from vcc.plan.planes import Plane, depends_on_view_only, detail_lost, mask_lookup, tap_origin
+from vcc.sampled import to_dtype
 
 if TYPE_CHECKING:
     from vcc.camera import Camera
@@ -55,6 +58,11 @@ def compile_plan(
         InputError: an option that does not exist, or a frame that the sensor cannot be reached by.
     """
     _check_options(interpolation, between_views, refine)
+    blurs = diffusers_as_blurs(camera, light_field)
+    if isinstance(blurs, str):
+        raise InputError(f"this camera's picture cannot be made by footprints: {blurs}")
+    if blurs.views is not None:
+        light_field = _grown(light_field, blurs.views)
     sensor = camera.sensor
     at_sensor = camera.rays_at(sensor.z)
     frame, samples, swapped = _without_transposition(light_field, at_sensor)
@@ -86,6 +94,8 @@ def compile_plan(
     tap = tap_origin(on_sensor, origin, index, shift, between.motion)
     guard, smear = _smear(between, divide)
     _check_raster(sensor.shape, guard)
+    if blurs.picture is not None:
+        guard += max(blurs.picture.shape) // 2
     lookups = tuple(
         mask_lookup(plane, index, shift, between.motion, samples, divide, fine) for plane in path_planes
     )
@@ -110,8 +120,38 @@ def compile_plan(
         samples=samples,
         missing_rays=missing,
         missing_reason=reason,
-        notes=_notes(camera, view_planes, path_planes, against_sensor, between, divide, fine, swapped),
+        notes=_notes(camera, view_planes, path_planes, against_sensor, between, divide, fine, swapped)
+        + blurs.notes,
         expected_ghosting=between.gap_left,
+        blur=blurs.picture,
+        view_blur=blurs.views,
+    )
+
+
+def why_not_footprints(camera: Camera, light_field: LightField) -> str | None:
+    """Why the picture cannot be made by footprints, in words that name the element; None where it can."""
+    for stage in camera.stages:
+        if stage.faces.bending is not None:
+            return f"{stage.element.label} bends rays by a function of position that is not affine"
+    blurs = diffusers_as_blurs(camera, light_field)
+    if isinstance(blurs, str):
+        return blurs
+    if blurs.picture is not None:
+        rows, columns = (n + m for n, m in zip(camera.sensor.shape, blurs.picture.shape, strict=True))
+        if rows * columns > LARGEST_RASTER:
+            return f"a diffuser scatters over {max(blurs.picture.shape)} pixels, more than a blur can hold"
+    return None
+
+
+def _grown(light_field: LightField, kernel: Array) -> LightField:
+    """A light field of the size that blurring its views makes it, without samples."""
+    high, wide = (n // 2 for n in kernel.shape)
+    nv, nu, nt, ns = light_field.shape[:4]
+    shape = (nv, nu, nt + 2 * high, ns + 2 * wide, *light_field.shape[4:])
+    return replace(
+        light_field,
+        values=np.broadcast_to(np.zeros((), dtype=to_dtype(light_field.values)), shape),
+        frame=light_field.frame @ Affine.translation(0, 0, -wide, -high),
     )
 
 

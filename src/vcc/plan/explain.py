@@ -13,6 +13,7 @@ import numpy as np
 
 from vcc.light_field import LightField, describe_geometry
 from vcc.plan.model import Plan
+from vcc.plan.rays import RayPlan
 from vcc.sampled import known, to_dtype
 from vcc.units import short
 
@@ -24,7 +25,7 @@ class Explanation(str):
     """Text that shows itself plainly in a notebook or at the prompt."""
 
     __slots__ = ("expected_seconds", "plan")
-    plan: Plan
+    plan: Plan | RayPlan
     expected_seconds: float | None
 
     def __repr__(self) -> str:
@@ -38,19 +39,17 @@ def explain(camera: Camera, light_field: LightField, **options: Any) -> Explanat
     """
     engine = options.pop("engine", None)
     options.pop("progress", None)
+    tolerance = options.pop("tolerance", None)
     plan = camera.compile(light_field, **options)
-    seconds = expected_seconds(plan, light_field, engine)
-    result = Explanation(
-        "\n\n".join(
-            [
-                _what(camera, light_field),
-                "How the picture is made\n" + "\n".join(f"  {note}" for note in plan.notes),
-                _sampling(plan),
-                _cost(plan, light_field, seconds),
-                _warnings(plan),
-            ]
-        )
-    )
+    how = "How the picture is made\n" + "\n".join(f"  {note}" for note in plan.notes)
+    if isinstance(plan, RayPlan):
+        from vcc.plan.explain_rays import sections
+
+        parts, seconds = sections(camera, plan, light_field, engine, tolerance)
+    else:
+        seconds = expected_seconds(plan, light_field, engine)
+        parts = [_sampling(plan), _cost(plan, light_field, seconds), _warnings(plan)]
+    result = Explanation("\n\n".join([_what(camera, light_field), how, *parts]))
     result.plan, result.expected_seconds = plan, seconds
     return result
 
@@ -87,6 +86,9 @@ def _sampling(plan: Plan) -> str:
         f"  interpolation within a view: {plan.interpolation}"
         + ("" if plan.separable else "; the frame shears the pixel grid, which takes the slower general path"),
     ]
+    for kernel, what in ((plan.view_blur, "each view, in samples"), (plan.blur, "the picture, in pixels")):
+        if kernel is not None:
+            lines.append(f"  a diffuser's kernel of {kernel.shape[0]} × {kernel.shape[1]} blurs {what}")
     if any(plan.smear):
         lines.append(
             f"  gaps between views closed by a tent of {plan.smear[0]:.3g} × {plan.smear[1]:.3g} pixels half width"
@@ -131,7 +133,9 @@ def expected_memory(plan: Plan, light_field: LightField) -> int:
     raster = 4 * channels * plan.raster_shape[0] * plan.raster_shape[1]
     bands = (os.cpu_count() or 1) * (2 * MASKED_BAND if plan.masks else BAND) * line
     textures = sum(mask.texture.nbytes + len(mask.texture) * line for mask in plan.masks)
-    return int(2 * raster + bands + textures)
+    # One column of views is blurred at a time: in double precision, and kept in single.
+    blurred = 0 if plan.view_blur is None else 4 * channels * light_field.shape[0] * math.prod(plan.samples)
+    return int(2 * raster + bands + textures + blurred)
 
 
 def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) -> float | None:
@@ -149,7 +153,7 @@ def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) ->
     # Enough of them that their own time stands out from the clock's noise.
     share = max(1 / 16, min(1.0, 1e8 / (plan.samples_touched * (light_field.channels or 1))))
     columns = np.sort(np.argsort(-used)[: math.ceil(len(used) * share)])
-    piece = _columns_of(plan, columns)
+    piece = plan.columns(columns)
     # What a run costs whatever it adds up.
     nothing = replace(piece, weights=np.zeros_like(piece.weights))
 
@@ -159,18 +163,6 @@ def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) ->
 
     whole, fixed = least_seconds(piece), least_seconds(nothing)
     return fixed + max(whole - fixed, 0.0) * plan.taps_used / piece.taps_used
-
-
-def _columns_of(plan: Plan, columns: np.ndarray[Any, Any]) -> Plan:
-    """The plan with some of its columns of view taps only."""
-    return replace(
-        plan,
-        view_columns=plan.view_columns[columns],
-        weights=plan.weights[:, columns],
-        x=plan.x[:, columns],
-        y=plan.y[:, columns],
-        masks=tuple(replace(m, column=m.column[:, columns], row=m.row[:, columns]) for m in plan.masks),
-    )
 
 
 def _timed(step: Callable[[], object]) -> float:

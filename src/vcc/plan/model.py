@@ -9,7 +9,7 @@ in which every place is an affine function of the sample's index. The engine kno
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,9 @@ class Plan:
         refine: how many finer samples replace one, along each pixel axis.
         smear: (vertical, horizontal) half width in pixels of the tent that fills the gap between the
             pictures of neighbouring views; 0 for none.
+        blur: kernel that the picture is convolved with, odd rows × odd columns of sum 1 (a diffuser), or None.
+        view_blur: kernel that each view is convolved with before all else (a diffuser at the views), growing by
+            half the kernel on each side, or None; ``samples`` and places count what is there after that.
         swap_pixel_axes: whether rows and columns of pixels change places before all else.
         samples: (rows, columns) of pixels of a view, after that change.
         missing_rays: share of the rays asked for that the light field lacks.
@@ -105,6 +108,19 @@ class Plan:
     missing_reason: str
     notes: tuple[str, ...] = field(default=())
     expected_ghosting: float = 0.0
+    blur: Array | None = None
+    view_blur: Array | None = None
+
+    def columns(self, columns: NDArray[np.int64]) -> Plan:
+        """The plan with some of its columns of view taps only: pictures of such pieces add up."""
+        return replace(
+            self,
+            view_columns=self.view_columns[columns],
+            weights=self.weights[:, columns],
+            x=self.x[:, columns],
+            y=self.y[:, columns],
+            masks=tuple(replace(m, column=m.column[:, columns], row=m.row[:, columns]) for m in self.masks),
+        )
 
     @property
     def raster_shape(self) -> tuple[int, int]:
@@ -155,6 +171,11 @@ class Plan:
         """How many samples, refined ones counted, an engine goes through."""
         return self.taps_used * self.samples[0] * self.samples[1] * self.refine**2
 
+    @property
+    def _blurs(self) -> list[tuple[str, tuple[int, ...], str]]:
+        found = (("picture blurred", self.blur, "pixels"), ("views blurred", self.view_blur, "samples"))
+        return [(name, kernel.shape, unit) for name, kernel, unit in found if kernel is not None]
+
     def __repr__(self) -> str:
         rows, columns = self.weights.shape
         lines = [
@@ -165,6 +186,10 @@ class Plan:
             f"({self.direction}, {self.interpolation}, {'separable' if self.separable else 'sheared'})",
             f"  masks in mid-path: {', '.join(mask.label for mask in self.masks) or 'none'}; "
             f"samples refined ×{self.refine}; smear {self.smear[0]:.3g}×{self.smear[1]:.3g} pixels",
+            *(
+                f"  {name} by a diffuser's kernel of {size[0]}×{size[1]} {unit}"
+                for name, size, unit in self._blurs
+            ),
             f"  missing rays: {self.missing_rays:.2%}",
         ]
         return "\n".join(lines + [f"  - {note}" for note in self.notes])

@@ -78,13 +78,13 @@ def choose_between_views(
     rows, columns = light_field.whole_views
     if rows <= 1 and columns <= 1:
         return BetweenViews(np.zeros((2, 2)), (0.0, 0.0), 0.0, "a single view: nothing between views")
-    vergences = _vergences(light_field, scene_distance)
-    if vergences is None:
+    known = vergences(light_field, scene_distance)
+    if known is None:
         motion = _in_focus(on_sensor)
         steps = np.stack([on_sensor[:, :2] - on_sensor[:, 2:] @ motion])
         motions = np.stack([motion])
     else:
-        motions = index_motions(frame, vergences)
+        motions = index_motions(frame, known)
         steps = on_sensor[:, :2] - on_sensor[:, 2:] @ motions
     axis = 0 if columns > 1 else 1
     along = steps[:, :, axis]
@@ -96,7 +96,7 @@ def choose_between_views(
     pixel = max(1.0, float(np.abs(on_sensor[:, 2:]).max()))
     spread = (
         f"neighbouring views' pictures lie {smallest:.2g} to {largest:.2g} pixels apart on the sensor"
-        if vergences is not None
+        if known is not None
         else "the pictures show no parallax to measure"
     )
     if between_views == "none":
@@ -117,7 +117,16 @@ def choose_between_views(
     )
 
 
-def _vergences(light_field: LightField, scene_distance: float | None) -> Array | None:
+def vergences(light_field: LightField, scene_distance: float | None) -> Array | None:
+    """1/Z of the scene in 1/m, evenly over its disparities; None where it shows no parallax.
+
+    Args:
+        light_field: whose disparities are asked for.
+        scene_distance: metres before it, which then is all that counts, or None.
+
+    Raises:
+        InputError: a distance of 0 or less.
+    """
     if scene_distance is not None:
         if not scene_distance > 0:
             raise InputError(f"scene_distance must be greater than 0 m, not {scene_distance}")

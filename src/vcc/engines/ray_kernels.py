@@ -1,0 +1,518 @@
+"""The compiled kernel that traces packets of rays from the sensor to the light field and adds up what they find.
+
+One kernel serves every camera: what a ray meets comes as a list of numbers (`vcc.plan.steps`), read step by
+step for a packet of rays at a time, so that reading the list costs nothing and the arithmetic runs on several
+rays at once. A packet holds the rays of one pixel.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from vcc.engines.vector_gather import LANES, add_rows_of_1, add_rows_of_3, add_rows_of_4
+
+PACKET = 256
+"""Rays at a time: six numbers each, which stay in the first-level cache."""
+
+OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy"}
+
+
+@njit(**OPTIONS)
+def cell_of(layout, turn, x, y):  # type: ignore[no-untyped-def]
+    """(row, column, centre x, centre y) of the cell that holds a place; turn as `steps._lattice_numbers`."""
+    cosine, sine, offset_x, offset_y, pitch, height = turn[0], turn[1], turn[2], turn[3], turn[4], turn[5]
+    dx, dy = x - offset_x, y - offset_y
+    across = (cosine * dx + sine * dy) * (1 / pitch)
+    down = (cosine * dy - sine * dx) * (1 / height)
+    if layout == 0:
+        row, column = math.floor(down + 0.5), math.floor(across + 0.5)
+        shifted = column
+    else:
+        even_row, even_column = 2 * math.floor(down / 2 + 0.5), math.floor(across + 0.5)
+        odd_row, odd_column = 2 * math.floor(down / 2) + 1, math.floor(across)
+        to_even = (across - even_column) ** 2 + 0.75 * (down - even_row) ** 2
+        to_odd = (across - odd_column - 0.5) ** 2 + 0.75 * (down - odd_row) ** 2
+        if to_even <= to_odd:
+            row, column = even_row, even_column
+            shifted = column
+        else:
+            row, column = odd_row, odd_column
+            shifted = column + 0.5
+    shifted, down = shifted * pitch, row * height
+    return (
+        np.int64(row),
+        np.int64(column),
+        cosine * shifted - sine * down + offset_x,
+        sine * shifted + cosine * down + offset_y,
+    )
+
+
+@njit(**OPTIONS)
+def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
+    """(x, y) of the centre of a cell."""
+    shifted = column * turn[4]
+    if layout == 1 and row % 2 != 0:
+        shifted += 0.5 * turn[4]
+    down = row * turn[5]
+    return turn[0] * shifted - turn[1] * down + turn[2], turn[1] * shifted + turn[0] * down + turn[3]
+
+
+@njit(**OPTIONS)
+def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
+    """(row, column, next row, next column, way to it, way to it) of a place on a texture."""
+    column = min(max((x - real[0]) * real[2], 0.0), columns - 1.0)
+    row = min(max((y - real[1]) * real[3], 0.0), rows - 1.0)
+    c, r = min(int(column), max(columns - 2, 0)), min(int(row), max(rows - 2, 0))
+    return r, c, min(r + 1, rows - 1), min(c + 1, columns - 1), row - r, column - c
+
+
+@njit(**OPTIONS)
+def mixed(table, start, width, number, columns, at):  # type: ignore[no-untyped-def]
+    """One of ``width`` numbers of a texture at a place that `corner` found."""
+    r, c, r1, c1, fr, fc = at
+    above = table[start + (r * columns + c) * width + number] * (1 - fc)
+    above += table[start + (r * columns + c1) * width + number] * fc
+    below = table[start + (r1 * columns + c) * width + number] * (1 - fc)
+    below += table[start + (r1 * columns + c1) * width + number] * fc
+    return above * (1 - fr) + below * fr
+
+
+@njit(**OPTIONS)
+def take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
+    """Take a packet of n rays through all steps; ``number`` says which points of the table are theirs."""
+    for step in range(len(codes)):
+        code, a, f = codes[step], whole[step], real[step]
+        if code == 0:
+            for p in range(n):
+                xp, sp, yp, tp = x[p], s[p], y[p], t[p]
+                x[p] = f[0] * xp + f[1] * sp + f[2]
+                s[p] = f[3] * xp + f[4] * sp + f[5]
+                y[p] = f[6] * yp + f[7] * tp + f[8]
+                t[p] = f[9] * yp + f[10] * tp + f[11]
+        elif code == 1:
+            for p in range(n):
+                xp, yp, sp, tp = x[p], y[p], s[p], t[p]
+                x[p] = f[0] * xp + f[1] * yp + f[2] * sp + f[3] * tp + f[4]
+                y[p] = f[5] * xp + f[6] * yp + f[7] * sp + f[8] * tp + f[9]
+                s[p] = f[10] * xp + f[11] * yp + f[12] * sp + f[13] * tp + f[14]
+                t[p] = f[15] * xp + f[16] * yp + f[17] * sp + f[18] * tp + f[19]
+        elif code == 2 and a[1] * a[2] == 1:
+            power, slope_x, slope_y = slopes[a[3]], slopes[a[3] + 1], slopes[a[3] + 2]
+            for p in range(n):
+                _, _, centre_x, centre_y = cell_of(a[0], f, x[p], y[p])
+                s[p] += power * (x[p] - centre_x) - slope_x
+                t[p] += power * (y[p] - centre_y) - slope_y
+        elif code == 2:
+            for p in range(n):
+                row, column, centre_x, centre_y = cell_of(a[0], f, x[p], y[p])
+                at = a[3] + ((row % a[1]) * a[2] + column % a[2]) * 3
+                s[p] += slopes[at] * (x[p] - centre_x) - slopes[at + 1]
+                t[p] += slopes[at] * (y[p] - centre_y) - slopes[at + 2]
+        elif code == 3:
+            for p in range(n):
+                _, _, centre_x, centre_y = cell_of(a[0], f, x[p], y[p])
+                dx, dy = x[p] - centre_x, y[p] - centre_y
+                across, down = abs(f[0] * dx + f[1] * dy), abs(f[0] * dy - f[1] * dx)
+                if a[1] == 1:
+                    inside = across * across + down * down <= f[6] * f[6]
+                elif a[0] == 0:
+                    inside = max(across, down) <= f[6]
+                else:
+                    inside = max(across, across / 2 + 0.5 * math.sqrt(3.0) * down) <= f[6]
+                share[p] *= inside
+        elif code == 4:
+            for p in range(n):
+                dx, dy = x[p] - f[0], y[p] - f[1]
+                best, at = -np.inf, a[1]
+                for facet in range(a[0]):
+                    outward = dx * slopes[a[1] + 4 * facet] + dy * slopes[a[1] + 4 * facet + 1]
+                    if outward > best:
+                        best, at = outward, a[1] + 4 * facet
+                s[p] -= slopes[at + 2]
+                t[p] -= slopes[at + 3]
+        elif code == 5:
+            for p in range(n):
+                at = corner(x[p], y[p], a[0], a[1], f)
+                s[p] -= mixed(slopes, a[2], 2, 0, a[1], at)
+                t[p] -= mixed(slopes, a[2], 2, 1, a[1], at)
+        elif code == 6:
+            for p in range(n):
+                share[p] *= (x[p] - f[0]) ** 2 + (y[p] - f[1]) ** 2 <= f[2]
+        elif code == 7:
+            for p in range(n):
+                share[p] *= (abs(x[p] - f[0]) <= f[2]) & (abs(y[p] - f[1]) <= f[3])
+        elif code == 8:
+            for p in range(n):
+                column, row = math.floor((x[p] - f[0]) * f[2]), math.floor((y[p] - f[1]) * f[3])
+                inside = (column >= 0) & (column < a[1]) & (row >= 0) & (row < a[0])
+                c, r = int(min(max(column, 0), a[1] - 1)), int(min(max(row, 0), a[0] - 1))
+                share[p] *= shares[a[2] + r * a[1] + c] * inside
+        elif code == 9:
+            for p in range(n):
+                at = corner(x[p], y[p], a[0], a[1], f)
+                share[p] *= mixed(shares, a[2], 1, 0, a[1], at)
+        else:
+            for p in range(n):
+                kernel = 0
+                if a[3] > 0:
+                    at = corner(x[p], y[p], a[3], a[4], f)
+                    picked = points[number[p], a[2]]
+                    while kernel < a[1] - 1 and picked >= mixed(shares, a[5], a[1], kernel, a[4], at):
+                        kernel += 1
+                stretch = 1.0
+                if a[6] > 0:
+                    at = corner(x[p], y[p], a[6], a[7], f[4:])
+                    stretch = mixed(shares, a[8], 1, 0, a[7], at)
+                s[p] -= stretch * points[number[p], a[0] + 2 * kernel]
+                t[p] -= stretch * points[number[p], a[0] + 2 * kernel + 1]
+
+
+@njit(**OPTIONS)
+def add_view(values, base, k, l, rows, columns, channels, weight, found):  # type: ignore[no-untyped-def]
+    """Add a view's value at pixel (k, l), interpolated linearly and dark outside, times a weight."""
+    k0, l0 = math.floor(k), math.floor(l)
+    fk, fl = np.float32(k - k0), np.float32(l - l0)
+    one = np.float32(1)
+    c, r = int(k0), int(l0)
+    if c >= 0 and c < columns - 1 and r >= 0 and r < rows - 1:
+        at = np.uint64(base + (r * columns + c) * channels)
+        right, below = np.uint64(channels), np.uint64(columns * channels)
+        w0, w1 = weight * (one - fl), weight * fl
+        w00, w01, w10, w11 = w0 * (one - fk), w0 * fk, w1 * (one - fk), w1 * fk
+        if channels == 3:
+            one64, two64 = np.uint64(1), np.uint64(2)
+            b, d, e = at + right, at + below, at + below + right
+            found[0] += w00 * values[at] + w01 * values[b] + w10 * values[d] + w11 * values[e]
+            found[1] += (
+                w00 * values[at + one64]
+                + w01 * values[b + one64]
+                + w10 * values[d + one64]
+                + w11 * values[e + one64]
+            )
+            found[2] += (
+                w00 * values[at + two64]
+                + w01 * values[b + two64]
+                + w10 * values[d + two64]
+                + w11 * values[e + two64]
+            )
+            return
+        for channel in range(channels):
+            p = at + np.uint64(channel)
+            found[channel] += (
+                w00 * values[p]
+                + w01 * values[p + right]
+                + w10 * values[p + below]
+                + w11 * values[p + below + right]
+            )
+        return
+    for dr in range(2):
+        for dc in range(2):
+            if c + dc >= 0 and c + dc < columns and r + dr >= 0 and r + dr < rows:
+                w = weight * (fl if dr else one - fl) * (fk if dc else one - fk)
+                for channel in range(channels):
+                    found[channel] += w * values[base + ((r + dr) * columns + c + dc) * channels + channel]
+
+
+@njit(**OPTIONS)
+def add_rays(  # type: ignore[no-untyped-def]
+    values, views, channels, index, motion, between, ends, n, half, x, y, s, t, share, sums, offsets, weights,
+    tally,
+):  # fmt: skip
+    """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
+
+    ``tally`` collects the weights of all rays and of those that the light field does not hold; ``offsets`` and
+    ``weights`` are room for the rows of one ray.
+    """
+    nv, nu, nt, ns = views[0], views[1], views[2], views[3]
+    m = index
+    flat = sums.reshape(-1)
+    # Where x and y do not mix, the pixels looked at in four views are two columns and two rows.
+    parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
+    vectors = parted and (channels == 1 or channels == 3 or channels == 4)
+    line, picture, row_of_views = ns * channels, nt * ns * channels, nu * nt * ns * channels
+    last = len(values) - LANES
+    for p in range(n):
+        weight = share[p]
+        if weight == 0.0:
+            continue
+        i = m[0, 0] * x[p] + m[0, 1] * y[p] + m[0, 2] * s[p] + m[0, 3] * t[p] + m[0, 4]
+        j = m[1, 0] * x[p] + m[1, 1] * y[p] + m[1, 2] * s[p] + m[1, 3] * t[p] + m[1, 4]
+        if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
+            if ends:
+                tally[0] += weight
+                tally[1] += weight
+            continue
+        tally[0] += weight
+        k = m[2, 0] * x[p] + m[2, 1] * y[p] + m[2, 2] * s[p] + m[2, 3] * t[p] + m[2, 4]
+        l = m[3, 0] * x[p] + m[3, 1] * y[p] + m[3, 2] * s[p] + m[3, 3] * t[p] + m[3, 4]
+        if not (k >= -0.5 and k <= ns - 0.5 and l >= -0.5 and l <= nt - 0.5):
+            tally[1] += weight
+            if not (k > -1e9 and k < 1e9 and l > -1e9 and l < 1e9):
+                continue
+        ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
+        if not between:
+            i0, j0 = int(ci + 0.5), int(cj + 0.5)
+            base = j0 * row_of_views + i0 * picture
+            add_view(values, base, k, l, nt, ns, channels, np.float32(weight), sums[half[p]])
+            continue
+        i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
+        fi, fj = ci - i0, cj - j0
+        if vectors:
+            k0, l0 = k + motion[0, 0] * (i - i0), l + motion[1, 1] * (j - j0)
+            k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
+            kf0, kf1, lf0, lf1 = math.floor(k0), math.floor(k1), math.floor(l0), math.floor(l1)
+            inside = (
+                min(kf0, kf1) >= 0 and max(kf0, kf1) < ns - 1 and min(lf0, lf1) >= 0 and max(lf0, lf1) < nt - 1
+            )
+            c0, c1, r0, r1 = int(kf0) * channels, int(kf1) * channels, int(lf0) * line, int(lf1) * line
+            base = j0 * row_of_views + i0 * picture
+            if inside and base + row_of_views + picture + max(r0, r1) + line + max(c0, c1) <= last:
+                fk0, fk1, fl0, fl1 = k0 - kf0, k1 - kf1, l0 - lf0, l1 - lf1
+                w0, w1 = weight * (1 - fj), weight * fj
+                w00, w01, w10, w11 = w0 * (1 - fi), w0 * fi, w1 * (1 - fi), w1 * fi
+                put_row(offsets, weights, 0, base + r0 + c0, w00 * (1 - fl0), fk0)
+                put_row(offsets, weights, 1, base + r0 + line + c0, w00 * fl0, fk0)
+                base += picture
+                put_row(offsets, weights, 2, base + r0 + c1, w01 * (1 - fl0), fk1)
+                put_row(offsets, weights, 3, base + r0 + line + c1, w01 * fl0, fk1)
+                base += row_of_views - picture
+                put_row(offsets, weights, 4, base + r1 + c0, w10 * (1 - fl1), fk0)
+                put_row(offsets, weights, 5, base + r1 + line + c0, w10 * fl1, fk0)
+                base += picture
+                put_row(offsets, weights, 6, base + r1 + c1, w11 * (1 - fl1), fk1)
+                put_row(offsets, weights, 7, base + r1 + line + c1, w11 * fl1, fk1)
+                at = half[p] * sums.shape[1]
+                if channels == 3:
+                    add_rows_of_3(values, offsets, weights, flat, at)
+                elif channels == 1:
+                    add_rows_of_1(values, offsets, weights, flat, at)
+                else:
+                    add_rows_of_4(values, offsets, weights, flat, at)
+                continue
+        for dj in range(2):
+            wj = weight * (fj if dj else 1.0 - fj)
+            if wj == 0.0:
+                continue
+            for di in range(2):
+                w = wj * (fi if di else 1.0 - fi)
+                if w == 0.0:
+                    continue
+                away_i, away_j = i - (i0 + di), j - (j0 + dj)
+                view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j
+                view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
+                base = (j0 + dj) * row_of_views + (i0 + di) * picture
+                add_view(values, base, view_k, view_l, nt, ns, channels, np.float32(w), sums[half[p]])
+
+
+@njit(**OPTIONS)
+def fold_lanes(sums, channels):  # type: ignore[no-untyped-def]
+    """Add the right pixels' channels to the left ones', where vectors left them apart."""
+    if channels == 1 or channels == 3 or channels == 4:
+        for half in range(2):
+            for channel in range(channels):
+                sums[half, channel] += sums[half, channels + channel]
+
+
+@njit(**OPTIONS)
+def put_row(offsets, weights, row, offset, weight, right):  # type: ignore[no-untyped-def]
+    """One row of two pixels: where it begins, and the weights of the left and the right one."""
+    offsets[row] = offset
+    weights[2 * row] = np.float32(weight * (1 - right))
+    weights[2 * row + 1] = np.float32(weight * right)
+
+
+@njit(**OPTIONS)
+def hashed(number, seed):  # type: ignore[no-untyped-def]
+    """See `vcc.plan.rays.hashed`."""
+    h = np.uint32(number & 0xFFFFFFFF) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
+    h = np.uint32(np.uint32(h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B))
+    h = np.uint32(np.uint32(h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35))
+    return np.uint32(h ^ (h >> np.uint32(16)))
+
+
+@njit(**OPTIONS)
+def set_box(boxes, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
+    """Numbers by which `box_of` finds the places in a cell that light comes through, along one axis."""
+    gain = cells[6, axis] + power * cells[8, axis]
+    if abs(gain) < 1e-12:
+        gain = 1e-12
+    rest = cells[10, axis] - cells[9, axis] + cells[8, axis] * (power * centre + slope)
+    boxes[axis, 0] = rest / gain
+    boxes[axis, 1] = -cells[7, axis] / gain
+    boxes[axis, 2] = cells[11, axis] / abs(gain)
+    boxes[axis, 3] = centre - cells[12, axis]
+    boxes[axis, 4] = centre + cells[12, axis]
+
+
+@njit(**OPTIONS)
+def box_of(boxes, axis, place):  # type: ignore[no-untyped-def]
+    """(low, high) of the places in a cell, along one axis, that light from a place on the sensor comes through."""
+    middle = boxes[axis, 0] + boxes[axis, 1] * place
+    low = max(middle - boxes[axis, 2], boxes[axis, 3])
+    return low, max(min(middle + boxes[axis, 2], boxes[axis, 4]), low)
+
+
+@njit(**OPTIONS)
+def cells_seen(cells, cell_kinds, cell_whole, x, y, pixels, near):  # type: ignore[no-untyped-def]
+    """Fill ``near`` with the (row, column) of the cells through which a pixel sees the stop; returns how many."""
+    turn = cells[0:3].ravel()
+    centre_x = (cells[10, 0] - cells[9, 0] - cells[7, 0] * x) / cells[6, 0]
+    centre_y = (cells[10, 1] - cells[9, 1] - cells[7, 1] * y) / cells[6, 1]
+    row, column, _, _ = cell_of(cell_whole[0], turn, centre_x, centre_y)
+    found = 0
+    for r in range(row - cell_whole[3], row + cell_whole[3] + 1):
+        for c in range(column - cell_whole[4], column + cell_whole[4] + 1):
+            centre_x, centre_y = centre_of(cell_whole[0], turn, r, c)
+            kind = (r % cell_whole[1]) * cell_whole[2] + c % cell_whole[2]
+            power = cell_kinds[kind, 0]
+            seen = True
+            for axis in range(2):
+                place = x if axis == 0 else y
+                centre = centre_x if axis == 0 else centre_y
+                # p(a) = gain·a + rest over the cell and the pixel must meet the stop
+                gain = cells[6, axis] + power * cells[8, axis]
+                rest = cells[7, axis] * place - cells[8, axis] * (power * centre + cell_kinds[kind, 1 + axis])
+                off = abs(gain * centre + rest + cells[9, axis] - cells[10, axis])
+                loose = abs(gain) * cells[12, axis] + abs(cells[7, axis]) * pixels[axis, 2] / 2
+                if off > cells[11, axis] + loose * (1 + 1e-9):
+                    seen = False
+            if seen:
+                near[found, 0], near[found, 1] = r, c
+                found += 1
+    return found
+
+
+@njit(**OPTIONS)
+def add_tile(  # type: ignore[no-untyped-def]
+    values, views, channels, scale, pixels, tile, samples, block_shift, seed, points, window, scatter, cells,
+    cell_kinds, cell_whole, codes, whole, real, shares, slopes, index, motion, between, ends, picture, tally,
+):  # fmt: skip
+    """The pixels of a tile, into picture (rows, columns, channels).
+
+    Args:
+        values: samples of the light field, flat.
+        views: (v, u, t, s).
+        channels: numbers a sample.
+        scale: factor on everything.
+        pixels: (2, 3): first place, pitch and sensitive size along (x, y).
+        tile: (first row, row after the last, first column, column after the last).
+        samples: rays a pixel.
+        block_shift: which block beside the hashed one is taken, see `vcc.engines.rays`.
+        seed: of the hash.
+        points: the table.
+        window: (2, 5): slopes from point, from sensor, and offset; and a third row with the solid angle.
+        scatter: (diffusers, 5): column of the table and slopes from what the diffuser does, see `Window`.
+        cells: rows of numbers by axis (x, y) where rays are aimed through cells, else empty.
+        cell_kinds: (kinds, 3): power, δs, δt.
+        cell_whole: layout, rows and columns of kinds, reach in rows and columns.
+        codes: see `vcc.plan.steps.Packer`, likewise the next four.
+        whole: see above.
+        real: see above.
+        shares: see above.
+        slopes: see above.
+        index: 4×5, indices from rays.
+        motion: 2×2.
+        between: whether views are interpolated.
+        ends: whether rays outside the grid of views are missing.
+        picture: where to write.
+        tally: (weights of rays, of missing rays, squared differences of the halves, rays) are added here.
+    """
+    x, y, s, t, share = np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET)
+    number, half = np.empty(PACKET, dtype=np.int64), np.empty(PACKET, dtype=np.int64)
+    sums = np.zeros((2, max(channels, LANES)), dtype=np.float32)
+    offsets, weights = np.empty(8, dtype=np.int64), np.empty(16, dtype=np.float32)
+    rows_there, columns_there = picture.shape[0], picture.shape[1]
+    by_cell = cells.shape[0] > 0
+    blocks = points.shape[0] // samples
+    near = np.empty((256, 2), dtype=np.int64)
+    turn = cells[0:3].ravel()
+    boxes = np.empty((2, 5))
+    box_is_cell = cell_whole[0] == 0 and (not by_cell or turn[1] == 0.0)
+    per_slope_x = 1 / cells[4, 0] if by_cell else 1.0
+    per_slope_y = 1 / cells[4, 1] if by_cell else 1.0
+    cell_row = cell_column = 0
+    for row in range(tile[0], min(tile[1], rows_there)):
+        for column in range(tile[2], min(tile[3], columns_there)):
+            middle_x = pixels[0, 0] + column * pixels[0, 1]
+            middle_y = pixels[1, 0] + row * pixels[1, 1]
+            block = hashed(row * columns_there + column, seed) & np.uint32(blocks - 1)
+            first = (np.int64(block) ^ block_shift) * samples
+            sums[:] = 0
+            n, rays = 0, 0
+            cells_near = 1
+            if by_cell:
+                cells_near = cells_seen(cells, cell_kinds, cell_whole, middle_x, middle_y, pixels, near)
+            for q in range(cells_near):
+                if by_cell:
+                    cell_row, cell_column = near[q, 0], near[q, 1]
+                    centre_x, centre_y = centre_of(cell_whole[0], turn, cell_row, cell_column)
+                    kind = (cell_row % cell_whole[1]) * cell_whole[2] + cell_column % cell_whole[2]
+                    set_box(boxes, cells, 0, centre_x, cell_kinds[kind, 0], cell_kinds[kind, 1])
+                    set_box(boxes, cells, 1, centre_y, cell_kinds[kind, 0], cell_kinds[kind, 2])
+                for sample in range(samples):
+                    point = points[first + sample]
+                    px = middle_x + point[0] * pixels[0, 2]
+                    py = middle_y + point[1] * pixels[1, 2]
+                    if by_cell:
+                        low_x, high_x = box_of(boxes, 0, px)
+                        low_y, high_y = box_of(boxes, 1, py)
+                        area = (high_x - low_x) * (high_y - low_y)
+                        if area <= 0.0:
+                            continue
+                        a = (low_x + high_x) / 2 + (high_x - low_x) / 2 * point[2]
+                        b = (low_y + high_y) / 2 + (high_y - low_y) / 2 * point[3]
+                        if not box_is_cell:
+                            own_row, own_column, _, _ = cell_of(cell_whole[0], turn, a, b)
+                            if own_row != cell_row or own_column != cell_column:
+                                continue
+                        s[n] = (a - cells[3, 0] * px - cells[5, 0]) * per_slope_x
+                        t[n] = (b - cells[3, 1] * py - cells[5, 1]) * per_slope_y
+                        share[n] = area * abs(per_slope_x * per_slope_y)
+                    else:
+                        a, b = np.float64(point[2]), np.float64(point[3])
+                        s[n] = (
+                            window[0, 0] * a
+                            + window[0, 1] * b
+                            + window[0, 2] * px
+                            + window[0, 3] * py
+                            + window[0, 4]
+                        )
+                        t[n] = (
+                            window[1, 0] * a
+                            + window[1, 1] * b
+                            + window[1, 2] * px
+                            + window[1, 3] * py
+                            + window[1, 4]
+                        )
+                        for term in range(len(scatter)):
+                            at = int(scatter[term, 0])
+                            s[n] += scatter[term, 1] * point[at] + scatter[term, 2] * point[at + 1]
+                            t[n] += scatter[term, 3] * point[at] + scatter[term, 4] * point[at + 1]
+                        share[n] = window[2, 0]
+                    x[n], y[n] = px, py
+                    number[n], half[n] = first + sample, 1 if 2 * sample >= samples else 0
+                    n += 1
+                    if n == PACKET:
+                        take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t, share)
+                        add_rays(
+                            values, views, channels, index, motion, between, ends, n, half, x, y, s, t, share,
+                            sums, offsets, weights, tally,
+                        )  # fmt: skip
+                        rays += n
+                        n = 0
+            if n > 0:
+                take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t, share)
+                add_rays(
+                    values, views, channels, index, motion, between, ends, n, half, x, y, s, t, share, sums,
+                    offsets, weights, tally,
+                )  # fmt: skip
+                rays += n
+            tally[3] += rays
+            fold_lanes(sums, channels)
+            for channel in range(channels):
+                one, two = sums[0, channel] * scale / samples, sums[1, channel] * scale / samples
+                picture[row, column, channel] = one + two
+                tally[2] += (one - two) ** 2

@@ -1,0 +1,95 @@
+"""Prisms of several plane faces that meet in the middle: the biprism, and pyramids."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vcc.errors import InputError
+from vcc.optics.deflections import FacetDeflection
+from vcc.optics.faces import Element, Faces
+from vcc.patterns import Circle
+
+
+@dataclass(frozen=True)
+class Biprism(Element):
+    """Two prisms whose bases meet in a line through the middle: Fresnel's biprism.
+
+    Before a camera it shows a point of the scene twice, which makes a stereo camera of it (Lee and Kweon 2000).
+    A face inclined by the angle α, of glass of index n, deflects by about (n − 1)·α.
+
+    Args:
+        deflection: δ, a slope: where x > 0, Δs = −δ, and where x < 0, Δs = +δ. Greater than 0, both halves bend
+            towards the line where they meet; less than 0, away from it; 0 does nothing.
+        rotation: of that line, which runs along y at 0, radians, from x towards y.
+        diameter: of a round rim, metres; None lets rays pass at any distance from the axis.
+
+    Raises:
+        InputError: a deflection or rotation that is not finite, a diameter of 0 or less.
+    """
+
+    deflection: float
+    rotation: float = field(default=0.0, metadata={"unit": "angle"})
+    diameter: float | None = field(default=None, metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check(self)
+
+    def faces(self) -> Faces:
+        """Two facets, each bending along its own direction, and a rim if there is a diameter."""
+        return _facets(self, 2)
+
+
+@dataclass(frozen=True)
+class Pyramid(Element):
+    """A pyramid of plane facets around the axis: one picture of the scene through each of them.
+
+    Args:
+        sides: how many facets, 3 or more.
+        deflection: δ, a slope: each facet bends light by δ against the direction in which it lies, towards the
+            axis where greater than 0, away from it where less; 0 does nothing.
+        rotation: of the facets, radians, from x towards y; at 0 the middle of a facet lies to the right.
+        diameter: of a round rim, metres; None lets rays pass at any distance from the axis.
+
+    Raises:
+        InputError: fewer than 3 sides, a deflection or rotation that is not finite, a diameter of 0 or less.
+    """
+
+    sides: int
+    deflection: float
+    rotation: float = field(default=0.0, metadata={"unit": "angle"})
+    diameter: float | None = field(default=None, metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (self.sides >= 3 and self.sides % 1 == 0):
+            raise InputError(
+                f"sides of {self.label} is a whole number, 3 or more, not {self.sides}; "
+                "two sides make a vcc.Biprism"
+            )
+        _check(self)
+
+    def faces(self) -> Faces:
+        """Facets around the middle, each bending along its own direction, and a rim if there is a diameter."""
+        return _facets(self, int(self.sides))
+
+
+def _check(element: Biprism | Pyramid) -> None:
+    for name in ("deflection", "rotation"):
+        if not math.isfinite(getattr(element, name)):
+            raise InputError(f"{name} of {element.label} must be a finite number, not {getattr(element, name)}")
+    if element.diameter is not None and not (element.diameter > 0 and math.isfinite(element.diameter)):
+        raise InputError(
+            f"diameter of {element.label} must be greater than 0 m, not {element.diameter}; "
+            "leave it out for one without a rim"
+        )
+
+
+def _facets(element: Biprism | Pyramid, number: int) -> Faces:
+    angles = element.rotation + 2 * math.pi * np.arange(number) / number
+    outward = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    rim = None if element.diameter is None else Circle(element.diameter)
+    return Faces(deflection=FacetDeflection(outward, -element.deflection * outward), transmission=rim)

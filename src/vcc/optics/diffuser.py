@@ -1,0 +1,249 @@
+"""Diffusers: the paper's third category of optics, which scatters light (section 3.2.2)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.errors import InputError
+from vcc.kernels import SUM_TOLERANCE, Kernel, Samples
+from vcc.optics.faces import Element, Faces
+from vcc.optics.scatter import Scatter, SheetMap
+from vcc.patterns import Bounded, Circle, Open, Pattern
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Diffuser(Element):
+    """A diffuser that scatters light alike wherever it is hit.
+
+    L'(u, v, s, t) = ∫∫ D(δs, δt) L(u, v, s − δs, t − δt) dδs dδt: a ray keeps its place and leaves with its
+    slope changed by (δs, δt) with probability density D (paper, section 3.2.2: a convolution of the light field
+    along its slopes). No light is lost but beyond the rim.
+
+    Args:
+        kernel: D: a kernel of `vcc.kernels`, or an array of shares, (rows of δt, columns of δs), its middle δ = 0.
+        slope_pitch: width of the array's cells in slope; for an array only.
+        normalise: divide an array by its sum; without it, it must sum to 1.
+        diameter: of a round diffuser, metres; outside is opaque.
+        width: of a rectangular diffuser, metres; outside is opaque. Without diameter and width there is no rim.
+        height: of a rectangular diffuser, metres; None makes it square.
+
+    Raises:
+        InputError: what `vcc.kernels.Samples` refuses in an array (negative, not finite, another sum than 1), an
+            array without a pitch, a kernel with one, a size of zero or less, both a diameter and a width.
+    """
+
+    kernel: Kernel | NDArray[np.float64]
+    slope_pitch: float | None = None
+    normalise: bool = False
+    diameter: float | None = field(default=None, metadata={"unit": "length"})
+    width: float | None = field(default=None, metadata={"unit": "length"})
+    height: float | None = field(default=None, metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("diameter", "width", "height"):
+            _check_size(self, name)
+        if self.diameter is not None and (self.width is not None or self.height is not None):
+            raise InputError(f"{self.label} has a diameter and a width or height: give one, round or rectangular")
+        if self.height is not None and self.width is None:
+            raise InputError(f"{self.label} has a height and no width: give both, or a width alone for a square")
+        object.__setattr__(self, "kernel", self._as_kernel())
+        # What only says how to read an array is spent, so that equal diffusers have equal parameters.
+        object.__setattr__(self, "slope_pitch", None)
+        object.__setattr__(self, "normalise", False)
+
+    def _as_kernel(self) -> Kernel:
+        if isinstance(self.kernel, Kernel):
+            if self.slope_pitch is not None or self.normalise:
+                raise InputError(
+                    f"slope_pitch and normalise of {self.label} are for an array, "
+                    f"not for {self.kernel.described()}"
+                )
+            return self.kernel
+        if self.slope_pitch is None:
+            raise InputError(
+                f"the kernel of {self.label} is an array: give the width of its cells in slope, "
+                "e.g. slope_pitch=1e-3"
+            )
+        try:
+            return Samples(np.asarray(self.kernel, dtype=np.float64), self.slope_pitch, self.normalise)
+        except InputError as error:
+            raise InputError(f"{self.label}: {error}") from None
+        except (ValueError, TypeError):
+            raise InputError(
+                f"the kernel of {self.label} is a vcc.kernels.Kernel or rows of equally many numbers, "
+                f"not {type(self.kernel).__name__}"
+            ) from None
+
+    def faces(self) -> Faces:
+        """The kernel, and a rim if there is a size."""
+        assert isinstance(self.kernel, Kernel)
+        rim: Pattern | None = None
+        if self.diameter is not None:
+            rim = Circle(self.diameter)
+        elif self.width is not None:
+            rim = Bounded(Open(), self.width, self.width if self.height is None else self.height)
+        return Faces(transmission=rim, scatter=self.kernel)
+
+
+@dataclass(frozen=True, eq=False)
+class CodedDiffuser(Element):
+    """A diffuser whose kernel varies over its surface: D(δs, δt | u, v) (paper, eq. 6).
+
+    D(δ | u, v) = Σₙ weightₙ(u, v) · Dₙ(δ / w(u, v)) / w(u, v)²: kernels mixed by weights, stretched by w.
+
+    Args:
+        kernels: one kernel or several.
+        width: of the sheet, metres; outside is opaque.
+        weights: the kernels' shares over the sheet, shape (n, rows, columns), row 0 at the top; they sum to 1 at
+            each place. Needed for several kernels.
+        widths: the factor w ≥ 0 by which the kernels are stretched over the sheet, shape (rows, columns). With
+            `vcc.kernels.Gaussian(1.0)` this is the map of σ itself. Needed for a single kernel. At 0 light passes
+            unscattered.
+        height: of the sheet, metres; None keeps cells square.
+        normalise: divide the weights by their sum at each place.
+
+    Numbers hold in the middles of the cells and are interpolated bilinearly between them.
+
+    Raises:
+        InputError: no kernels or what is not one, neither weights nor widths, shapes that do not fit, numbers
+            that are negative or not finite, weights that do not sum to 1 without ``normalise``, widths that are 0
+            throughout, a size of zero or less.
+    """
+
+    kernels: Kernel | tuple[Kernel, ...]
+    width: float = field(metadata={"unit": "length"})
+    weights: NDArray[np.float64] | None = None
+    widths: NDArray[np.float64] | None = None
+    height: float | None = field(default=None, metadata={"unit": "length"})
+    normalise: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("width", "height"):
+            _check_size(self, name)
+        kernels = (self.kernels,) if isinstance(self.kernels, Kernel) else tuple(self.kernels)
+        for kernel in kernels:
+            if not isinstance(kernel, Kernel):
+                raise InputError(f"kernels of {self.label} are vcc.kernels.Kernel, not {type(kernel).__name__}")
+        object.__setattr__(self, "kernels", kernels)
+        object.__setattr__(self, "weights", self._checked_weights(len(kernels)))
+        object.__setattr__(self, "normalise", False)
+        object.__setattr__(self, "widths", self._checked_widths())
+        if self.height is None:
+            shapes = {values.shape[-2:] for values in (self.weights, self.widths) if values is not None}
+            ratios = {rows / columns for rows, columns in shapes}
+            if len(ratios) > 1:
+                raise InputError(
+                    f"weights and widths of {self.label} have cells of different shapes: give the sheet's height"
+                )
+            object.__setattr__(self, "height", self.width * ratios.pop())
+
+    def _checked_weights(self, kernels: int) -> Array | None:
+        if kernels == 0:
+            raise InputError(f"{self.label} has no kernels: give one or more")
+        if self.weights is None:
+            if kernels > 1:
+                raise InputError(
+                    f"{self.label} has {kernels} kernels and no weights: give an array ({kernels}, rows, columns)"
+                )
+            if self.widths is None:
+                raise InputError(
+                    f"{self.label} has one kernel and no widths: it is alike everywhere, and that is vcc.Diffuser"
+                )
+            return None
+        weights = self._checked_map("weights", self.weights)
+        if weights.ndim != 3 or weights.shape[0] != kernels:
+            raise InputError(
+                f"weights of {self.label} have shape ({kernels}, rows, columns), one map a kernel, "
+                f"not {weights.shape}"
+            )
+        sums = weights.sum(axis=0)
+        worst = tuple(int(n) for n in np.unravel_index(np.abs(sums - 1).argmax(), sums.shape))
+        if self.normalise:
+            if not sums.all():
+                dark = tuple(int(n) for n in np.argwhere(sums == 0)[0])
+                raise InputError(f"weights of {self.label} are all 0 in cell {dark}: they cannot be normalised")
+            weights = weights / sums
+        elif abs(sums[worst] - 1) > SUM_TOLERANCE:
+            raise InputError(
+                f"weights of {self.label} sum to {sums[worst]:.9g} in cell {worst}, and must to 1, or light would "
+                "be made or lost: divide them by their sum, or pass normalise=True"
+            )
+        weights.flags.writeable = False
+        return weights
+
+    def _checked_widths(self) -> Array | None:
+        if self.widths is None:
+            return None
+        widths = self._checked_map("widths", self.widths)
+        if widths.ndim != 2:
+            raise InputError(f"widths of {self.label} have shape (rows, columns), not {widths.shape}")
+        if not widths.any():
+            raise InputError(f"widths of {self.label} are 0 throughout: it would scatter nothing")
+        widths.flags.writeable = False
+        return widths
+
+    def _checked_map(self, name: str, given: object) -> Array:
+        try:
+            values = np.array(given, dtype=np.float64)
+        except (ValueError, TypeError):
+            raise InputError(f"{name} of {self.label} are an array of numbers") from None
+        if values.size == 0:
+            raise InputError(f"{name} of {self.label} are empty: shape {values.shape}")
+        if not np.isfinite(values).all():
+            bad = tuple(int(n) for n in np.argwhere(~np.isfinite(values))[0])
+            raise InputError(f"{name} of {self.label} must be finite; at index {bad} there is {values[bad]}")
+        if values.min() < 0:
+            bad = tuple(int(n) for n in np.unravel_index(values.argmin(), values.shape))
+            raise InputError(f"{name} of {self.label} are 0 or more; at index {bad} there is {values[bad]:g}")
+        return values
+
+    def faces(self) -> Faces:
+        """The kernels with their maps over the sheet, opaque outside."""
+        assert isinstance(self.kernels, tuple)
+        assert self.height is not None
+        weights = None if self.weights is None else SheetMap(self.weights, self.width, self.height)
+        stretch = None if self.widths is None else SheetMap(self.widths, self.width, self.height)
+        largest = 1.0 if self.widths is None else float(self.widths.max())
+        return Faces(
+            transmission=Bounded(Open(), self.width, self.height),
+            scatter=Scatter(self.kernels, weights=weights, width=stretch, largest_width=largest),
+        )
+
+    def described(self) -> str:
+        """The kernels, the cells of the maps and the sheet's size in words."""
+        from vcc.units import short
+
+        assert isinstance(self.kernels, tuple)
+        assert self.height is not None
+        parts = [", ".join(kernel.described() for kernel in self.kernels)]
+        for verb, values in (("mixed", self.weights), ("stretched", self.widths)):
+            if values is not None:
+                rows, columns = values.shape[-2:]
+                parts.append(f"{verb} over {rows}×{columns} cells")
+        return "; ".join([*parts, f"width {short(self.width)}, height {short(self.height)}"])
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and all(
+            np.array_equal(getattr(self, one.name), getattr(other, one.name))
+            if one.name in ("weights", "widths")
+            else getattr(self, one.name) == getattr(other, one.name)
+            for one in fields(self)
+        )
+
+    def __hash__(self) -> int:
+        maps = tuple(None if values is None else values.tobytes() for values in (self.weights, self.widths))
+        return hash((self.kernels, maps, self.width, self.height, self.z, self.decentre, self.name))
+
+
+def _check_size(element: Element, name: str) -> None:
+    size = getattr(element, name)
+    if size is not None and not (size > 0 and math.isfinite(size)):
+        raise InputError(f"{name} of {element.label} must be greater than 0 m, not {size}")

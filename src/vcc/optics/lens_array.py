@@ -1,0 +1,255 @@
+"""Arrays of lenslets and of prisms: what plenoptic cameras are made of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.errors import InputError
+from vcc.optics.deflections import CellDeflection
+from vcc.optics.faces import Element, Faces
+from vcc.optics.lattice import CellApertures, CellBlock, Lattice, interleaved
+from vcc.patterns import Bounded, Open, Pattern
+
+LARGEST_DISC = {"square": math.pi / 4, "hexagonal": math.pi / (2 * math.sqrt(3))}
+"""The share of a cell that the largest disc in it covers."""
+
+
+@dataclass(frozen=True)
+class LensArray(Element):
+    """A sheet of equal lenslets side by side, on a square or hexagonal lattice, of one or several focal lengths.
+
+    Within a cell centred at c the deflection is that of a thin lens: Δs = −(x − c)/f. With the sensor f behind,
+    each lenslet images the main lens (Ng et al. 2005: plenoptic 1.0); with the sensor at another distance b it
+    relays a picture formed at a before it, 1/a + 1/b = 1/f (Lumsdaine and Georgiev 2009: focused plenoptic, 2.0).
+    With ``focal_length=math.inf``, circular openings and a small fill factor it is an array of pinholes.
+
+    Args:
+        pitch: distance between the centres of neighbouring lenslets, metres.
+        focal_length: of the lenslets, metres, negative for diverging ones, infinite for none; several are
+            interleaved so that neighbours differ (`vcc.optics.lattice.interleaved`), the first at ``offset``.
+        layout: ``"square"`` or ``"hexagonal"`` (every second row shifted by half a pitch).
+        rotation: of the rows against x, radians, from x towards y.
+        offset: place (x, y) of the centre of a lenslet from the element's middle, metres; at (0, 0) one is centred
+            there.
+        fill_factor: share of a cell's area that is clear, greater than 0, up to 1, in the middle of an opaque
+            border; None leaves as much clear as the openings' shape allows.
+        circular: whether openings are discs, which cover at most π/4 of a square cell and π/(2√3) of a hexagonal
+            one; otherwise they have the shape of the cells.
+        width: of the whole sheet, metres, opaque outside; None leaves it unbounded.
+        height: metres; None makes the sheet square.
+
+    Raises:
+        InputError: a pitch of 0 or less, a focal length of 0 or not a number, an unknown layout, a fill factor
+            that openings of this shape cannot have, a size of 0 or less, or a height without a width.
+    """
+
+    pitch: float = field(metadata={"unit": "length"})
+    focal_length: float | tuple[float, ...] = field(metadata={"unit": "length"})
+    layout: str = "square"
+    rotation: float = field(default=0.0, metadata={"unit": "angle"})
+    offset: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
+    fill_factor: float | None = None
+    circular: bool = False
+    width: float | None = field(default=None, metadata={"unit": "length"})
+    height: float | None = field(default=None, metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.focal_length, int | float):
+            object.__setattr__(self, "focal_length", tuple(float(length) for length in self.focal_length))
+        if not self.focal_lengths:
+            raise InputError(f"focal_length of {self.label} is an empty list: give one or more, in metres")
+        for focal_length in self.focal_lengths:
+            if focal_length == 0 or math.isnan(focal_length):
+                raise InputError(f"focal_length of {self.label} is {focal_length} m: it must not be 0")
+        object.__setattr__(self, "offset", _lattice(self, self.offset).offset)
+        self._check_fill_factor()
+        for name in ("width", "height"):
+            size = getattr(self, name)
+            if size is not None and not (size > 0 and math.isfinite(size)):
+                raise InputError(f"{name} of {self.label} must be greater than 0 m, not {size}")
+        if self.height is not None and self.width is None:
+            raise InputError(f"{self.label} has a height and no width: give both, or a width alone for a square")
+
+    def _check_fill_factor(self) -> None:
+        if self.fill_factor is None:
+            return
+        if not 0 < self.fill_factor <= 1:
+            raise InputError(
+                f"fill_factor of {self.label} is greater than 0 and at most 1, not {self.fill_factor}; "
+                "leave it out for openings as large as can be"
+            )
+        # A limit worked out by hand may differ from ours in its last digits.
+        if self.circular and self.fill_factor > LARGEST_DISC[self.layout] * (1 + 1e-9):
+            raise InputError(
+                f"fill_factor of {self.label} is {self.fill_factor}, and discs cover at most "
+                f"{LARGEST_DISC[self.layout]:.4f} of {self.layout} cells: leave it out for the largest discs, or "
+                "circular out for openings in the shape of the cells"
+            )
+
+    @property
+    def focal_lengths(self) -> tuple[float, ...]:
+        """The focal length of each kind of lenslet, metres."""
+        return self.focal_length if isinstance(self.focal_length, tuple) else (float(self.focal_length),)
+
+    @property
+    def f_numbers(self) -> tuple[float, ...]:
+        """The f-number of each kind of lenslet: focal length over pitch."""
+        return tuple(focal_length / self.pitch for focal_length in self.focal_lengths)
+
+    @property
+    def lattice(self) -> Lattice:
+        """The cells, in coordinates centred on the element."""
+        return _lattice(self, self.offset)
+
+    @property
+    def kinds(self) -> NDArray[np.int64]:
+        """Which focal length each cell has, a table (rows, columns) that repeats over the lattice."""
+        return interleaved(self.layout, len(self.focal_lengths))
+
+    def micro_images(self, distance_to_main_lens: float, distance_to_sensor: float) -> Lattice:
+        """Where on the sensor the lenslets image the middle of the main lens, as a lattice in the camera's x, y.
+
+        The ray from the middle of the main lens through that of a lenslet goes on straight: the lenslets' places
+        grow by 1 + b/d around the axis, and so does their pitch (Dansereau, Pizarro and Williams 2013).
+
+        Args:
+            distance_to_main_lens: d, from the main lens, which is centred on the axis, to the array, metres.
+            distance_to_sensor: b, from the array to the sensor, metres.
+        """
+        if not distance_to_main_lens > 0 or not distance_to_sensor >= 0:
+            raise InputError(
+                f"the main lens stands before {self.label} and the sensor behind it, not "
+                f"{distance_to_main_lens} m and {distance_to_sensor} m away"
+            )
+        growth = 1 + distance_to_sensor / distance_to_main_lens
+        centre = tuple(growth * (a + b) for a, b in zip(self.decentre, self.offset, strict=True))
+        return Lattice(self.layout, growth * self.pitch, self.rotation, (centre[0], centre[1]))
+
+    def faces(self) -> Faces:
+        """A lens in each cell, and what is clear where not all is."""
+        powers = (1 / np.array(self.focal_lengths))[self.kinds]
+        deflection = CellDeflection(self.lattice, powers, np.zeros((*powers.shape, 2)))
+        return Faces(deflection=deflection if powers.any() else None, transmission=self._transmission())
+
+    def _transmission(self) -> Pattern | None:
+        opening: Pattern = Open()
+        if self.circular or self.fill_factor not in (None, 1):
+            opening = CellApertures(self.lattice, self._opening_scale(), self.circular)
+        if self.width is None:
+            return None if isinstance(opening, Open) else opening
+        return Bounded(opening, self.width, self.width if self.height is None else self.height)
+
+    def _opening_scale(self) -> float:
+        """The openings' size as a share of the cells': of discs, diameter over pitch."""
+        largest = LARGEST_DISC[self.layout] if self.circular else 1.0
+        return 1.0 if self.fill_factor is None else min(math.sqrt(self.fill_factor / largest), 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PrismArray(Element):
+    """So many rows and columns of prisms side by side, each of its own deflection, opaque around them.
+
+    With a focal length, each cell is a lens too: the lens-prism array with which Georgiev and Intwala (2006) take
+    a light field by one picture; a lens moved by −f·δ within its cell does the same as a prism of deflection δ.
+
+    Args:
+        slopes: (δs, δt) that each cell adds to rays, (rows, columns, 2), row 0 at the top, column 0 at the left.
+        pitch: distance between the centres of neighbouring cells, metres.
+        layout: ``"square"``, or ``"hexagonal"``: every second row, from the second on, stands half a pitch to
+            the right. The middle of the rectangle around all cells is the element's middle.
+        focal_length: of all cells, metres; None for prisms alone.
+        rotation: of the array around the element's middle, radians, from x towards y. It does not turn slopes.
+
+    Raises:
+        InputError: slopes of another shape or not finite, a pitch of 0 or less, an unknown layout, a focal length
+            of 0 or not a number.
+    """
+
+    slopes: NDArray[np.float64]
+    pitch: float = field(metadata={"unit": "length"})
+    layout: str = "square"
+    focal_length: float | None = field(default=None, metadata={"unit": "length"})
+    rotation: float = field(default=0.0, metadata={"unit": "angle"})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        try:
+            slopes = np.array(self.slopes, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"slopes of {self.label} are numbers (rows, columns, 2), (δs, δt) of each cell"
+            ) from None
+        if slopes.ndim != 3 or slopes.shape[2] != 2 or slopes.size == 0:
+            raise InputError(
+                f"slopes of {self.label} have the shape (rows, columns, 2), (δs, δt) of each cell, "
+                f"not {slopes.shape}"
+            )
+        if not np.isfinite(slopes).all():
+            row, column = np.argwhere(~np.isfinite(slopes))[0][:2]
+            raise InputError(
+                f"slopes of {self.label} must be finite numbers; those of cell ({row}, {column}) are "
+                f"({slopes[row, column, 0]}, {slopes[row, column, 1]})"
+            )
+        slopes.setflags(write=False)
+        object.__setattr__(self, "slopes", slopes)
+        if self.focal_length is not None and (self.focal_length == 0 or math.isnan(self.focal_length)):
+            raise InputError(
+                f"focal_length of {self.label} is {self.focal_length} m: it must not be 0; "
+                "leave it out for prisms alone"
+            )
+        _lattice(self, (0.0, 0.0))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns) of cells."""
+        return self.slopes.shape[0], self.slopes.shape[1]
+
+    @property
+    def lattice(self) -> Lattice:
+        """The cells, in coordinates centred on the element; (0, 0) is the upper left one."""
+        rows, columns = self.shape
+        around_first = _lattice(self, (0.0, 0.0))
+        # A shifted row is a quarter of a pitch to the right of the middle, as the others are to the left.
+        shifted = 0.25 if self.layout == "hexagonal" and rows > 1 else 0.0
+        across = ((columns - 1) / 2 + shifted) * self.pitch
+        down = (rows - 1) / 2 * around_first.row_height
+        cosine, sine = math.cos(self.rotation), math.sin(self.rotation)
+        return _lattice(self, (sine * down - cosine * across, -sine * across - cosine * down))
+
+    def faces(self) -> Faces:
+        """A prism in each cell, a lens too if there is a focal length, and the clear block of cells."""
+        rows, columns = self.shape
+        power = 0.0 if self.focal_length is None else 1 / self.focal_length
+        deflection = CellDeflection(self.lattice, np.full((rows, columns), power), self.slopes)
+        if self.layout == "square" and self.rotation == 0:
+            return Faces(deflection, Bounded(Open(), columns * self.pitch, rows * self.pitch))
+        return Faces(deflection, CellBlock(self.lattice, rows, columns))
+
+    def described(self) -> str:
+        """The number of cells and the parameters in words."""
+        from vcc.describe import parameters_in_words
+
+        steepest = float(np.abs(self.slopes).max())
+        words = parameters_in_words(self, leave_out=("z", "name", "slopes"))
+        return f"{self.shape[0]}×{self.shape[1]} prisms of up to {steepest:g}, {words}"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PrismArray) and all(
+            np.array_equal(getattr(self, each.name), getattr(other, each.name)) for each in fields(self)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.slopes.tobytes(), self.pitch, self.layout, self.focal_length, self.rotation, self.z))
+
+
+def _lattice(array: LensArray | PrismArray, offset: tuple[float, float]) -> Lattice:
+    """The cells of an array; errors name it."""
+    try:
+        return Lattice(array.layout, array.pitch, array.rotation, offset)
+    except InputError as error:
+        raise InputError(f"{array.label}: {error}") from None

@@ -1,0 +1,138 @@
+"""The phase plate: thin glass of any shape, which bends rays by the gradient of its optical path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.describe import parameters_in_words
+from vcc.errors import InputError
+from vcc.optics.deflections import Deflection, SlopeFunction
+from vcc.optics.faces import Element, Faces
+from vcc.patterns import Bounded, Circle, Open, Pattern
+from vcc.surfaces import Surface
+from vcc.units import short
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SurfaceDeflection(Deflection):
+    """The slopes that a surface adds to rays.
+
+    Args:
+        surface: whose optical path bends them.
+    """
+
+    surface: Surface
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """The gradient of the surface's optical path, checked."""
+        return SlopeFunction(self.surface.slopes)(*np.broadcast_arrays(x, y))
+
+    def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
+        """The surface's own bounds."""
+        return self.surface.largest(half_width, half_height)
+
+
+@dataclass(frozen=True)
+class PhasePlate(Element):
+    """A thin plate that adds an optical path OPL(x, y): rays bend by its gradient, Δs = ∂OPL/∂x, Δt = ∂OPL/∂y.
+
+    Geometric: a ray bends and is neither split nor delayed. Where diffraction matters is said in
+    docs/elements/phase-plate.md. Aberrations of a lens are a plate of `vcc.surfaces.Zernike` at the lens's z.
+
+    Args:
+        surface: a `vcc.surfaces.Surface`, or a function of (x, y) in metres (arrays of one shape) that returns
+            the slopes (Δs, Δt).
+        diameter: of a round opening, metres.
+        width: of a rectangular opening, metres.
+        height: of that, metres; None makes it square.
+
+    Without a size, a surface known on a sheet only (a height map, a path map, a rough surface) is as large as
+    its sheet, and others have no rim. Outside a plate with a rim it is dark.
+
+    Raises:
+        InputError: a surface of another type, a size of zero or less, a diameter and a width together, a height
+            without a width, or an opening larger than the surface's sheet.
+    """
+
+    surface: Surface | Callable[[Array, Array], Any]
+    diameter: float | None = field(default=None, metadata={"unit": "length"})
+    width: float | None = field(default=None, metadata={"unit": "length"})
+    height: float | None = field(default=None, metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.surface, type) or not (isinstance(self.surface, Surface) or callable(self.surface)):
+            given = self.surface.__name__ if isinstance(self.surface, type) else type(self.surface).__name__
+            raise InputError(
+                f"surface of {self.label} is a vcc.surfaces.Surface, such as Cubic(250.0), or a function of "
+                f"(x, y) that returns slopes (Δs, Δt), not {given}"
+            )
+        for name in ("diameter", "width", "height"):
+            size = getattr(self, name)
+            if size is not None and not (size > 0 and math.isfinite(size)):
+                raise InputError(f"{name} of {self.label} must be greater than 0 m, not {size}")
+        if self.diameter is not None and (self.width is not None or self.height is not None):
+            raise InputError(f"{self.label} is round or rectangular: give its diameter, or its width and height")
+        if self.height is not None and self.width is None:
+            raise InputError(f"{self.label} has a height and no width: give both")
+        self._check_that_the_sheet_fills_the_opening()
+
+    def _check_that_the_sheet_fills_the_opening(self) -> None:
+        opening = self._size
+        if opening is None or not isinstance(self.surface, Surface):
+            return
+        sheet = self.surface.size
+        if any(wanted > known * (1 + 1e-9) for wanted, known in zip(opening, sheet, strict=True)):
+            opening_words, sheet_words = (f"{short(size[0])} × {short(size[1])}" for size in (opening, sheet))
+            raise InputError(
+                f"the opening of {self.label}, {opening_words}, is larger than the sheet of its surface, "
+                f"{sheet_words}, and beyond the sheet nothing is known: make the sheet larger or the opening "
+                "smaller"
+            )
+
+    @property
+    def _size(self) -> tuple[float, float] | None:
+        """(width, height) of the opening; None where there is no rim."""
+        if self.diameter is not None:
+            return self.diameter, self.diameter
+        if self.width is not None:
+            return self.width, self.width if self.height is None else self.height
+        if isinstance(self.surface, Surface) and all(map(math.isfinite, self.surface.size)):
+            return self.surface.size
+        return None
+
+    def faces(self) -> Faces:
+        """A deflection, affine where the surface's slopes are linear, and an opening if there is a rim."""
+        return Faces(deflection=self._deflection(), transmission=self._opening())
+
+    def _deflection(self) -> Any:
+        if not isinstance(self.surface, Surface):
+            return SlopeFunction(_given_whole_arrays(self.surface))
+        affine = self.surface.affine
+        return SurfaceDeflection(self.surface) if affine is None else affine
+
+    def _opening(self) -> Pattern | None:
+        if self.diameter is not None:
+            return Circle(self.diameter)
+        return None if self._size is None else Bounded(Open(), *self._size)
+
+    def described(self) -> str:
+        """The surface and the opening in words."""
+        if isinstance(self.surface, Surface):
+            return super().described()
+        name = getattr(self.surface, "__name__", type(self.surface).__name__)
+        sizes = parameters_in_words(self, leave_out=("z", "name", "surface"))
+        return f"slopes by {name}" + (f", {sizes}" if sizes else "")
+
+
+def _given_whole_arrays(function: Callable[[Array, Array], Any]) -> Callable[[Array, Array], Any]:
+    """The function called with arrays of one shape, so that (−x/f, −y/f) returns two of that shape."""
+    return lambda x, y: function(*np.broadcast_arrays(x, y))

@@ -1,0 +1,68 @@
+"""Which kind of plan a camera gets: footprints where its optics allow them, else rays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from vcc.errors import InputError
+from vcc.plan.compiler import compile_plan, why_not_footprints
+from vcc.plan.model import Plan
+from vcc.plan.ray_compiler import compile_rays
+from vcc.plan.rays import RayPlan
+
+if TYPE_CHECKING:
+    from vcc.camera import Camera
+    from vcc.light_field import LightField
+
+
+def compile_best(
+    camera: Camera,
+    light_field: LightField,
+    *,
+    method: str = "auto",
+    interpolation: str = "linear",
+    between_views: str = "auto",
+    scene_distance: float | None = None,
+    refine: int | str = "auto",
+    samples: int | None = None,
+    seed: int = 0,
+) -> Plan | RayPlan:
+    """The plan by which an engine makes the picture; the arguments are those of `vcc.Camera.capture`.
+
+    Raises:
+        InputError: an option that does not exist, or does not go with the method.
+    """
+    if method not in ("auto", "footprints", "rays"):
+        raise InputError(f"method is 'auto', 'footprints' or 'rays', not {method!r}")
+    reason = "asked for" if method == "rays" else why_not_footprints(camera, light_field)
+    if reason is None:
+        if samples is not None:
+            raise InputError(
+                "samples is for pictures made by rays, and this camera needs none: leave it out, or pass "
+                "method='rays'"
+            )
+        return compile_plan(
+            camera,
+            light_field,
+            interpolation=interpolation,
+            between_views=between_views,
+            scene_distance=scene_distance,
+            refine=refine,
+        )
+    if method == "footprints":
+        raise InputError(f"this camera's picture cannot be made by footprints: {reason}. Use method='rays'")
+    for name, given, default in (("interpolation", interpolation, "linear"), ("refine", refine, "auto")):
+        if given != default:
+            raise InputError(
+                f"{name}={given!r} is for pictures made by footprints; this one is made by rays ({reason}): "
+                "leave it out"
+            )
+    return compile_rays(
+        camera,
+        light_field,
+        between_views=between_views,
+        scene_distance=scene_distance,
+        samples=samples,
+        seed=seed,
+        reason=reason,
+    )

@@ -1,0 +1,141 @@
+"""Rewrite rules for diffusers: when scattering is a blur of the picture, or of each view.
+
+Rule 1, blur of the picture. A uniform diffuser changes a ray's slope by δ with density D(δ), wherever the ray
+meets it. If all optics behind it are affine, the ray lands B·δ further, for every ray alike, with B the place
+on the sensor from slope at the diffuser. So the picture is convolved with D, stretched by B. Preconditions: the
+kernel is uniform; behind the diffuser's plane nothing bends rays other than affinely, nothing absorbs (a rim or
+a mask there would be met in another place by the scattered ray), and whatever else scatters is uniform too.
+What stands in the diffuser's own plane acts by position, which scattering leaves alone, and may absorb.
+
+Rule 2, blur of the views. If all optics before a uniform diffuser are affine and each view meets it in one
+place, then scattering exchanges light between the pixels of one view only: each view's picture is convolved
+with D. Preconditions: the kernel is uniform; up to the diffuser's plane nothing bends rays other than affinely,
+and what absorbs there tells views apart only.
+
+Where neither holds, rays are traced.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+
+if TYPE_CHECKING:
+    from vcc.camera import Camera, Stage
+    from vcc.light_field import LightField
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Blurs:
+    """What the diffusers of a camera come to.
+
+    Args:
+        picture: kernel in pixels that the picture is convolved with, odd rows × odd columns of sum 1, or None.
+        views: kernel in samples that each view is convolved with, likewise, or None.
+        notes: which rule was applied to what, in words.
+    """
+
+    picture: Array | None
+    views: Array | None
+    notes: tuple[str, ...] = ()
+
+
+def diffusers_as_blurs(camera: Camera, light_field: LightField) -> Blurs | str:
+    """The blurs by which the rules replace all diffusers of a camera, or why they do not."""
+    picture: Array | None = None
+    views: Array | None = None
+    notes = []
+    for n, stage in enumerate(camera.stages):
+        if stage.faces.spread is None:
+            continue
+        label = stage.element.label
+        if not stage.faces.spread.uniform:
+            return f"{label} scatters by a kernel that varies over its surface"
+        kernel = stage.faces.spread.kernels[0]
+        obstacle = behind(camera, n)
+        try:
+            if obstacle is None:
+                picture = _convolved(picture, kernel.weights(_pixels_from_slopes(camera, n)))
+                notes.append(
+                    f"blur of the picture: {label}, since all behind it is affine and nothing there absorbs"
+                )
+            elif meets_views_in_points(camera, light_field, n):
+                views = _convolved(views, kernel.weights(_samples_from_slopes(camera, light_field, n)))
+                notes.append(f"blur of each view: {label}, since each view meets it in one place")
+            else:
+                return f"{label} scatters, and {obstacle} behind it"
+        except InputError:
+            return f"{label} scatters further than a blur can reach"
+    return Blurs(picture, views, tuple(notes))
+
+
+def behind(camera: Camera, n: int) -> str | None:
+    """What forbids rule 1 for the diffuser that is stage n, in words; None if nothing does."""
+    same_plane = True
+    for stage in camera.stages[n + 1 :]:
+        same_plane = same_plane and np.array_equal(stage.approach.matrix, np.eye(5))
+        label = stage.element.label
+        if same_plane and stage.faces.bending is None:
+            continue
+        if stage.faces.bending is not None:
+            return f"{label} bends rays by a function of position that is not affine"
+        if stage.faces.pattern is not None:
+            return f"{label} absorbs"
+        if stage.faces.spread is not None and not stage.faces.spread.uniform:
+            return f"{label} scatters by a kernel that varies over its surface"
+    return None
+
+
+def meets_views_in_points(camera: Camera, light_field: LightField, n: int) -> bool:
+    """Whether each view meets stage n, and all that absorbs before it, in one place (rule 2)."""
+    rays = Affine.identity()
+    size = np.array([light_field.shape[3], light_field.shape[2]])
+    for m, stage in enumerate(camera.stages[: n + 1]):
+        rays = stage.approach @ rays
+        if stage.faces.bending is not None:
+            return False
+        if m == n or stage.faces.pattern is not None:
+            place = (rays @ light_field.frame).linear[:2]
+            travel = np.abs(place[:, 2:]) @ size
+            if (travel > 1e-6 * np.abs(place[:, :2]).sum(axis=1)).any():
+                return False
+        rays = _behind_lens(stage, rays)
+    return True
+
+
+def _behind_lens(stage: Stage, rays: Affine) -> Affine:
+    return rays if stage.centred is None else stage.centred @ rays
+
+
+def _pixels_from_slopes(camera: Camera, n: int) -> Array:
+    """2×2: pixels on the sensor by which a ray moves for a change of slope at stage n."""
+    rays = Affine.identity()
+    for stage in camera.stages[n + 1 :]:
+        rays = _behind_lens(stage, stage.approach @ rays)
+    to_sensor = camera.approach_to_sensor @ rays
+    return np.asarray(camera.sensor.frame.inverse().linear @ to_sensor.linear[:2, 2:])
+
+
+def _samples_from_slopes(camera: Camera, light_field: LightField, n: int) -> Array:
+    """2×2: samples of a view by which a ray moves for a change of slope at stage n."""
+    rays = Affine.identity()
+    for stage in camera.stages[:n]:
+        rays = _behind_lens(stage, stage.approach @ rays)
+    rays = camera.stages[n].approach @ rays
+    return np.asarray((rays @ light_field.frame).inverse().linear[2:, 2:])
+
+
+def _convolved(one: Array | None, other: Array) -> Array:
+    if one is None:
+        return other
+    from scipy.signal import convolve
+
+    return np.asarray(np.maximum(convolve(one, other), 0.0))

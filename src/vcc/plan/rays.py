@@ -1,0 +1,296 @@
+"""The ray plan: how to make the picture of a light field by tracing rays back from the sensor.
+
+For cameras whose optics do not fold into one matrix (arrays, plates, diffusers) the irradiance at a place x of
+the sensor is the integral over the slopes at which light arrives,
+
+    I(x) = ∫∫ L(ray traced back to the light field) · Π T ds dt,
+
+and a pixel holds the mean over its sensitive area. Both integrals are taken at once by a fixed number of rays a
+pixel, spread evenly (a scrambled Sobol' sequence) over the pixel, over the part of the optics that its light can
+come through (the aim) and over what diffusers do. The engine knows nothing of optics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.optics.lattice import Lattice
+from vcc.plan.steps import Bundle, Move, Packer, Step
+
+Array = NDArray[np.float64]
+
+TABLE = 2**16
+"""Points of the sequence that all pixels share; a pixel takes an aligned block of them."""
+FIRST_COLUMNS = 4
+"""Columns of the table that every plan has: place in the pixel (x, y), place in the aim (x, y)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Where to aim: a rectangle or a disc in a plane that the sensor's rays reach through affine optics.
+
+    A ray from (x, y) on the sensor towards the window's point (a, b), −1 … 1 each, has the slopes
+    (s, t) = slope_from_point · (a, b) + slope_from_sensor · (x, y) + offset + Σ slope_from_scatter · (δs, δt).
+
+    The last term makes up for what diffusers on the way will take from the ray's slope: which of its ways a ray
+    goes is drawn beforehand, so that it hits the window whatever the kernel.
+
+    Args:
+        slope_from_point: 2×2.
+        slope_from_sensor: 2×2, 1/m.
+        offset: (s, t).
+        disc: whether the window is the disc a² + b² ≤ 1, not the whole square.
+        words: what is aimed at.
+        slope_from_scatter: (column of the table, 2×2) of each uniform diffuser before the window.
+    """
+
+    slope_from_point: Array
+    slope_from_sensor: Array
+    offset: Array
+    disc: bool
+    words: str
+    slope_from_scatter: tuple[tuple[int, Array], ...] = ()
+
+    @property
+    def solid_angle(self) -> float:
+        """∫∫ ds dt over the window, the same seen from any place on the sensor."""
+        return (np.pi if self.disc else 4.0) * abs(float(np.linalg.det(self.slope_from_point)))
+
+    def slopes(self, x: Array, y: Array, points: NDArray[np.float32]) -> tuple[Array, Array, Array]:
+        """Slopes s, t of rays from places x, y towards the window, and the solid angle that they stand for."""
+        a, b = points[..., 2].astype(np.float64), points[..., 3].astype(np.float64)
+        p, q = self.slope_from_point, self.slope_from_sensor
+        s = p[0, 0] * a + p[0, 1] * b + q[0, 0] * x + q[0, 1] * y + self.offset[0]
+        t = p[1, 0] * a + p[1, 1] * b + q[1, 0] * x + q[1, 1] * y + self.offset[1]
+        for column, matrix in self.slope_from_scatter:
+            ds, dt = points[..., column].astype(np.float64), points[..., column + 1].astype(np.float64)
+            s, t = s + matrix[0, 0] * ds + matrix[0, 1] * dt, t + matrix[1, 0] * ds + matrix[1, 1] * dt
+        return s, t, np.full(s.shape, self.solid_angle)
+
+
+@dataclass(frozen=True, eq=False)
+class CellWindows:
+    """Where to aim in front of a lens array: in each cell only at the part whose light comes from the stop beyond.
+
+    A ray that passes a cell with centre c and power P at place a meets the plane of the stop at gain·a + rest,
+    with gain = beyond + P·beyond_from_slope and rest as `_rest` says, one for each axis. Only cells where that
+    falls into the stop for some a are aimed at, and of these only the places a where it does.
+
+    Args:
+        place_from_sensor: place on the array from place on the sensor, factors (x, y).
+        place_from_slope: place on the array from slope at the sensor, factors (x, y).
+        offset: of the place on the array.
+        lattice: of the array's cells, offset counted from the axis of the camera.
+        powers: 1/f of the kinds of cells (rows, columns).
+        slopes: (δs, δt) of the kinds of cells.
+        beyond: place at the stop from place on the array, the slope at the sensor's side being that from the
+            sensor: factors (x, y).
+        beyond_from_sensor: place at the stop from place on the sensor.
+        beyond_from_slope: place at the stop from slope before the array.
+        beyond_offset: of the place at the stop.
+        middle: of the stop, (x, y).
+        half: half the (width, height) of the stop.
+        cell_half: half the (width, height) of the rectangle around a cell.
+        reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are looked at.
+        words: what is aimed at.
+    """
+
+    place_from_sensor: Array
+    place_from_slope: Array
+    offset: Array
+    lattice: Lattice
+    powers: Array
+    slopes: Array
+    beyond: Array
+    beyond_from_sensor: Array
+    beyond_from_slope: Array
+    beyond_offset: Array
+    middle: Array
+    half: Array
+    cell_half: Array
+    reach: tuple[int, int]
+    words: str
+
+    def nearest(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(row, column) of the cell through whose centre the middle of the stop is seen from x, y, nearly."""
+        centre = [
+            (self.middle[n] - self.beyond_offset[n] - self.beyond_from_sensor[n] * place) / self.beyond[n]
+            for n, place in enumerate((x, y))
+        ]
+        return self.lattice.cell_of(*centre)
+
+    def box(
+        self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64]
+    ) -> tuple[Array, Array, Array, Array]:
+        """(low x, high x, low y, high y) of the places in cells that light from x, y can come through."""
+        kind = row % self.powers.shape[0], column % self.powers.shape[1]
+        ends = []
+        for n, (place, centre) in enumerate(zip((x, y), self.lattice.centre_of(row, column), strict=True)):
+            power = self.powers[kind]
+            gain = self.beyond[n] + power * self.beyond_from_slope[n]
+            rest = (
+                self.beyond_from_sensor[n] * place
+                - self.beyond_from_slope[n] * (power * centre + self.slopes[(*kind, n)])
+                + self.beyond_offset[n]
+            )
+            gain = np.where(np.abs(gain) < SMALLEST_GAIN, SMALLEST_GAIN, gain)
+            ends_here = (
+                (self.middle[n] - rest - self.half[n]) / gain,
+                (self.middle[n] - rest + self.half[n]) / gain,
+            )
+            low = np.maximum(np.minimum(*ends_here), centre - self.cell_half[n])
+            high = np.minimum(np.maximum(*ends_here), centre + self.cell_half[n])
+            ends += [low, np.maximum(high, low)]
+        return ends[0], ends[1], ends[2], ends[3]
+
+
+SMALLEST_GAIN = 1e-12
+"""Gains of cells are kept from 0, where a whole cell looks at one place: its bounds are then far outside."""
+
+Aim = Window | CellWindows
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RayPlan:
+    """How to make the picture of a light field by tracing rays.
+
+    Args:
+        sensor_shape: (rows, columns) of the picture.
+        first_pixel: place (x, y) of the middle of pixel (0, 0), metres.
+        pitch: distance between pixels along (x, y), metres.
+        sensitive: size (x, y) of a pixel's sensitive area, metres.
+        aim: which slopes are traced.
+        steps: what a ray meets, from the sensor on.
+        index_from_ray: from rays at the end of the steps to indices (i, j, k, l) of the light field.
+        motion: 2×2; a point of the scene is seen in view (i, j) at pixel (k, l) − motion · (i, j).
+        between_views: interpolate between views along the motion; else each view is its cell.
+        views: (v, u, t, s) of the light field.
+        scale: turns stored samples into radiance.
+        samples: rays a pixel, a power of two (through an array of lenses: a cell).
+        seed: of the choice of points for each pixel.
+        points: the table, (`TABLE`, columns) float32: place in the pixel (−½ … ½, twice), place in the window
+            (−1 … 1, twice), then what diffusers need.
+        views_may_end: rays outside the grid of views are missing: a stop at the views says that they are wanted.
+        notes: what was decided and why, in words.
+    """
+
+    sensor_shape: tuple[int, int]
+    first_pixel: tuple[float, float]
+    pitch: tuple[float, float]
+    sensitive: tuple[float, float]
+    aim: Aim
+    steps: tuple[Step, ...]
+    index_from_ray: Affine
+    motion: Array
+    between_views: bool
+    views: tuple[int, int, int, int]
+    scale: float
+    samples: int
+    seed: int
+    points: NDArray[np.float32]
+    views_may_end: bool
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def rays(self) -> int:
+        """How many rays are aimed at one cell or window, over all pixels."""
+        return self.sensor_shape[0] * self.sensor_shape[1] * self.samples
+
+    @property
+    def samples_touched(self) -> int:
+        """How many samples of the light field the rays look at, those that are looked at twice counted twice."""
+        return 16 * self.rays
+
+    def block(self, pixel: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Which aligned block of ``samples`` points each pixel takes, by a hash of its number and the seed."""
+        return (hashed(pixel, self.seed) & np.uint32(TABLE // self.samples - 1)).astype(np.int64)
+
+    def looked_up(self, pixel: NDArray[np.int64], block: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Where the rays of pixels meet the light field, and what they weigh.
+
+        Args:
+            pixel: numbers of pixels, row · columns + column, (pixels,).
+            block: the block of points of each, (pixels,).
+
+        Returns:
+            indices (i, j, k, l) of the light field, (pixels, cells, samples, 4), and shares of solid angle in
+            units of slope squared, (pixels, cells, samples); their sum over a pixel is its irradiance under
+            radiance 1. The first half of the samples is as good a set as the second.
+        """
+        number = block[:, None] * self.samples + np.arange(self.samples)
+        points = self.points[number][:, None]  # (pixels, 1, samples, columns)
+        row, column = np.divmod(pixel, self.sensor_shape[1])
+        shape = (-1, 1, 1)
+        x = self.first_pixel[0] + column.reshape(shape) * self.pitch[0] + points[..., 0] * self.sensitive[0]
+        y = self.first_pixel[1] + row.reshape(shape) * self.pitch[1] + points[..., 1] * self.sensitive[1]
+        if isinstance(self.aim, Window):
+            s, t, weight = self.aim.slopes(x, y, points)
+        else:
+            x, y, s, t, weight = self._through_cells(pixel, x, y, points)
+        points = np.broadcast_to(points, (*s.shape, points.shape[-1]))
+        rays = Bundle(x, y, s, t, weight / self.samples, points)
+        for step in self.steps:
+            step(rays)
+        index = self.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
+        return index, rays.share
+
+    def _through_cells(
+        self, pixel: NDArray[np.int64], x: Array, y: Array, points: NDArray[np.float32]
+    ) -> tuple[Array, Array, Array, Array, Array]:
+        """Rays from places on the sensor through all cells that the stop beyond can be seen through."""
+        aim = self.aim
+        assert isinstance(aim, CellWindows)
+        row, column = np.divmod(pixel, self.sensor_shape[1])
+        nearest = aim.nearest(
+            self.first_pixel[0] + column * self.pitch[0], self.first_pixel[1] + row * self.pitch[1]
+        )
+        down, across = (np.arange(-reach, reach + 1) for reach in aim.reach)
+        cell_row = (nearest[0][:, None, None] + down[:, None]).repeat(len(across), axis=2)
+        cell_column = (nearest[1][:, None, None] + across[None, :]).repeat(len(down), axis=1)
+        cell_row, cell_column = (cells.reshape(len(pixel), -1, 1) for cells in (cell_row, cell_column))
+        low_x, high_x, low_y, high_y = aim.box(x, y, cell_row, cell_column)
+        a = (low_x + high_x) / 2 + (high_x - low_x) / 2 * points[..., 2]
+        b = (low_y + high_y) / 2 + (high_y - low_y) / 2 * points[..., 3]
+        s = (a - aim.place_from_sensor[0] * x - aim.offset[0]) / aim.place_from_slope[0]
+        t = (b - aim.place_from_sensor[1] * y - aim.offset[1]) / aim.place_from_slope[1]
+        jacobian = abs(aim.place_from_slope[0] * aim.place_from_slope[1])
+        # A cell is its Voronoi cell: what of its rectangle lies in a neighbour is the neighbour's.
+        own_row, own_column = aim.lattice.cell_of(a, b)
+        own = (own_row == cell_row) & (own_column == cell_column)
+        weight = (high_x - low_x) * (high_y - low_y) / jacobian * own
+        x, y = np.broadcast_to(x, s.shape), np.broadcast_to(y, s.shape)
+        return x, y, s, t, weight
+
+    @property
+    def met(self) -> str:
+        """What rays meet on their way back from the sensor, in words."""
+        met = [step.words for step in self.steps if not isinstance(step, Move)]
+        return ", ".join(dict.fromkeys(met)) or "nothing"
+
+    def packed(self) -> Packer:
+        """The steps as numbers for the compiled kernel."""
+        packer = Packer()
+        for step in self.steps:
+            step.packed(packer)
+        return packer
+
+    def __repr__(self) -> str:
+        rows, columns = self.sensor_shape
+        lines = [
+            f"Ray plan for a picture of {rows}×{columns} pixels: {self.samples} rays a pixel",
+            f"  aimed at {self.aim.words}",
+            f"  met on the way back: {self.met}",
+        ]
+        return "\n".join(lines + [f"  - {note}" for note in self.notes])
+
+
+def hashed(number: NDArray[np.int64], seed: int) -> NDArray[np.uint32]:
+    """A 32-bit hash of whole numbers and a seed (the finaliser of MurmurHash3, by Austin Appleby)."""
+    h = (number & 0xFFFFFFFF).astype(np.uint32) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
+    h = (h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B)
+    h = (h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35)
+    return np.asarray(h ^ (h >> np.uint32(16)), dtype=np.uint32)
