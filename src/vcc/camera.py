@@ -255,8 +255,8 @@ class Camera:
             Irradiance on the sensor, radiance × steradian (paper, eq. 5), as light lands on it (inverted).
 
         Warns:
-            ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, or the
-                tolerance was not reached.
+            ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
+                tolerance was not reached, or the cells of an array are smaller than a pixel.
 
         Raises:
             InputError: an option that does not exist or does not go with the method, or an element that returns
@@ -278,6 +278,8 @@ class Camera:
             samples=samples,
             seed=seed,
         )
+        for caution in plan.cautions:
+            warnings.warn(caution, ResultWarning, stacklevel=2)
         recorded = record(plan, light_field.values, engine=engine, tolerance=tolerance, progress=progress)
         if recorded.missing_rays > 0.01:
             warnings.warn(

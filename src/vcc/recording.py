@@ -570,6 +570,8 @@ def photon_transfer(
     """
     if isinstance(levels, bool) or not isinstance(levels, int) or levels < 4:
         raise InputError(f"levels is {levels!r}: a curve needs 4 levels or more")
+    if len(shape) != 2 or min(shape) < 1 or shape[0] * shape[1] < 2:
+        raise InputError(f"shape is {shape!r}: give (rows, columns) of at least two pixels")
     time = _checked_exposure(exposure)
     dark = electronics.dark_current * time
     noise = math.sqrt(electronics.read_noise**2 + electronics.dsnu**2 + dark)

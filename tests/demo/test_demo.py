@@ -165,7 +165,7 @@ def test_the_warm_up_runs_every_loop_that_is_timed_later(monkeypatch):
     assert small.scene is not None
     views = small.scene.light_field((20, 20), (16, 16), spacing=1e-3, slope_per_pixel=0.03, focus_distance=1.3)
     used = []
-    monkeypatch.setattr(engines, "run_plan", lambda plan, values: used.append((plan.taps_used, len(plan.masks))))
+    monkeypatch.setattr(engines, "record", lambda plan, values: used.append((plan.taps_used, len(plan.masks))))
     run._warm_up(replace(small, light_field=views))
     assert all(taps > 0 for taps, _ in used)
     assert {masks for _, masks in used} == {0, 1}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.engines.smear import blurred, tent, tent_matrix
+from vcc.engines.smear import band_matrix, blurred, tent
 from vcc.units import mm, um
 
 
@@ -26,7 +26,9 @@ def test_a_tent_has_the_moments_of_a_tent(half_width):
 def test_blurring_is_the_product_with_the_tents_matrix(half_width, axis):
     raster = np.random.default_rng(0).random((150, 160, 2))
     size = raster.shape[axis]
-    truth = np.moveaxis(np.tensordot(tent_matrix(half_width, size, 0), np.moveaxis(raster, axis, 0), 1), 0, axis)
+    truth = np.moveaxis(
+        np.tensordot(band_matrix(tent(half_width), size, 0), np.moveaxis(raster, axis, 0), 1), 0, axis
+    )
     assert np.allclose(blurred(raster, tent(half_width), axis), truth, atol=1e-12)
 
 

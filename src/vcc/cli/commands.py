@@ -122,6 +122,90 @@ def capture(
     show(image.save(output, exposure=factor, upright=not as_recorded).description)
 
 
+@app.command(
+    epilog='Example:  vcc expose camera.toml views/ -o raw.tif --exposure "10 ms" --seed 1\n\n'
+    "Example:  vcc expose camera.toml views/ -o raw.npy --picture picture.png"
+)
+def expose(
+    camera: given.CameraFile,
+    light_field: given.LightFieldFolder,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="The raw numbers, .tif, .png or .npy: linear, not scaled, upside down as recorded.",
+            show_default=False,
+        ),
+    ],
+    exposure: Annotated[
+        str,
+        typer.Option(
+            metavar="TIME",
+            help='Exposure time, "10 ms". auto brings the brightest 0.1 % of the pixels to 90 % of saturation.',
+        ),
+    ] = "auto",
+    seed: Annotated[int, typer.Option(metavar="NUMBER", help="Of the sensor's noise, 0 or more.")] = 0,
+    radiance: Annotated[
+        float,
+        typer.Option(
+            metavar="NUMBER", help="What the light field's white (a value of 1) stands for, in W/(m² sr)."
+        ),
+    ] = 1.0,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write also a picture of it for people, demosaiced and upright; or linear, .exr and .npy.",
+            show_default=False,
+        ),
+    ] = None,
+    interpolation: given.Interpolation = "linear",
+    between_views: given.BetweenViews = "auto",
+    scene_distance: given.SceneDistance = None,
+    refine: given.Refine = "auto",
+    engine: given.Engine = "numba",
+    transfer: given.Transfer = "srgb",
+    spacing: given.Spacing = None,
+    slope_per_pixel: given.SlopePerPixel = None,
+    focus_distance: given.FocusDistance = None,
+    orientation: given.Orientation = "auto",
+) -> None:
+    """Record a light field as a real sensor would: photons, electrons, noise, raw numbers.
+
+    The camera file says how the sensor does so, in a table sensor.electronics.
+    """
+    time = given.exposure_time(exposure)
+    distance = given.length(scene_distance, "--scene-distance")
+    division = given.refinement(refine)
+    from vcc.camera_file import load_camera
+    from vcc.formats.pictures import RAW_ENDINGS, WRITE_ENDINGS
+    from vcc.recording import electronics_of
+
+    output = check_output(output, RAW_ENDINGS)
+    if picture is not None:
+        picture = check_output(picture, WRITE_ENDINGS)
+    optics = load_camera(camera)
+    electronics_of(optics.sensor)  # refused before the light field is read
+    field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
+    recording = optics.expose(
+        field,
+        time,
+        seed=seed,
+        radiance=radiance,
+        interpolation=interpolation,
+        between_views=between_views,
+        scene_distance=distance,
+        refine=division,
+        engine=engine,
+    )
+    show(recording.save(output).description)
+    if picture is not None:
+        mosaic = recording.electronics.color_filter is not None
+        show((recording.demosaiced() if mosaic else recording.image()).save(picture).description)
+
+
 @app.command(epilog="Example:  vcc explain camera.toml views/")
 def explain(
     camera: given.CameraFile,

@@ -165,6 +165,17 @@ def exposure_of(given: str) -> Any:
     return number
 
 
+def exposure_time(given: str) -> Any:
+    """ "auto" or the seconds of a time on the command line.
+
+    Raises:
+        InputError: no unit, or not a time.
+    """
+    from vcc.units import parse
+
+    return given if given == "auto" else parse(given, "time", "--exposure")
+
+
 def read_light_field(
     folder: Path,
     transfer: str,

@@ -118,13 +118,13 @@ class _Run:
                 continue
             view, k, l = self.weighted_view(b, a)
             y = plan.y[b, a] + plan.row_step * l
-            down = shares(plan.interpolation, pixels[0], y[None, :], plan.row_step / plan.refine)
+            down = shares(plan.interpolation, pixels[0], y[None, :], plan.row_step / plan.refine, plan.opening)
             part = self.rows_mixed(self.constant(down), view)
             total = part if total is None else total + part
         if total is None:
             return xp.zeros((*plan.raster_shape, self.channels), dtype=self.float, device=self.device)
         x = plan.x[0, a] + plan.column_step * k
-        across = shares(plan.interpolation, pixels[1], x[None, :], plan.column_step / plan.refine)
+        across = shares(plan.interpolation, pixels[1], x[None, :], plan.column_step / plan.refine, plan.opening)
         mixed = self.rows_mixed(self.constant(across), xp.permute_dims(total, (1, 0, 2)))
         return xp.permute_dims(mixed, (1, 0, 2))
 
@@ -168,7 +168,7 @@ class _Run:
         flat = xp.reshape(block, (samples * width, -1))
         for tap in range(int((last - first).max()) + 1):
             index = np.minimum(first + tap, samples - 1)
-            share = shares(self.plan.interpolation, pixel, start + step * index, step)
+            share = shares(self.plan.interpolation, pixel, start + step * index, step, self.plan.opening)
             share = np.where(first + tap <= last, share, 0.0)
             place = xp.asarray((index * width + np.arange(width)).reshape(-1), device=self.device)
             values = xp.reshape(xp.take(flat, place, axis=0), total.shape)

@@ -126,8 +126,8 @@ class _Separable:
         start_y = plan.y[:, 0] + plan.row_step * fine.first_row
         start_x = plan.x[0] + plan.column_step * fine.first_column
         row_step, column_step = plan.row_step / plan.refine, plan.column_step / plan.refine
-        self.down = taps(plan.interpolation, start_y, row_step, fine.rows, rows)
-        self.across = taps(plan.interpolation, start_x, column_step, fine.columns, columns)
+        self.down = taps(plan.interpolation, start_y, row_step, fine.rows, rows, plan.opening)
+        self.across = taps(plan.interpolation, start_x, column_step, fine.columns, columns, plan.opening)
         # A real image runs against its samples: the raster is then filled in mirror writing, so that samples
         # and pixels are read and written in the same direction.
         self.mirrored = column_step < 0
@@ -258,7 +258,8 @@ def _add_sheared(
                 view, plan.weights[b, a] * plan.scale, code, REACH[plan.interpolation],
                 plan.x[b, a], plan.y[b, a], plan.step, plan.shear, row_step, column_step,
                 row_step / plan.refine, column_step / plan.refine, fine.first_column, fine.first_row,
-                plan.refine, textures, size, place, mask_step, start, min(start + BAND, len(raster)), raster,
+                plan.refine, textures, size, place, mask_step, start, min(start + BAND, len(raster)), plan.opening,
+                raster,
             )  # fmt: skip
 
         list(pool.map(band, range(0, len(raster), BAND)))

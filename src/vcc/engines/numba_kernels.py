@@ -313,11 +313,12 @@ def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
 
 
 @_inlined
-def _share(interpolation, offset, size):  # type: ignore[no-untyped-def]
+def _share(interpolation, offset, size, opening):  # type: ignore[no-untyped-def]
     if interpolation == 0:
         reach = max(size, 1.0) / 2
         return 1.0 / max(size, 1.0) if -reach - 1e-9 <= offset < reach - 1e-9 else 0.0
-    return _cumulative(interpolation, (offset + 0.5) / size) - _cumulative(interpolation, (offset - 0.5) / size)
+    upper = _cumulative(interpolation, (offset + opening / 2) / size)
+    return (upper - _cumulative(interpolation, (offset - opening / 2) / size)) / opening
 
 
 @_inlined
@@ -339,7 +340,7 @@ def _looked_up(texture, row, column):  # type: ignore[no-untyped-def]
 def sheared_view(  # type: ignore[no-untyped-def]
     view, weight, interpolation, reach, x0, y0, step, shear, row_step, column_step, fine_row_step,
     fine_column_step, first_k, first_l, refine, textures, texture_size, mask_place, mask_step, start, stop,
-    raster,
+    opening, raster,
 ):  # fmt: skip
     """Add one view to raster rows start … stop where rows and columns of samples shear on the sensor.
 
@@ -361,7 +362,7 @@ def sheared_view(  # type: ignore[no-untyped-def]
             low = max(int(np.ceil(middle - reach_y / height)), 0)
             high = min(int(np.floor(middle + reach_y / height)), nt - 1)
             for m in range(low, high + 1):
-                share = weight * _share(interpolation, y - y_start - fine_row_step * m, height)
+                share = weight * _share(interpolation, y - y_start - fine_row_step * m, height, opening)
                 l = first_l + m / refine
                 for mask in range(mask_place.shape[0]):
                     column = mask_place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
@@ -379,6 +380,6 @@ def sheared_view(  # type: ignore[no-untyped-def]
             low = max(int(np.ceil(x - reach_x)), 0)
             high = min(int(np.floor(x + reach_x)), raster.shape[1] - 1)
             for pixel in range(low, high + 1):
-                share = _share(interpolation, pixel - x, width)
+                share = _share(interpolation, pixel - x, width, opening)
                 for c in range(channels):
                     raster[y, pixel, c] += share * line[n, c]

@@ -123,6 +123,10 @@ def take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t
                 else:
                     inside = max(across, across / 2 + 0.5 * math.sqrt(3.0) * down) <= f[6]
                 share[p] *= inside
+        elif code == 11:
+            for p in range(n):
+                row, column, _, _ = cell_of(a[0], f, x[p], y[p])
+                share[p] *= (row >= 0) & (row < a[1]) & (column >= 0) & (column < a[2])
         elif code == 4:
             for p in range(n):
                 dx, dy = x[p] - f[0], y[p] - f[1]
@@ -438,8 +442,8 @@ def add_tile(  # type: ignore[no-untyped-def]
         for column in range(tile[2], min(tile[3], columns_there)):
             middle_x = pixels[0, 0] + column * pixels[0, 1]
             middle_y = pixels[1, 0] + row * pixels[1, 1]
-            block = hashed(row * columns_there + column, seed) & np.uint32(blocks - 1)
-            first = (np.int64(block) ^ block_shift) * samples
+            block = (np.int64(hashed(row * columns_there + column, seed)) * blocks) >> 32
+            first = (block ^ block_shift) * samples
             sums[:] = 0
             n, rays = 0, 0
             cells_near = 1

@@ -64,9 +64,10 @@ def _spread(plan: Plan, raster: Array, flux: Array, b: int, a: int, k: Array, l:
     pixel = np.arange(columns, dtype=float)
     y = plan.y[b, a] + plan.step[1, 0] * k[None, :] + plan.step[1, 1] * l[:, None]
     for row in range(rows):
-        share_y = shares(plan.interpolation, float(row), y, plan.row_step / fine)
+        share_y = shares(plan.interpolation, float(row), y, plan.row_step / fine, plan.opening)
         if not share_y.any():
             continue
         line = (share_y[..., None] * flux).sum(axis=0)
         x = plan.x[b, a] + plan.shear * (row - plan.y[b, a]) + plan.column_step * k
-        raster[row] += shares(plan.interpolation, pixel[:, None], x[None, :], plan.column_step / fine) @ line
+        across = shares(plan.interpolation, pixel[:, None], x[None, :], plan.column_step / fine, plan.opening)
+        raster[row] += across @ line

@@ -4,6 +4,7 @@ programs.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
@@ -22,6 +23,8 @@ READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy"
 """The endings that `read_picture` knows."""
 WRITE_ENDINGS = (".png", ".tif", ".tiff", ".exr", ".npy")
 """The endings that `save_image` knows."""
+RAW_ENDINGS = (".tif", ".tiff", ".png", ".npy")
+"""The endings that `save_numbers` knows."""
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)  # IEC 61966-2-1
 _BRIGHT_PERCENTILE = 99.5
@@ -161,6 +164,48 @@ def save_image(
     return _save_display(values, path, ending, exposure, bits)
 
 
+def save_numbers(
+    values: NDArray[Any], path: str | PathLike[str], meaning: dict[str, Any], words: str, saturated: float
+) -> SavedPicture:
+    """Write a camera's raw numbers as they are: linear, not scaled, not turned.
+
+    Args:
+        values: uint8 or uint16, shape (rows, columns) or (rows, columns, channels).
+        path: where to, .tif, .tiff, .png or .npy.
+        meaning: what the numbers mean; a TIFF holds it as JSON in its description.
+        words: the same for people.
+        saturated: the share of the pixels that are saturated, 0 to 1.
+
+    Raises:
+        InputError: another ending, a number of channels that the format does not have, or a place that cannot be
+            written to.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in RAW_ENDINGS:
+        raise InputError(
+            f'raw numbers cannot be written as "{path.name}": end the name in {", ".join(RAW_ENDINGS)}'
+        )
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    if ending != ".npy" and values.ndim == 3 and values.shape[2] != 3:
+        raise InputError(
+            f"{ending} files have 1 or 3 channels, and this recording has {values.shape[2]}: use .npy"
+        )
+    with atomic_path(path) as temporary:
+        if ending == ".npy":
+            with temporary.open("wb") as file:
+                np.save(file, values)
+        elif ending == ".png":
+            import imagecodecs
+
+            temporary.write_bytes(imagecodecs.png_encode(np.ascontiguousarray(values)))
+        else:
+            _write_tiff(values, temporary, json.dumps(meaning))
+    description = f"{path}: {_size(values)}, {words}; {values.dtype} numbers as recorded, upside down"
+    return SavedPicture(path, 1.0, saturated, description)
+
+
 def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
     """The exposure that "auto" stands for: 1 over the 99.5th percentile of the luminance (1 if
     black).
@@ -266,11 +311,13 @@ def _size(values: NDArray[Any]) -> str:
     return f"{values.shape[1]}×{values.shape[0]} pixels, {kind}"
 
 
-def _write_tiff(codes: NDArray[Any], path: Path) -> None:
+def _write_tiff(codes: NDArray[Any], path: Path, description: str | None = None) -> None:
     import tifffile
 
     photometric = "rgb" if codes.ndim == 3 else "minisblack"
-    tifffile.imwrite(path, codes, photometric=photometric, compression="zlib", metadata=None)
+    tifffile.imwrite(
+        path, codes, photometric=photometric, compression="zlib", metadata=None, description=description
+    )
 
 
 def _write_exr(values: NDArray[np.float32], path: Path) -> None:

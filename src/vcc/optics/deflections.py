@@ -123,7 +123,9 @@ class SlopeFunction(Deflection):
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """What the function returns, checked."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        shape = np.broadcast_shapes(x.shape, y.shape)
+        # As whole arrays: a function such as (−x/f, −y/f) then returns slopes of one shape.
+        x, y = np.broadcast_arrays(x, y)
+        shape = x.shape
         returned = self.function(x, y)
         try:
             s, t = returned

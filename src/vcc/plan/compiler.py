@@ -123,6 +123,7 @@ def compile_plan(
         notes=_notes(camera, view_planes, path_planes, against_sensor, between, divide, fine, swapped)
         + blurs.notes,
         expected_ghosting=between.gap_left,
+        opening=math.sqrt(sensor.fill_factor),
         blur=blurs.picture,
         view_blur=blurs.views,
     )
@@ -289,7 +290,7 @@ def _sensor_transmission(sensor: Sensor, planes: list[Plane]) -> Array | None:
     """The mean transmission over each pixel of what lies against the sensor."""
     if not planes:
         return None
-    vertical, horizontal = sensor.pitches
+    vertical, horizontal = sensor.sensitive_pitches
     total = np.ones(sensor.shape)
     for plane in planes:
         x = sensor.column_places - plane.decentre[0]

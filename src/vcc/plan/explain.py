@@ -45,7 +45,7 @@ def explain(camera: Camera, light_field: LightField, **options: Any) -> Explanat
     if isinstance(plan, RayPlan):
         from vcc.plan.explain_rays import sections
 
-        parts, seconds = sections(camera, plan, light_field, engine, tolerance)
+        parts, seconds = sections(plan, light_field, engine, tolerance)
     else:
         seconds = expected_seconds(plan, light_field, engine)
         parts = [_sampling(plan), _cost(plan, light_field, seconds), _warnings(plan)]

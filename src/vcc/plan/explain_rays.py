@@ -6,17 +6,13 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vcc.light_field import LightField
 from vcc.plan.rays import CellWindows, RayPlan
 from vcc.sampled import known
-from vcc.units import short
-
-if TYPE_CHECKING:
-    from vcc.camera import Camera
 
 PATCH = 40
 """Pixels a side of the pieces of the picture that are traced to foretell time and error."""
@@ -25,7 +21,7 @@ PLACES = (0.1, 0.5, 0.9)
 
 
 def sections(
-    camera: Camera, plan: RayPlan, light_field: LightField, engine: Any, tolerance: float | None
+    plan: RayPlan, light_field: LightField, engine: Any, tolerance: float | None
 ) -> tuple[list[str], float | None]:
     """The sections of `vcc.Camera.explain` after how the picture is made, and the seconds expected."""
     pilot = _pilot(plan, light_field, engine)
@@ -33,7 +29,7 @@ def sections(
     return [
         _sampling(plan, pilot, tolerance),
         _cost(plan, light_field, pilot),
-        _warnings(camera, plan, pilot),
+        _warnings(plan, pilot),
     ], seconds
 
 
@@ -111,18 +107,12 @@ def expected_memory(plan: RayPlan, light_field: LightField) -> int:
     return int(plan.points.nbytes + tables + copied)
 
 
-def _warnings(camera: Camera, plan: RayPlan, pilot: Any) -> str:
+def _warnings(plan: RayPlan, pilot: Any) -> str:
     lines = []
     if pilot is not None and pilot[3] > 1e-3:
         lines.append(
             f"  {pilot[3]:.1%} of the rays asked for are missing: they fall outside the grid of views or the "
             "views' pictures"
         )
-    if isinstance(plan.aim, CellWindows):
-        pitch, pixel = plan.aim.lattice.pitch, max(plan.pitch)
-        if pitch < pixel:
-            lines.append(
-                f"  cells of {short(pitch)} are smaller than a pixel of {short(pixel)}: what "
-                "they do is averaged away"
-            )
+    lines += [f"  {caution}" for caution in plan.cautions]
     return "Warnings\n" + ("\n".join(lines) if lines else "  none")

@@ -5,10 +5,11 @@ where b is the step from one sample to the next, in pixels. Pixel m receives the
 
     F(m) = Φ((m + ½ − x)/b) − Φ((m − ½ − x)/b),        Φ(a) = ∫₋∞ᵃ φ,
 
-exactly, for any b. Over the pixels the shares sum to one, so no light is lost; over equally spaced samples
-they sum to 1/|b|, so uniform light stays uniform. Nothing is singular at b = 0, where a whole view falls
-into one point. Seen from the sample this is forward evaluation (splatting), seen from the pixel it is
-backward evaluation (interpolating, then averaging over the pixel); the shares are the same.
+exactly, for any b. (Where only a share a of a pixel's width is sensitive, ½ becomes a/2, and F is divided by a:
+the mean over the sensitive area.) Over the pixels the shares sum to one, so no light is lost; over equally
+spaced samples they sum to 1/|b|, so uniform light stays uniform. Nothing is singular at b = 0, where a whole
+view falls into one point. Seen from the sample this is forward evaluation (splatting), seen from the pixel it
+is backward evaluation (interpolating, then averaging over the pixel); the shares are the same.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ def weight(interpolation: str, distance: Any, xp: Any = np) -> Any:
     return xp.where(r < 1, near, xp.where(r < 2, far, xp.zeros_like(r)))
 
 
-def shares(interpolation: str, pixel: Any, position: Any, step: float, xp: Any = np) -> Any:
+def shares(interpolation: str, pixel: Any, position: Any, step: float, opening: float = 1.0, xp: Any = np) -> Any:
     """F: the share of a sample's light that each pixel receives, for arrays that broadcast.
 
     Args:
@@ -78,6 +79,7 @@ def shares(interpolation: str, pixel: Any, position: Any, step: float, xp: Any =
         pixel: pixel indices, as floating point.
         position: the samples' pixel coordinates.
         step: pixels from one sample to the next, of any sign, not 0.
+        opening: the share of a pixel's width that is sensitive, around its middle.
         xp: the array namespace of the arrays.
 
     ``"nearest"`` is the paper's: where samples are closer than pixels, each falls into the pixel that holds
@@ -89,8 +91,8 @@ def shares(interpolation: str, pixel: Any, position: Any, step: float, xp: Any =
         reach = max(size, 1.0) / 2
         inside = (offset >= -reach - TIE) & (offset < reach - TIE)
         return xp.astype(inside, offset.dtype) / max(size, 1.0)
-    upper = cumulative(interpolation, (offset + 0.5) / size, xp)
-    return upper - cumulative(interpolation, (offset - 0.5) / size, xp)
+    upper = cumulative(interpolation, (offset + opening / 2) / size, xp)
+    return (upper - cumulative(interpolation, (offset - opening / 2) / size, xp)) / opening
 
 
 def reach_in_pixels(interpolation: str, size: float) -> float:
@@ -124,7 +126,7 @@ class Taps:
         )
 
 
-def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: int) -> Taps:
+def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: int, opening: float = 1.0) -> Taps:
     """The table of shares for rows of samples at ``origin + step · index``, in pixels.
 
     Args:
@@ -133,6 +135,7 @@ def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: i
         step: pixels from one sample to the next.
         samples: how many samples there are.
         pixels: how many pixels there are.
+        opening: the share of a pixel's width that is sensitive.
     """
     size = abs(step)
     reach = reach_in_pixels(interpolation, size)
@@ -145,7 +148,7 @@ def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: i
     width = max(int(count.max(initial=0)), 1)
     index = first[..., None] + np.arange(width)
     position = np.asarray(origin)[..., None, None] + step * index
-    table = shares(interpolation, pixel[:, None], position, step)
+    table = shares(interpolation, pixel[:, None], position, step, opening)
     table = np.where(np.arange(width) < count[..., None], table, 0.0)
     first = np.minimum(first, samples - 1)
     return Taps(first, np.ascontiguousarray(table, dtype=np.float32))

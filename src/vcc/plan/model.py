@@ -76,6 +76,7 @@ class Plan:
         refine: how many finer samples replace one, along each pixel axis.
         smear: (vertical, horizontal) half width in pixels of the tent that fills the gap between the
             pictures of neighbouring views; 0 for none.
+        opening: the share of a pixel's width, and of its height, that is sensitive ("nearest" ignores it).
         blur: kernel that the picture is convolved with, odd rows × odd columns of sum 1 (a diffuser), or None.
         view_blur: kernel that each view is convolved with before all else (a diffuser at the views), growing by
             half the kernel on each side, or None; ``samples`` and places count what is there after that.
@@ -108,6 +109,7 @@ class Plan:
     missing_reason: str
     notes: tuple[str, ...] = field(default=())
     expected_ghosting: float = 0.0
+    opening: float = 1.0
     blur: Array | None = None
     view_blur: Array | None = None
 
@@ -170,6 +172,11 @@ class Plan:
     def samples_touched(self) -> int:
         """How many samples, refined ones counted, an engine goes through."""
         return self.taps_used * self.samples[0] * self.samples[1] * self.refine**2
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """What a user should be warned of before a run: nothing, for footprints."""
+        return ()
 
     @property
     def _blurs(self) -> list[tuple[str, tuple[int, ...], str]]:

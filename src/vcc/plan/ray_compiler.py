@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.affine import Affine
+from vcc.electronics import checked_seed
 from vcc.errors import InputError
 from vcc.optics.deflections import CellDeflection, FacetDeflection
-from vcc.optics.lattice import CellApertures, Product
+from vcc.optics.lattice import CellApertures, CellBlock, Product
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.patterns import Bounded, Cells, Circle, Open, Pattern
 from vcc.plan import steps
 from vcc.plan.beam import Beam
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import FIRST_COLUMNS, TABLE, Aim, CellWindows, RayPlan, Window
+from vcc.units import short
 
 if TYPE_CHECKING:
     from vcc.camera import Camera, Stage
@@ -95,6 +97,7 @@ def compile_rays(
         seed=seed,
         points=_table(seed, scatters, isinstance(aim, Window) and aim.disc),
         views_may_end=path.stop_at_views,
+        cautions=tuple(_cautions(camera)),
         notes=tuple(notes),
     )
 
@@ -107,17 +110,16 @@ def _checked_samples(samples: int | None) -> int:
     return int(2 ** math.ceil(math.log2(samples)))
 
 
-def checked_seed(seed: object) -> int:
-    """A seed as a whole number.
-
-    Raises:
-        InputError: anything else, truth values included.
-    """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
-        raise InputError(f"a seed is a whole number, not {seed!r}")
-    if not 0 <= seed < 2**63:
-        raise InputError(f"a seed is a whole number from 0 to 2**63 − 1, not {seed}")
-    return int(seed)
+def _cautions(camera: Camera) -> Iterator[str]:
+    """What the optics do that a picture can hardly show."""
+    pixel = max(camera.sensor.pitches)
+    for stage in camera.stages:
+        bending = stage.faces.bending
+        if isinstance(bending, CellDeflection) and bending.lattice.pitch < pixel:
+            yield (
+                f"cells of {stage.element.label} are {short(bending.lattice.pitch)} wide, less than a pixel of "
+                f"the sensor ({short(pixel)}): what each of them does is averaged away"
+            )
 
 
 # --- where to aim ---
@@ -519,6 +521,8 @@ def _transmission(
     if isinstance(pattern, CellApertures):
         half = pattern.scale * pattern.lattice.pitch / 2
         return [steps.CellGaps(pattern.lattice, decentre, half, pattern.circular, f"gaps of {label}")]
+    if isinstance(pattern, CellBlock):
+        return [steps.BlockOfCells(pattern.lattice, decentre, pattern.rows, pattern.columns, f"edges of {label}")]
     if isinstance(pattern, Cells):
         rows, columns = pattern.values.shape
         size = (pattern.width / columns, float(pattern.height or 0.0) / rows)

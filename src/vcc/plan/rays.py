@@ -175,6 +175,7 @@ class RayPlan:
         points: the table, (`TABLE`, columns) float32: place in the pixel (−½ … ½, twice), place in the window
             (−1 … 1, twice), then what diffusers need.
         views_may_end: rays outside the grid of views are missing: a stop at the views says that they are wanted.
+        cautions: what a user should be warned of, in words.
         notes: what was decided and why, in words.
     """
 
@@ -193,6 +194,7 @@ class RayPlan:
     seed: int
     points: NDArray[np.float32]
     views_may_end: bool
+    cautions: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
 
     @property
@@ -206,8 +208,11 @@ class RayPlan:
         return 16 * self.rays
 
     def block(self, pixel: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Which aligned block of ``samples`` points each pixel takes, by a hash of its number and the seed."""
-        return (hashed(pixel, self.seed) & np.uint32(TABLE // self.samples - 1)).astype(np.int64)
+        """Which aligned block of ``samples`` points each pixel takes, by a hash of its number and the seed.
+
+        By the hash's leading bits: the block of twice the size is the one that this block is half of.
+        """
+        return (hashed(pixel, self.seed).astype(np.int64) * (TABLE // self.samples)) >> 32
 
     def looked_up(self, pixel: NDArray[np.int64], block: NDArray[np.int64]) -> tuple[Array, Array]:
         """Where the rays of pixels meet the light field, and what they weigh.

@@ -186,6 +186,28 @@ class CellGaps:
 
 
 @dataclass(frozen=True, eq=False)
+class BlockOfCells:
+    """A block of cells of a lattice, from cell (0, 0) on, opaque outside it."""
+
+    lattice: Lattice
+    decentre: tuple[float, float]
+    rows: int
+    columns: int
+    words: str
+    code: ClassVar[int] = 11
+
+    def __call__(self, rays: Bundle) -> None:
+        """Stop rays outside the block."""
+        row, column = self.lattice.cell_of(rays.x - self.decentre[0], rays.y - self.decentre[1])
+        rays.share = rays.share * ((row >= 0) & (row < self.rows) & (column >= 0) & (column < self.columns))
+
+    def packed(self, packer: Packer) -> None:
+        """The lattice, rows and columns of the block."""
+        layout, numbers = _lattice_numbers(self.lattice, self.decentre)
+        packer.step(self.code, [layout, self.rows, self.columns], numbers)
+
+
+@dataclass(frozen=True, eq=False)
 class FacetsUnbend:
     """Plane facets that meet in the middle: slopes lose what the facets added to them."""
 

@@ -1,0 +1,91 @@
+"""Real lenses from prescriptions: the files that list a lens's surfaces, reduced to first order.
+
+`load_lens` reads a file into an element for a camera; `read_prescription` gives the surfaces themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+
+from vcc.errors import InputError
+from vcc.optics.first_order import FirstOrder
+from vcc.prescriptions import pbrt, zemax
+from vcc.prescriptions.glasses import D_LINE, Glasses
+from vcc.prescriptions.model import Prescription, Surface
+
+__all__ = ["Prescription", "Surface", "load_lens", "read_prescription"]
+
+_READERS = {".dat": pbrt.read, ".zmx": zemax.read}
+
+
+def read_prescription(
+    path: str | PathLike[str], *, wavelength: float = D_LINE, glasses: Mapping[str, float] | None = None
+) -> Prescription:
+    """The surfaces of a lens as a file lists them, light travelling from the first to the last.
+
+    Args:
+        path: a PBRT lens table (``.dat``) or a sequential Zemax file (``.zmx``).
+        wavelength: metres, at which catalogue glasses are taken; a ``.dat`` gives indices at one only.
+        glasses: refractive indices by name, taken before any catalogue: ``{"N-BK7": 1.5168}``.
+
+    Raises:
+        InputError: no such file, another kind of file, a line that cannot be read, a surface that has no
+            paraxial reduction here (asphere, mirror, coordinate break …) or whose glass is not known. The
+            message names the file and the surface or line.
+    """
+    file = Path(path).expanduser()
+    reader = _READERS.get(file.suffix.lower())
+    if reader is None:
+        raise InputError(
+            f"{file} is not a lens prescription that can be read: known are .dat (PBRT) and .zmx (Zemax)"
+        )
+    try:
+        content = file.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"there is no lens prescription {file}") from None
+    except OSError as error:
+        raise InputError(f"{file} could not be read: {error.strerror or error}") from None
+    return reader(content, file, Glasses(wavelength, dict(glasses or {})))
+
+
+def load_lens(
+    path: str | PathLike[str],
+    *,
+    z: float = 0.0,
+    stop_diameter: float | None = None,
+    f_number: float | None = None,
+    wavelength: float = D_LINE,
+    glasses: Mapping[str, float] | None = None,
+    rims: bool = False,
+    decentre: tuple[float, float] = (0.0, 0.0),
+    name: str = "",
+) -> FirstOrder:
+    """A real lens, reduced to first order: its first surface stands at z, light travels as the file lists them.
+
+    Paraxial: principal planes, focal length, stop and pupils are the lens's own, aberrations are not, and of
+    the rims only the stop (and with ``rims`` the first and the last surface) cuts light off.
+    To focus: ``vcc.Sensor(z=lens.z + lens.length + lens.image_distance(2.0), …)``.
+
+    Args:
+        path: a PBRT lens table (``.dat``) or a sequential Zemax file (``.zmx``).
+        z: place of the first surface, metres.
+        stop_diameter: metres; None for the file's own stop.
+        f_number: focal length / entrance pupil, for a distant scene, by which to open the stop instead.
+        wavelength: metres, at which catalogue glasses are taken.
+        glasses: refractive indices by name, taken before any catalogue: ``{"N-BK7": 1.5168}``.
+        rims: whether the rims of the first and the last surface cut light off too.
+        decentre: place (x, y) of the lens's axis, metres.
+        name: how to call it in messages and plots.
+
+    Warns:
+        ResultWarning: the stop is opened wider than in the file.
+
+    Raises:
+        InputError: see `read_prescription` and `Prescription.first_order`.
+    """
+    prescription = read_prescription(path, wavelength=wavelength, glasses=glasses)
+    return prescription.first_order(
+        z=z, stop_diameter=stop_diameter, f_number=f_number, rims=rims, decentre=decentre, name=name
+    )

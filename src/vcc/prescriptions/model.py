@@ -1,0 +1,244 @@
+"""A lens prescription as data, and its paraxial reduction."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from dataclasses import dataclass, field
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.errors import InputError, ResultWarning
+from vcc.optics.first_order import FirstOrder, gap, refraction, surface_power
+from vcc.units import short
+
+Matrix = NDArray[np.float64]
+
+AIR_TOLERANCE = 1e-3
+"""How far the index behind the last surface may be from that of air."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A spherical or flat surface, or the aperture stop.
+
+    Args:
+        radius: of curvature, metres, positive where the centre lies behind the surface; infinite for a plane.
+        thickness: to the next surface along the axis, metres.
+        index: refractive index of the medium behind the surface, relative to air.
+        diameter: clear diameter, metres; None where the file has none.
+        stop: whether this is the aperture stop.
+        glass: what the file calls the medium behind; empty for air and for glasses given by index.
+        number: of the surface in its file, as messages name it.
+    """
+
+    radius: float = field(metadata={"unit": "length"})
+    thickness: float = field(metadata={"unit": "length"})
+    index: float
+    diameter: float | None = field(default=None, metadata={"unit": "length"})
+    stop: bool = False
+    glass: str = ""
+    number: int = 0
+
+
+@dataclass(frozen=True)
+class Prescription:
+    """The surfaces of a lens in air, in the order in which light meets them.
+
+    Its first-order figures are those of `first_order`, which is what a camera takes: focal length, principal
+    planes, pupils. Sources of the formulas: Hecht, *Optics*, section 6.2.
+
+    Args:
+        surfaces: first to last; what the last one's thickness says counts for nothing here.
+        name: what the file calls the lens.
+        source: the file's name.
+        f_number: as the file states it for a distant scene; None where the stop's own diameter counts.
+        entrance_pupil_diameter: as the file states it, metres, likewise.
+        image_distance: from the last surface to the image surface that the file lists, metres; None if none.
+
+    Raises:
+        InputError: no surface that bends light, a negative gap, more than one stop, an index below 1, light
+            that does not leave the lens into air. The message names the file and the surface.
+    """
+
+    surfaces: tuple[Surface, ...]
+    name: str = ""
+    source: str = ""
+    f_number: float | None = None
+    entrance_pupil_diameter: float | None = field(default=None, metadata={"unit": "length"})
+    image_distance: float | None = field(default=None, metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        place = self.source or "this prescription"
+        for surface in self.surfaces:
+            where = f"{place}: surface {surface.number}"
+            if surface.radius == 0 or math.isnan(surface.radius):
+                raise InputError(f"{where} has radius {surface.radius}: none may be 0, infinity is a plane")
+            if not (surface.index >= 1 and math.isfinite(surface.index)):
+                raise InputError(
+                    f"{where} has refractive index {surface.index:g} behind it: 1 is air, no glass is below"
+                )
+        for surface in self.surfaces[:-1]:
+            if not (surface.thickness >= 0 and math.isfinite(surface.thickness)):
+                raise InputError(
+                    f"{place}: the gap behind surface {surface.number} is {surface.thickness * 1e3:g} mm: light "
+                    "would travel backwards. List the surfaces in the order in which they stand on the axis"
+                )
+        stops = [surface.number for surface in self.surfaces if surface.stop]
+        if len(stops) > 1:
+            raise InputError(
+                f"{place} marks surfaces {' and '.join(map(str, stops))} as aperture stop: there is one"
+            )
+        if not any(power != 0 for power in self._powers()):
+            raise InputError(f"{place} has no surface that bends light: a lens needs a curved surface of glass")
+        last = self.surfaces[-1]
+        if abs(last.index - 1) > AIR_TOLERANCE:
+            raise InputError(
+                f"{place}: light leaves the last surface ({last.number}) into {last.glass or 'a medium'} of index "
+                f"{last.index:g}, not into air. If the image lies against a cover glass, leave the glass out or "
+                "list its back surface"
+            )
+
+    @property
+    def length(self) -> float:
+        """From the first surface to the last, metres."""
+        return math.fsum(surface.thickness for surface in self.surfaces[:-1])
+
+    @property
+    def stop(self) -> Surface | None:
+        """The aperture stop, if the file marks one."""
+        return next((surface for surface in self.surfaces if surface.stop), None)
+
+    @property
+    def stop_distance(self) -> float | None:
+        """From the first surface to the stop, metres; None without a stop."""
+        if self.stop is None:
+            return None
+        return math.fsum(surface.thickness for surface in self.surfaces[: self.surfaces.index(self.stop)])
+
+    @property
+    def matrix(self) -> Matrix:
+        """((A, B), (C, D)) from the first surface to the last, in air on both sides: shape (2, 2), SI."""
+        return self._matrix(len(self.surfaces) - 1)
+
+    @property
+    def stop_from_entrance(self) -> Matrix | None:
+        """((A, B), (C, D)) from before the first surface to just behind the stop surface; None without a stop.
+
+        Slopes at the stop are multiplied by the index there, so that the determinant is 1 in glass too.
+        """
+        return None if self.stop is None else self._matrix(self.surfaces.index(self.stop))
+
+    def _powers(self) -> list[float]:
+        before = [1.0, *(surface.index for surface in self.surfaces)]
+        return [surface_power(n, each.index, each.radius) for n, each in zip(before, self.surfaces, strict=False)]
+
+    def _matrix(self, last: int) -> Matrix:
+        """Through surfaces 0 to ``last``, of the list; each after the first is met behind its gap."""
+        steps = []
+        for place, power in enumerate(self._powers()[: last + 1]):
+            if place:
+                steps.append(gap(self.surfaces[place - 1].thickness, self.surfaces[place - 1].index))
+            steps.append(refraction(power))
+        return reduce(lambda done, step: step @ done, steps)
+
+    def first_order(
+        self,
+        *,
+        z: float = 0.0,
+        stop_diameter: float | None = None,
+        f_number: float | None = None,
+        rims: bool = False,
+        decentre: tuple[float, float] = (0.0, 0.0),
+        name: str = "",
+    ) -> FirstOrder:
+        """The lens as an element, from its first surface to its last.
+
+        Args: see `vcc.load_lens`.
+
+        Warns:
+            ResultWarning: the stop is opened wider than in the file.
+
+        Raises:
+            InputError: an aperture asked for where no stop is marked, a stop without diameter, an f-number
+                for an afocal system, rims where the file gives no diameters.
+        """
+        place = self.source or "this prescription"
+        ends: list[float | None] = [None, None]
+        if rims:
+            for end, surface in enumerate((self.surfaces[0], self.surfaces[-1])):
+                if surface.diameter is None:
+                    raise InputError(f"{place}: surface {surface.number} has no diameter: leave rims=True out")
+                ends[end] = surface.diameter
+        lens = FirstOrder(
+            self.matrix, self.length, entrance_diameter=ends[0], exit_diameter=ends[1],
+            z=z, decentre=decentre, name=name, source=self.source,
+        )  # fmt: skip
+        opening = self._opening(lens, stop_diameter, f_number)
+        if opening is None:
+            return lens
+        return dataclasses.replace(lens, stop_from_entrance=self.stop_from_entrance, stop_diameter=opening)
+
+    def _opening(self, lens: FirstOrder, stop_diameter: float | None, f_number: float | None) -> float | None:
+        """The stop's diameter: what is asked for, else what the file states, else the stop surface's own."""
+        place = self.source or "this prescription"
+        if stop_diameter is not None and f_number is not None:
+            raise InputError(f"{place}: give stop_diameter or f_number, not both")
+        if self.stop is None:
+            if stop_diameter is not None or f_number is not None:
+                raise InputError(
+                    f"{place} marks no aperture stop: add a vcc.Mask with patterns.Circle before the lens"
+                )
+            return None
+        if stop_diameter is None and f_number is None:
+            return self._own_opening(lens)
+        opening = stop_diameter if f_number is None else self._by_f_number(lens, f_number)
+        assert opening is not None
+        try:
+            widest: float | None = self._own_opening(lens)
+        except InputError:  # what the file states cannot be used: the way out is to ask for another
+            widest = self.stop.diameter
+        if widest is not None and opening > 1.001 * widest:
+            warnings.warn(
+                f"{place}: a stop of {short(opening)} is wider than that of the prescription ({short(widest)}): "
+                "rims that would cut this light off are not simulated",
+                ResultWarning,
+                stacklevel=4,  # the caller of load_lens
+            )
+        return opening
+
+    def _own_opening(self, lens: FirstOrder) -> float:
+        """The stop's diameter by the aperture that the file states, else the stop surface's own."""
+        assert self.stop is not None
+        if self.f_number is not None:
+            return self._by_f_number(lens, self.f_number)
+        if self.entrance_pupil_diameter is not None:
+            return self.entrance_pupil_diameter * self._magnification()
+        if self.stop.diameter is None:
+            raise InputError(
+                f"{self.source or 'this prescription'}: the stop (surface {self.stop.number}) has no diameter: "
+                "give stop_diameter or f_number"
+            )
+        return self.stop.diameter
+
+    def _by_f_number(self, lens: FirstOrder, f_number: float) -> float:
+        place = self.source or "this prescription"
+        if not (f_number > 0 and math.isfinite(f_number)):
+            raise InputError(f"{place}: f_number must be greater than 0, not {f_number}")
+        if math.isinf(lens.focal_length):
+            raise InputError(f"{place} is afocal, so it has no f-number: give stop_diameter")
+        return abs(lens.focal_length) / f_number * self._magnification()
+
+    def _magnification(self) -> float:
+        """The stop's diameter over that of the entrance pupil."""
+        matrix = self.stop_from_entrance
+        assert matrix is not None
+        if abs(matrix[0, 0]) < 1e-12:
+            raise InputError(
+                f"{self.source or 'this prescription'}: the entrance pupil lies at infinity (telecentric), so no "
+                "f-number and no pupil diameter say how wide the stop is: give stop_diameter"
+            )
+        return float(abs(matrix[0, 0]))

@@ -1,0 +1,238 @@
+"""Sequential lenses from Zemax OpticStudio's text files (.zmx): spheres and planes in glass and air.
+
+Each line is a keyword and values; ``SURF n`` starts a surface, on which CURV is the curvature, DISZ the distance
+to the next surface, GLAS the medium behind, DIAM the semi-diameter, STOP the mark of the aperture stop.
+The first surface is the object and the last the image: both are left out, and so are surfaces in air before
+and behind the lens that do nothing. Values are those with which the file was saved (solves and pickups done,
+one configuration).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from vcc.errors import InputError
+from vcc.prescriptions.glasses import Glasses
+from vcc.prescriptions.model import Prescription, Surface
+from vcc.units import cm, m, mm
+
+_UNITS = {
+    "MM": mm,
+    "CM": cm,
+    "M": m,
+    "METER": m,
+    "METERS": m,
+    "IN": 25.4 * mm,
+    "INCH": 25.4 * mm,
+    "INCHES": 25.4 * mm,
+}
+_MODEL_GLASS = "___BLANK"
+_SYSTEM = {"UNIT", "MODE", "NAME", "GCAT", "FNUM", "ENPD"}
+_PER_SURFACE = {"STOP", "TYPE", "CURV", "DISZ", "GLAS", "DIAM", "CONI"}
+_TYPES = {
+    "EVENASPH": "an asphere",
+    "ODDASPHE": "an asphere",
+    "XASPHERE": "an asphere",
+    "COORDBRK": "a coordinate break",
+    "TOROIDAL": "a toroid",
+    "BICONICX": "a biconic surface",
+    "DGRATING": "a diffraction grating",
+    "BINARY_1": "a diffractive surface",
+    "BINARY_2": "a diffractive surface",
+    "PARAXIAL": "an ideal lens (use vcc.Lens)",
+    "NONSEQCO": "a non-sequential component",
+}
+"""What the more common kinds of surfaces are, for messages; gradient-index kinds are GRADSUR1 and so on."""
+
+
+@dataclass
+class _Lines:
+    """The lines that matter of the file's head, or of one surface: keyword → (line number, values)."""
+
+    number: int = -1
+    found: dict[str, tuple[int, list[str]]] = field(default_factory=dict)
+
+    def values(self, keyword: str) -> list[str]:
+        return self.found.get(keyword, (0, []))[1]
+
+
+def read(content: bytes, file: Path, glasses: Glasses) -> Prescription:
+    """The prescription in a Zemax file.
+
+    Raises:
+        InputError: not a sequential Zemax file, a surface that is not a sphere or plane between glass and air,
+            an unknown glass, a value that is not a number. The message names file and surface.
+    """
+    head, surfaces = _grouped(_text(content), file)
+    mode = head.values("MODE")
+    if mode and mode[0] != "SEQ":
+        raise InputError(f"{file} is in mode {mode[0]}: only sequential lenses (MODE SEQ) can be read")
+    if len(surfaces) < 3:
+        raise InputError(
+            f"{file} lists {len(surfaces)} surfaces (SURF): a Zemax lens has an object, surfaces and an image"
+        )
+    unit = _unit(head, file)
+    for surface in surfaces:  # before any glass is looked up: no catalogue helps a lens with mirrors
+        _check_supported(surface, file)
+    makers = head.values("GCAT")
+    listed = [_surface(surface, unit, makers, glasses, file, _place(file, surface)) for surface in surfaces[:-1]]
+    if listed[0].index != 1.0:
+        raise InputError(f"{file}: the object lies in {listed[0].glass or 'glass'}, not in air")
+    inner, image_distance = _without_idle_ends(listed[1:])
+    return Prescription(
+        tuple(inner),
+        name=" ".join(head.values("NAME")),
+        source=file.name,
+        f_number=_f_number(head, file),
+        entrance_pupil_diameter=_entrance_pupil(head, unit, file),
+        image_distance=image_distance,
+    )
+
+
+def _text(content: bytes) -> str:
+    """UTF-16 (as newer versions write), UTF-8, or what Windows wrote before."""
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16", errors="replace")
+    if content[1:2] == b"\0":
+        return content.decode("utf-16-le", errors="replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")  # only names and notes can hold such letters
+
+
+def _grouped(text: str, file: Path) -> tuple[_Lines, list[_Lines]]:
+    head, surfaces = _Lines(), list[_Lines]()
+    for number, keyword, values in _keywords(text):
+        if keyword == "SURF":
+            expected = len(surfaces)
+            if values[:1] != [str(expected)]:
+                raise InputError(
+                    f"{file}, line {number}: surface {expected} should follow, not {' '.join(values)!r}"
+                )
+            surfaces.append(_Lines(expected))
+        elif surfaces and keyword in _PER_SURFACE:
+            surfaces[-1].found.setdefault(keyword, (number, values))
+        elif keyword in _SYSTEM:
+            head.found.setdefault(keyword, (number, values))
+    if not surfaces:
+        raise InputError(f"{file} lists no surfaces: a Zemax lens has lines SURF 0, SURF 1 …")
+    return head, surfaces
+
+
+def _keywords(text: str) -> Iterator[tuple[int, str, list[str]]]:
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.split()
+        if words:
+            yield number, words[0], words[1:]
+
+
+def _place(file: Path, surface: _Lines) -> str:
+    return f"{file}: surface {surface.number}"
+
+
+def _number(lines: _Lines, keyword: str, column: int, place: str, file: Path) -> float:
+    line, values = lines.found[keyword]
+    try:
+        value = float(values[column])
+    except (IndexError, ValueError):
+        value = math.nan
+    if math.isnan(value):
+        where = place if place != str(file) else f"{file}"
+        raise InputError(f'{where}, line {line}: "{keyword} {" ".join(values)}" should have a number')
+    return value
+
+
+def _unit(head: _Lines, file: Path) -> float:
+    values = head.values("UNIT")
+    if not values:
+        raise InputError(f"{file} does not say its unit of length: it needs a line UNIT MM")
+    if values[0].upper() not in _UNITS:
+        raise InputError(f"{file}: its unit of length {values[0]} is not known; known are {', '.join(_UNITS)}")
+    return _UNITS[values[0].upper()]
+
+
+def _f_number(head: _Lines, file: Path) -> float | None:
+    """The stated f-number for a distant scene; a second value of 1 makes it the working one, which is not that."""
+    values = head.values("FNUM")
+    if not values or (len(values) > 1 and values[1] != "0"):
+        return None
+    value = _number(head, "FNUM", 0, str(file), file)
+    return value if value > 0 else None
+
+
+def _entrance_pupil(head: _Lines, unit: float, file: Path) -> float | None:
+    if not head.values("ENPD"):
+        return None
+    value = _number(head, "ENPD", 0, str(file), file)
+    return value * unit if value > 0 else None
+
+
+def _check_supported(surface: _Lines, file: Path) -> None:
+    place = _place(file, surface)
+    kind = (surface.values("TYPE") or ["STANDARD"])[0].upper()
+    if kind != "STANDARD":
+        what = _TYPES.get(kind, "a gradient-index surface" if kind.startswith("GRAD") else "not a sphere or plane")
+        raise InputError(f"{place} is {what} (TYPE {kind}), which is not supported: only spheres and planes are")
+    if surface.values("GLAS")[:1] == ["MIRROR"]:
+        raise InputError(f"{place} is a mirror (GLAS MIRROR), which is not supported: only refracting lenses are")
+    if "CONI" in surface.found and (conic := _number(surface, "CONI", 0, place, file)) != 0:
+        raise InputError(
+            f"{place} is an asphere (CONI {conic:g}), which is not supported: only spheres and planes are"
+        )
+
+
+def _surface(surface: _Lines, unit: float, makers: list[str], glasses: Glasses, file: Path, place: str) -> Surface:
+    for keyword in ("CURV", "DISZ"):
+        if keyword not in surface.found:
+            raise InputError(f"{place} has no line {keyword}")
+    curvature = _number(surface, "CURV", 0, place, file)
+    distance = surface.values("DISZ")[:1]
+    thickness = math.inf if distance == ["INFINITY"] else _number(surface, "DISZ", 0, place, file) * unit
+    diameter = 2 * _number(surface, "DIAM", 0, place, file) * unit if "DIAM" in surface.found else 0.0
+    name, index = _medium(surface, makers, glasses, place, file)
+    return Surface(
+        radius=math.inf if curvature == 0 else unit / curvature,
+        thickness=thickness,
+        index=index,
+        diameter=diameter if diameter > 0 else None,
+        stop="STOP" in surface.found,
+        glass=name,
+        number=surface.number,
+    )
+
+
+def _medium(surface: _Lines, makers: list[str], glasses: Glasses, place: str, file: Path) -> tuple[str, float]:
+    """Name and index of what lies behind a surface; ("", 1.0) is air.
+
+    The index that stands after a catalogue name is not used: files hold placeholders there.
+    """
+    if "GLAS" not in surface.found:
+        return "", 1.0
+    values = surface.values("GLAS")
+    if not values:
+        raise InputError(f"{place} has a line GLAS that names no glass")
+    if values[0] != _MODEL_GLASS:
+        return values[0], glasses.by_name(values[0], makers, place)
+    abbe_number = _number(surface, "GLAS", 4, place, file) if len(values) > 4 else 0.0
+    return "", glasses.by_index(_number(surface, "GLAS", 3, place, file), abbe_number)
+
+
+def _without_idle_ends(surfaces: list[Surface]) -> tuple[list[Surface], float | None]:
+    """The lens proper, and the distance from its last surface to the image.
+
+    Surfaces in air that do not bend light are references of the design; before and behind the lens they
+    would only make it longer. The stop stays wherever it is.
+    """
+    before = [1.0, *(surface.index for surface in surfaces)]
+    counts = [
+        place for place, each in enumerate(surfaces) if each.stop or each.index != 1.0 or before[place] != 1.0
+    ]
+    if not counts:
+        return surfaces, None
+    first, last = counts[0], counts[-1]
+    distance = math.fsum(surface.thickness for surface in surfaces[last:])
+    return surfaces[first : last + 1], distance if 0 < distance < math.inf else None

@@ -1,0 +1,114 @@
+"""``vcc expose``: raw numbers from a camera file and a folder of views."""
+
+import dataclasses
+
+import imagecodecs
+import numpy as np
+import pytest
+import tifffile
+from typer.testing import CliRunner
+
+import vcc
+import vcc.camera_file
+from vcc.cli.commands import app
+
+CAMERA = """
+[[elements]]
+kind = "lens"
+z = "0 mm"
+focal_length = "50 mm"
+diameter = "2 mm"
+[sensor]
+z = "52 mm"
+shape = [12, 16]
+pitch = "1 mm"
+"""
+KNOWN = ["--spacing", "1 mm", "--slope-per-pixel", "0.02", "--focus-distance", "1.3 m"]
+RGGB = vcc.Electronics(color_filter="RGGB")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder to work in, with a camera file and a light field of 3 × 3 views."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "camera.toml").write_text(CAMERA)
+    (tmp_path / "views").mkdir()
+    texture = np.random.default_rng(1).integers(40, 255, (24, 28, 3), np.uint8)
+    for row, column in np.ndindex(3, 3):
+        view = np.ascontiguousarray(texture[2 - row : 22 - row, 2 - column : 26 - column])
+        (tmp_path / "views" / f"view_{row}_{column}.png").write_bytes(imagecodecs.png_encode(view))
+    return tmp_path
+
+
+@pytest.fixture
+def electronics(monkeypatch):
+    """The camera of the file, with electronics behind a colour filter."""
+    load = vcc.camera_file.load_camera
+
+    def load_with_electronics(path):
+        camera = load(path)
+        return vcc.Camera(camera.elements, dataclasses.replace(camera.sensor, electronics=RGGB))
+
+    monkeypatch.setattr(vcc.camera_file, "load_camera", load_with_electronics)
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def refused(*arguments):
+    result = run(*arguments)
+    assert result.exit_code == 2, result.output
+    assert "Traceback" not in result.output
+    return result.stderr
+
+
+@pytest.mark.usefixtures("folder", "electronics")
+def test_expose_gives_what_the_library_gives():
+    result = run(
+        *("expose", "camera.toml", "views", "-o", "raw.tif", "--exposure", "20 us", "--seed", "7"),
+        *("--radiance", "0.5", *KNOWN),
+    )
+    assert result.exit_code == 0, result.output
+    assert "raw.tif: 16×12 pixels, grey, 12-bit raw, RGGB, exposed 20 us" in result.stdout
+    light_field = vcc.open_light_field("views", spacing=1e-3, slope_per_pixel=0.02, focus_distance=1.3)
+    camera = vcc.camera_file.load_camera("camera.toml")
+    recording = camera.expose(light_field, 20e-6, seed=7, radiance=0.5)
+    assert np.array_equal(tifffile.imread("raw.tif"), recording.values)
+
+
+@pytest.mark.usefixtures("electronics")
+def test_expose_writes_a_picture_too(folder):
+    result = run("expose", "camera.toml", "views", "-o", "raw.npy", "--picture", "picture.png", *KNOWN)
+    assert result.exit_code == 0, result.output
+    assert np.load("raw.npy").dtype == np.uint16
+    assert imagecodecs.png_decode((folder / "picture.png").read_bytes()).shape == (12, 16, 3)
+    assert "picture.png: 16×12 pixels, 3 channels" in result.stdout
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_camera_without_electronics_is_refused_before_the_light_field_is_read():
+    said = refused("expose", "camera.toml", "no such folder", "-o", "raw.tif")
+    assert "sensor.electronics" in said
+
+
+@pytest.mark.usefixtures("folder", "electronics")
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--exposure", "10"], "--exposure"),
+        (["--exposure", "10 mm"], "--exposure"),
+        (["--exposure", "0 ms"], "above 0"),
+        (["--seed", "-1"], "seed is -1"),
+        (["--radiance", "0"], "radiance is 0"),
+        (["-o", "raw.exr"], ".tif, .tiff, .png, .npy"),
+        (["--picture", "raw.gif"], ".png"),
+    ],
+)
+def test_bad_options_are_refused(arguments, message):
+    output = [] if "-o" in arguments else ["-o", "raw.tif"]
+    assert message in refused("expose", "camera.toml", "views", *output, *KNOWN, *arguments)
+
+
+def test_seeds_that_are_not_whole_numbers_are_no_options():
+    assert run("expose", "camera.toml", "views", "-o", "raw.tif", "--seed", "1.5").exit_code == 2

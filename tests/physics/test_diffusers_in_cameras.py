@@ -1,0 +1,345 @@
+"""Diffusers in cameras: light kept, blur by the kernel times the distance, and brute force for all else.
+
+Oracles: conservation; the characteristic function and the moments of kernels in closed form; the tracer of
+`ray_oracle`, backwards and forwards, which draws what diffusers do from NumPy's generator.
+
+What limits an agreement with the tracer: the tracer's noise (measured), the picture's own sampling error (its
+estimate), and the light field, which is samples of the scene, interpolated. That last part is measured once, by
+the picture of the camera without diffusers, traced with very many rays: `test_the_light_field_holds_the_scene`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from brute_force import Layer, Scene, Texture, ThinLensCamera, cosines, psnr, round_stop, views
+from ray_oracle import Bench, Thin, cells, cosine_sheet, disc, grown, histogram, lens, normal, round_hat, square
+from scipy.integrate import quad
+from scipy.signal import convolve2d
+
+import vcc
+from vcc.kernels import Gaussian, Samples, TopHat
+from vcc.patterns import Circle, CosineSum
+from vcc.units import m, mm
+
+F, FOCUS = 50 * mm, 1 * m
+D = 1 / (1 / F - 1 / FOCUS)
+VIEWS, SPACING, SLOPE, PIXELS, DISPARITY = 16, 1 * mm, 1e-3, 96, 0.5
+DIAMETER = 12 * mm
+PICTURE = vcc.Sensor(z=D, shape=(24, 24), pitch=2 * D * SLOPE)
+LENS = vcc.Lens(focal_length=F, diameter=DIAMETER)
+ROUND = Thin(0.0, bend=lens(F), share=disc(DIAMETER))
+LIGHT_FIELD_ERROR = 10 ** (-56 / 20)
+"""Of the light field, as a share of the picture's largest value."""
+
+
+def two_planes() -> Scene:
+    """A textured plane before another, with an edge that is soft over six samples."""
+    near, far = (1 / (disparity * SLOPE / SPACING + 1 / FOCUS) for disparity in (DISPARITY, -DISPARITY))
+    periods = np.array([26.0, 40.0, 60.0]) * SLOPE
+    width = 6 * SLOPE * near
+
+    def edge(x, y):
+        return 0.5 * (1 + np.tanh((0.8 * x + 0.6 * y) / width))
+
+    return Scene([Layer(near, cosines(1, periods * near), edge), Layer(far, cosines(2, periods * far))])
+
+
+SCENE = two_planes()
+
+
+@cache
+def light_field() -> vcc.LightField:
+    samples = views(SCENE, (VIEWS, VIEWS, PIXELS, PIXELS), SPACING, SLOPE, FOCUS).astype(np.float32)
+    return vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(-DISPARITY, DISPARITY))
+
+
+@cache
+def in_focus(texture: Texture, pixels: int = 128, views_across: int = VIEWS) -> vcc.LightField:
+    """A single plane where the views converge."""
+    plane = Scene([Layer(FOCUS, texture)])
+    samples = views(plane, (views_across, views_across, pixels, pixels), SPACING, SLOPE, FOCUS).astype(np.float32)
+    return vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0))
+
+
+def capture(elements, lf, sensor, **options) -> vcc.Image:
+    return vcc.Camera(elements, sensor).capture(lf, **options)
+
+
+# -- conservation
+
+
+class Blob:
+    """A round Gaussian spot on the plane in focus, dark around."""
+
+    sigma = 8 * SLOPE * FOCUS
+
+    def __call__(self, x, y):
+        return np.exp(-(x**2 + y**2) / (2 * self.sigma**2))
+
+
+BLOB = Blob()
+WIDE = vcc.Sensor(z=D, shape=(60, 60), pitch=2.2 * D * SLOPE)
+"""66 samples each way from the middle: 4σ of the blob, 32, and what the diffusers of these tests reach, 33."""
+KERNELS = {
+    "gaussian": Gaussian(7e-3),
+    "disc": TopHat(50e-3),
+    "square": TopHat(40e-3, shape="square"),
+    "array": Samples(np.array([[0.1, 0.0, 0.3], [0.2, 0.25, 0.05], [0.1, 0.0, 0.0]]), 18e-3),
+}
+STOP = vcc.Mask(pattern=np.ones((1, 1)), width=DIAMETER)
+RULES = {
+    "blur of the picture": lambda kernel: [vcc.Lens(focal_length=F), STOP, vcc.Diffuser(kernel=kernel, z=0.1 * D)],
+    "blur of each view": lambda kernel: [
+        vcc.Lens(focal_length=F),
+        STOP,
+        vcc.Diffuser(kernel=kernel),
+        vcc.Mask(pattern=Circle(40 * mm), z=0.2 * D),  # all light passes it; it forbids a blur of the picture
+    ],
+}
+
+
+@pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
+@pytest.mark.parametrize("rule", RULES)
+def test_a_diffuser_conserves_light(rule, kernel):
+    lf, elements = in_focus(BLOB), RULES[rule](kernel)
+    camera = vcc.Camera(elements, WIDE)
+    assert any(rule in note for note in camera.compile(lf).notes)
+    without = vcc.Camera([one for one in elements if not isinstance(one, vcc.Diffuser)], WIDE).capture(lf)
+    blurred = camera.capture(lf)
+    # ∫ radiance = 2πσ² over the plane, seen by the stop under the solid angle side²/distance²; the plane's
+    # samples are 8 to σ, so that their sum is the integral to exp(−2π²·8²), and tents keep it.
+    total = 2 * np.pi * BLOB.sigma**2 * DIAMETER**2 / FOCUS**2
+    # float32 samples and sums: 2⁻²⁴ each, of either sign; ten times that is generous for a sum of them.
+    assert without.values.sum(dtype=np.float64) * WIDE.sensitive_area == pytest.approx(total, rel=1e-5)
+    assert blurred.values.sum(dtype=np.float64) == pytest.approx(without.values.sum(dtype=np.float64), rel=2e-6)
+    assert blurred.values.max() < 0.8 * without.values.max()  # it did scatter
+
+    rays = camera.capture(lf, method="rays", samples=256)
+    # Errors of pixels are independent: their sum's is √pixels of theirs. Four standard deviations.
+    noise = rays.sampling_error * np.sqrt(rays.values.size)
+    assert rays.sampling_error < 0.02 * rays.values.max()
+    assert rays.values.sum(dtype=np.float64) == pytest.approx(blurred.values.sum(dtype=np.float64), abs=4 * noise)
+
+
+def test_a_coded_diffuser_conserves_light():
+    widths = np.random.default_rng(1).uniform(0, 7e-3, (5, 5))
+    coded = vcc.CodedDiffuser(Gaussian(1.0), width=14 * mm, widths=widths, z=0.1 * D)
+    lf = in_focus(BLOB)
+    bare = [vcc.Lens(focal_length=F), STOP]
+    image = capture([*bare, coded], lf, WIDE, samples=256)
+    total = capture(bare, lf, WIDE).values.sum(dtype=np.float64)
+    noise = image.sampling_error * np.sqrt(image.values.size)
+    assert noise < 2e-3 * total
+    assert image.values.sum(dtype=np.float64) == pytest.approx(total, abs=4 * noise)
+
+
+# -- at the sensor
+
+
+@pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
+def test_a_diffuser_at_the_sensor_changes_nothing(kernel):
+    diffuser = vcc.Diffuser(kernel=kernel, z=D)
+    without = capture([LENS], light_field(), PICTURE)
+    np.testing.assert_allclose(
+        capture([LENS, diffuser], light_field(), PICTURE).values, without.values, rtol=1e-6
+    )
+    rays = capture([LENS, diffuser], light_field(), PICTURE, method="rays", samples=1024)
+    plain = capture([LENS], light_field(), PICTURE, method="rays", samples=1024)
+    # Two independent errors; the estimate from halves is known to 1/√(2·576) = 3 %.
+    error = np.sqrt(np.mean((rays.values - plain.values) ** 2))
+    assert error <= 1.2 * np.hypot(rays.sampling_error, plain.sampling_error)
+    assert error < 1e-3 * plain.values.max()
+
+
+# -- at the aperture, and anywhere before a sensor in focus
+
+
+def cut_normal(k: float) -> float:
+    """E cos(kz) of a normal variable cut at ±4 (its characteristic function, by quadrature)."""
+    share = quad(lambda z: np.exp(-z * z / 2), -4, 4, epsabs=1e-13)[0]
+    return quad(lambda z: np.exp(-z * z / 2) * np.cos(k * z), -4, 4, epsabs=1e-13, limit=200)[0] / share
+
+
+WAVES = Texture(0.5, ((0.2, 1 / 26e-3, 0.0, 0.4), (0.2, 12e-3 / (26e-3 * 30e-3), 1 / 30e-3, 1.0)))
+"""Periods of 26 and about 25 samples on the plane in focus."""
+
+
+def amplitudes(picture: np.ndarray, sensor: vcc.Sensor) -> list[float]:
+    """The cosines' amplitudes in a picture of WAVES, by least squares. The picture is inverted, D/FOCUS as large."""
+    x, y = np.meshgrid(sensor.column_places, sensor.row_places)
+    columns = [np.ones(x.size)]
+    for _, fx, fy, _ in WAVES.waves:
+        phase = 2 * np.pi * (fx * x + fy * y).ravel() * FOCUS / D
+        columns += [np.cos(phase), np.sin(phase)]
+    found = np.linalg.lstsq(np.stack(columns, axis=1), picture.ravel().astype(np.float64), rcond=None)[0]
+    return [float(np.hypot(found[2 * n + 1], found[2 * n + 2]) / found[0]) for n in range(len(WAVES.waves))]
+
+
+@pytest.mark.parametrize("place", [0.0, 0.5], ids=["at the aperture", "half-way"])
+@pytest.mark.parametrize("method", ["auto", "rays"])
+def test_a_gaussian_diffuser_takes_from_cosines_what_the_closed_form_says(place, method):
+    sensor = vcc.Sensor(z=D, shape=(52, 52), pitch=D * SLOPE)
+    sigma = (5e-3, 3e-3) if place == 0 else (10e-3, 6e-3)
+    diffuser = vcc.Diffuser(kernel=Gaussian(sigma), z=place * D)
+    lf = in_focus(WAVES)
+    options = {"method": "rays", "samples": 4096} if method == "rays" else {}
+    after = capture([LENS, diffuser], lf, sensor, **options)
+    before = capture([LENS], lf, sensor)
+    way = D - diffuser.z
+    for (_, fx, fy, _), new, old in zip(
+        WAVES.waves, amplitudes(after.values, sensor), amplitudes(before.values, sensor), strict=True
+    ):
+        qx, qy = fx * FOCUS / D, fy * FOCUS / D
+        expected = cut_normal(2 * np.pi * sigma[0] * way * qx) * cut_normal(2 * np.pi * sigma[1] * way * qy)
+        # What the cut does not change: exp(−2π²σ²d²q²)
+        plain = np.exp(-2 * np.pi**2 * way**2 * ((sigma[0] * qx) ** 2 + (sigma[1] * qy) ** 2))
+        assert expected == pytest.approx(plain, abs=5e-4)
+        assert plain < 0.6
+        if method == "auto":
+            # The blur is the kernel on the lattice of pixels, each point shared linearly by its neighbours: a
+            # tent on either axis, sinc²(pitch·q), and copies at q + n/pitch that a kernel of σ ≥ 3 pixels does
+            # not have (exp(−2π²·9·0.96²) < 1e-70). The rest is rounding of float32.
+            lattice = (np.sinc(sensor.pitch * qx) * np.sinc(sensor.pitch * qy)) ** 2
+            assert new / old == pytest.approx(expected * lattice, abs=2e-5)
+            assert lattice > 0.985  # the 1/6 pixel² of variance that a blur of pixels adds
+        else:
+            # A fit of n pixels knows an amplitude to √(2/n) of their error; four standard deviations. The picture
+            # without the diffuser has none.
+            noise = after.sampling_error / after.values.mean() * np.sqrt(2 / after.values.size) / old
+            assert noise < 1e-4
+            assert new / old == pytest.approx(expected, abs=4 * noise + 1e-5)
+
+
+@pytest.mark.parametrize("name", ["disc", "square", "array"])
+@pytest.mark.parametrize("method", ["auto", "rays"])
+def test_moments_of_a_blurred_spot_are_those_of_the_kernel(name, method):
+    kernel = KERNELS[name]
+    lf = in_focus(BLOB)
+    diffuser = vcc.Diffuser(kernel=kernel, z=0.1 * D)
+    options = {"method": "rays", "samples": 2048} if method == "rays" else {}
+    images = [capture([LENS, *more], lf, WIDE, **options) for more in ([], [diffuser])]
+    moments = []
+    for image in images:
+        light = image.values.astype(np.float64) / image.values.sum(dtype=np.float64)
+        x, y = WIDE.column_places[None, :], WIDE.row_places[:, None]
+        mean = (light * x).sum(), (light * y).sum()
+        moments.append((*mean, (light * (x - mean[0]) ** 2).sum(), (light * (y - mean[1]) ** 2).sum()))
+    added = np.subtract(moments[1], moments[0])
+    # By hand: a disc of width w has w²/16 along each axis, a square w²/12, cells the moments of their middles
+    # and pitch²/12.
+    if name == "array":
+        at = (np.arange(3) - 1) * 18e-3
+        rows, columns = kernel.values.sum(axis=1), kernel.values.sum(axis=0)
+        mean = (columns @ at, rows @ at)
+        spread = [shares @ at**2 - (shares @ at) ** 2 + (18e-3) ** 2 / 12 for shares in (columns, rows)]
+    else:
+        mean = (0.0, 0.0)
+        spread = [kernel.width**2 / (16 if name == "disc" else 12)] * 2
+    way = 0.9 * D
+    expected = np.array([way * mean[0], way * mean[1], way**2 * spread[0], way**2 * spread[1]])
+    if method == "auto":
+        expected[2:] += WIDE.pitch**2 / 6  # shared linearly between pixels
+        tolerance = np.array([1e-5, 1e-5, 1e-5, 1e-5])  # kernels' weights without a closed form are that good
+    else:
+        # The sums' errors: pixels' errors are independent, and weighted by place and by its square.
+        noise = images[1].sampling_error / images[1].values.sum(dtype=np.float64) * np.sqrt(2)
+        x = np.broadcast_to(WIDE.column_places, WIDE.shape)
+        tolerance = 4 * noise * np.sqrt([(x**2).sum()] * 2 + [(x**4).sum()] * 2) / np.array([way] * 2 + [way**2] * 2)
+        assert tolerance[2] < 0.03 * max(spread)
+    np.testing.assert_allclose(
+        added / [way, way, way**2, way**2], expected / [way, way, way**2, way**2], rtol=0, atol=tolerance.max()
+    )
+
+
+# -- among other things, against brute force
+
+
+def test_the_light_field_holds_the_scene():
+    """How far interpolating its samples is from the scene: exact quadrature against rays without noise."""
+    truth = ThinLensCamera(F, round_stop(DIAMETER, 16, 32), D, PICTURE.shape, PICTURE.pitch).picture(SCENE)
+    image = capture([LENS], light_field(), PICTURE, method="rays", samples=8192)
+    assert image.sampling_error < 1e-4 * truth.max()
+    reached = psnr(image.values, truth)
+    print(f"light field {reached:.1f} dB")
+    assert 10 ** (-reached / 20) <= LIGHT_FIELD_ERROR
+
+
+CODE = np.array([[1, 0, 1, 1, 0], [0, 1, 1, 0, 1], [1, 1, 0, 1, 0], [0, 1, 0, 1, 1], [1, 0, 1, 0, 1]], float)
+WIDTHS = np.random.default_rng(3).uniform(0, 12e-3, (4, 5))
+WEIGHTS = np.random.default_rng(4).dirichlet([1, 1, 1], (3, 3)).transpose(2, 0, 1)
+ARRAY = KERNELS["array"].values
+
+
+def mask(place: float, period: float = 5 * mm) -> tuple[vcc.Mask, Thin]:
+    pattern = CosineSum((period, period), 1, 0.7)
+    return vcc.Mask(pattern=pattern, z=place * D), Thin(place * D, share=cosine_sheet(period, 0.7))
+
+
+def coded_mask(place: float) -> tuple[vcc.Mask, Thin]:
+    return vcc.Mask(pattern=CODE, width=11 * mm, z=place * D), Thin(place * D, share=cells(CODE, 11 * mm))
+
+
+def gaussian(place: float, sigma: float) -> tuple[vcc.Diffuser, Thin]:
+    return vcc.Diffuser(kernel=Gaussian(sigma), z=place * D), Thin(place * D, scatter=normal(sigma))
+
+
+def hat(place: float, width: float) -> tuple[vcc.Diffuser, Thin]:
+    return vcc.Diffuser(kernel=TopHat(width), z=place * D), Thin(place * D, scatter=round_hat(width))
+
+
+def stretched(place: float) -> tuple[vcc.CodedDiffuser, Thin]:
+    """σ by position."""
+    sheet = 15 * mm
+    sigma, one = grown(WIDTHS, sheet), normal(1.0)
+
+    def scatter(xi, eta, zeta, x, y):
+        s, t = one(xi, eta)
+        here = sigma(x, y)
+        return s * here, t * here
+
+    inside = Thin(
+        place * D,
+        share=lambda x, y: ((np.abs(x) <= sheet / 2) & (np.abs(y) <= sheet / 2 * 4 / 5)).astype(float),
+        scatter=scatter,
+    )
+    return vcc.CodedDiffuser(Gaussian(1.0), width=sheet, widths=WIDTHS, z=place * D), inside
+
+
+def mixed(place: float) -> tuple[vcc.CodedDiffuser, Thin]:
+    """Three kernels in shares by position: the first share of the third number picks the kernel."""
+    sheet = 14 * mm
+    shares = [grown(weights, sheet) for weights in WEIGHTS]
+    kernels = [normal(3e-3), round_hat(30e-3), histogram(ARRAY, 6e-3)]
+
+    def scatter(xi, eta, zeta, x, y):
+        first, second = shares[0](x, y), shares[1](x, y)
+        which = (zeta >= first).astype(int) + (zeta >= first + second)
+        # A kernel's own numbers must not depend on which one was picked.
+        ways = [kernel(xi, eta, np.random.default_rng(5).random(xi.shape), x, y) for kernel in kernels]
+        return tuple(np.choose(which, [way[n] for way in ways]) for n in (0, 1))
+
+    kinds = (Gaussian(3e-3), TopHat(30e-3), Samples(ARRAY, 6e-3))
+    element = vcc.CodedDiffuser(kinds, width=sheet, weights=WEIGHTS, z=place * D)
+    return element, Thin(place * D, share=square(sheet), scatter=scatter)
+
+
+CASES = {
+    "mask, diffuser": ([mask(0.5), gaussian(0.7, 8e-3)], 4 * 8e-3 * 0.7),
+    "diffuser, mask": ([gaussian(0.3, 8e-3), mask(0.7, 3 * mm)], 4 * 8e-3 * 0.3),
+    "diffuser, mask, diffuser": ([gaussian(0.3, 6e-3), mask(0.5), hat(0.7, 20e-3)], 24e-3 * 0.3 + 10e-3 * 0.7),
+    "diffuser, cells, diffuser": ([gaussian(0.3, 4e-3), coded_mask(0.5), hat(0.7, 20e-3)], 16e-3 * 0.3 + 7e-3),
+    "two diffusers at the lens, mask": ([gaussian(0, 3e-3), hat(0, 20e-3), mask(0.6)], 0.0),
+    "width by position, mask": ([stretched(0.3), mask(0.6, 4 * mm)], 4 * 12e-3 * 0.3),
+    "mask, width by position": ([mask(0.4), stretched(0.6)], 4 * 12e-3 * 0.6),
+    "kernels by position, mask": ([mixed(0.3), mask(0.6, 4 * mm)], 15e-3 * 0.3),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_diffusers_and_masks_match_brute_force(case):
+    pairs, spread = CASES[case]
+    image = capture([LENS, *(one for one, _ in pairs)], light_field(), PICTURE, samples=8192)
