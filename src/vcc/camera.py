@@ -302,6 +302,7 @@ class Camera:
         *,
         seed: int = 0,
         radiance: float = 1.0,
+        ray_seed: int = 0,
         **options: Any,
     ) -> Recording:
         """What the sensor records of a light field, as its electronics number it, noise included (EMVA 1288).
@@ -313,7 +314,8 @@ class Camera:
             seed: of the sensor's noise, a whole number. Recordings with different seeds are independent; the
                 same seed gives the same numbers, on any number of threads.
             radiance: what a sample value of 1 stands for, W/(m²·sr), in each channel's band.
-            options: as in `capture`, whose seed (of rays) stays 0 here.
+            ray_seed: of the choice of rays, where rays are traced: the seed of `capture`.
+            options: as in `capture`.
 
         Raises:
             InputError: a sensor without electronics, channels that they cannot record, an unusable exposure,
@@ -324,7 +326,7 @@ class Camera:
         """
         from vcc.recording import expose
 
-        return expose(self, light_field, exposure, seed=seed, radiance=radiance, **options)
+        return expose(self, light_field, exposure, seed=seed, radiance=radiance, ray_seed=ray_seed, **options)
 
     def explain(self, light_field: LightField, **options: Any) -> Explanation:
         """The plan for a light field in words: what was folded, pulled to the sensor, chosen, and its cost.

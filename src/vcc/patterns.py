@@ -393,7 +393,9 @@ class FunctionPattern(Pattern):
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """What the function returns, checked."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        shape = np.broadcast_shapes(x.shape, y.shape)
+        # As whole arrays: a function of x alone then returns one number for each place, too.
+        x, y = np.broadcast_arrays(x, y)
+        shape = x.shape
         name = getattr(self.function, "__name__", repr(self.function))
         values = np.asarray(self.function(x, y), dtype=np.float64)
         if values.shape not in (shape, ()):

@@ -244,6 +244,7 @@ def expose(
     *,
     seed: int = 0,
     radiance: float = 1.0,
+    ray_seed: int = 0,
     **options: Any,
 ) -> Recording:
     """What a camera's sensor records of a light field, as numbers. See `vcc.Camera.expose`, which calls this."""
@@ -253,7 +254,7 @@ def expose(
     checked_seed(seed)
     _checked_radiance(radiance)
     electronics.check_channels(light_field.channels)
-    image = camera.capture(light_field, **options)
+    image = camera.capture(light_field, seed=ray_seed, **options)
     return expose_image(image, camera.sensor, exposure, seed=seed, radiance=radiance)
 
 

@@ -80,10 +80,14 @@ def capture(
         bool,
         typer.Option("--as-recorded", help="Leave the picture upside down, as it lies on the sensor."),
     ] = False,
+    method: given.Method = "auto",
     interpolation: given.Interpolation = "linear",
     between_views: given.BetweenViews = "auto",
     scene_distance: given.SceneDistance = None,
     refine: given.Refine = "auto",
+    samples: given.Samples = None,
+    tolerance: given.Tolerance = None,
+    ray_seed: given.RaySeed = 0,
     engine: given.Engine = "numba",
     transfer: given.Transfer = "srgb",
     spacing: given.Spacing = None,
@@ -93,31 +97,26 @@ def capture(
 ) -> None:
     """Make the picture that a camera records of a light field."""
     factor = given.exposure_of(exposure)
-    distance = given.length(scene_distance, "--scene-distance")
-    division = given.refinement(refine)
+    how = given.how_made(
+        method=method,
+        interpolation=interpolation,
+        between_views=between_views,
+        scene_distance=scene_distance,
+        refine=refine,
+        samples=samples,
+        ray_seed=ray_seed,
+    )
     from vcc.camera_file import load_camera
     from vcc.formats.pictures import WRITE_ENDINGS
 
     output = check_output(output, WRITE_ENDINGS)
     optics = load_camera(camera)
     field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
-    plan = optics.compile(
-        field,
-        interpolation=interpolation,
-        between_views=between_views,
-        scene_distance=distance,
-        refine=division,
-    )
+    plan = optics.compile(field, **how)
     expensive = plan.samples_touched * (field.channels or 1) > SAMPLES_WORTH_A_BAR
     with progress("Capturing") as advance:
         image = optics.capture(
-            field,
-            interpolation=interpolation,
-            between_views=between_views,
-            scene_distance=distance,
-            refine=division,
-            engine=engine,
-            progress=advance if expensive else None,
+            field, **how, tolerance=tolerance, engine=engine, progress=advance if expensive else None
         )
     show(image.save(output, exposure=factor, upright=not as_recorded).description)
 
@@ -161,10 +160,14 @@ def expose(
             show_default=False,
         ),
     ] = None,
+    method: given.Method = "auto",
     interpolation: given.Interpolation = "linear",
     between_views: given.BetweenViews = "auto",
     scene_distance: given.SceneDistance = None,
     refine: given.Refine = "auto",
+    samples: given.Samples = None,
+    tolerance: given.Tolerance = None,
+    ray_seed: given.RaySeed = 0,
     engine: given.Engine = "numba",
     transfer: given.Transfer = "srgb",
     spacing: given.Spacing = None,
@@ -177,8 +180,15 @@ def expose(
     The camera file says how the sensor does so, in a table sensor.electronics.
     """
     time = given.exposure_time(exposure)
-    distance = given.length(scene_distance, "--scene-distance")
-    division = given.refinement(refine)
+    how = given.how_made(
+        method=method,
+        interpolation=interpolation,
+        between_views=between_views,
+        scene_distance=scene_distance,
+        refine=refine,
+        samples=samples,
+        ray_seed=ray_seed,
+    )
     from vcc.camera_file import load_camera
     from vcc.formats.pictures import RAW_ENDINGS, WRITE_ENDINGS
     from vcc.recording import electronics_of
@@ -194,10 +204,9 @@ def expose(
         time,
         seed=seed,
         radiance=radiance,
-        interpolation=interpolation,
-        between_views=between_views,
-        scene_distance=distance,
-        refine=division,
+        ray_seed=how.pop("seed"),
+        **how,
+        tolerance=tolerance,
         engine=engine,
     )
     show(recording.save(output).description)
@@ -210,10 +219,14 @@ def expose(
 def explain(
     camera: given.CameraFile,
     light_field: given.LightFieldFolder,
+    method: given.Method = "auto",
     interpolation: given.Interpolation = "linear",
     between_views: given.BetweenViews = "auto",
     scene_distance: given.SceneDistance = None,
     refine: given.Refine = "auto",
+    samples: given.Samples = None,
+    tolerance: given.Tolerance = None,
+    ray_seed: given.RaySeed = 0,
     engine: given.Engine = "numba",
     transfer: given.Transfer = "srgb",
     spacing: given.Spacing = None,
@@ -222,20 +235,20 @@ def explain(
     orientation: given.Orientation = "auto",
 ) -> None:
     """Say how a picture would be made, what it costs and what to beware of."""
-    distance = given.length(scene_distance, "--scene-distance")
-    division = given.refinement(refine)
+    how = given.how_made(
+        method=method,
+        interpolation=interpolation,
+        between_views=between_views,
+        scene_distance=scene_distance,
+        refine=refine,
+        samples=samples,
+        ray_seed=ray_seed,
+    )
     from vcc.camera_file import load_camera
 
     optics = load_camera(camera)
     field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
-    words = optics.explain(
-        field,
-        interpolation=interpolation,
-        between_views=between_views,
-        scene_distance=distance,
-        refine=division,
-        engine=engine,
-    )
+    words = optics.explain(field, **how, tolerance=tolerance, engine=engine)
     show(str(words))
 
 

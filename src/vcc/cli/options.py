@@ -66,6 +66,40 @@ Orientation = Annotated[
         rich_help_panel=_READING,
     ),
 ]
+Method = Annotated[
+    Literal["auto", "footprints", "rays"],
+    typer.Option(
+        help="footprints spread each sample over the sensor, exactly, where lenses, prisms and masks are all "
+        "there is; rays are traced through anything. auto takes footprints where it can.",
+        rich_help_panel=_CAPTURING,
+    ),
+]
+Samples = Annotated[
+    int | None,
+    typer.Option(
+        metavar="NUMBER",
+        help="Rays a pixel, where rays are traced; rounded up to a power of two. Default: 64.",
+        show_default=False,
+        rich_help_panel=_CAPTURING,
+    ),
+]
+Tolerance = Annotated[
+    float | None,
+    typer.Option(
+        metavar="NUMBER",
+        help="Double the rays until the picture's sampling error is at most this share of its mean, like 0.01.",
+        show_default=False,
+        rich_help_panel=_CAPTURING,
+    ),
+]
+RaySeed = Annotated[
+    int,
+    typer.Option(
+        metavar="NUMBER",
+        help="Of the choice of rays: the same number gives the same picture.",
+        rich_help_panel=_CAPTURING,
+    ),
+]
 Interpolation = Annotated[
     Literal["nearest", "linear", "cubic"],
     typer.Option(help="Interpolation within a view.", rich_help_panel=_CAPTURING),
@@ -103,6 +137,32 @@ Engine = Annotated[
         rich_help_panel=_CAPTURING,
     ),
 ]
+
+
+def how_made(
+    *,
+    method: str,
+    interpolation: str,
+    between_views: str,
+    scene_distance: str | None,
+    refine: str,
+    samples: int | None,
+    ray_seed: int,
+) -> dict[str, Any]:
+    """The options of `vcc.Camera.compile` from those of the command line.
+
+    Raises:
+        InputError: a distance without a unit, or a refinement that is no number.
+    """
+    return {
+        "method": method,
+        "interpolation": interpolation,
+        "between_views": between_views,
+        "scene_distance": length(scene_distance, "--scene-distance"),
+        "refine": refinement(refine),
+        "samples": samples,
+        "seed": ray_seed,
+    }
 
 
 def refinement(given: str) -> int | str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,11 @@ FINE_ENOUGH = 1e-6
 WORTH_SAYING = 1e-3
 """The same, from which on a plan says it."""
 POINTS_AT_ONCE = 2**20
+LIGHT_FIELD_BOUNDS = ((slice(0, 2), "the grid of views"), (slice(2, 4), "the slopes of the views"))
+"""What bounds rays where no stop does. By slopes only where the sensor shows each view as a point: what is beyond
+the views' pictures is asked for, and missing."""
+UNBOUNDED = 1e6
+"""Metres, or slopes, by which no ray of a camera strays."""
 ROUNDS = 8
 """Plates deflect by where they are met, and are met by how they deflect: bounds are refined so often."""
 
@@ -184,23 +189,29 @@ class _Path:
     def aimed(self) -> tuple[Aim, list[tuple[Array, Array]]]:
         """The aim, and for each leg the region (low, high) in which its stage is met."""
         slack = _Slack(*([[np.zeros(4)] * (len(self.legs) + 1)] * 2))
-        size = math.inf
+        size: float | None = None
         for _ in range(ROUNDS):
             aim = self.best(slack)
             regions, slack = self.walk(aim)
             before, size = size, sum(float(part.sum()) for part in slack.whole)
-            if abs(size - before) <= 0.01 * before:
+            if before is not None and abs(size - before) <= 0.01 * before:
                 break
+            if size > UNBOUNDED:
+                self.refuse()
         else:
-            names = ", ".join(leg.stage.element.label for leg in self.legs if leg.stage.faces.bending is not None)
-            raise InputError(
-                f"no bound can be found for the rays through {names}: the further out, the more it bends. "
-                "Give it a diameter, or put a stop beside it"
-            )
+            self.refuse()
         # Once more, with all that rays can stray by.
         aim = self.best(slack)
         regions, _ = self.walk(aim)
         return aim, regions
+
+    def refuse(self) -> NoReturn:
+        """Say which elements leave the rays without a bound."""
+        names = ", ".join(leg.stage.element.label for leg in self.legs if leg.stage.faces.bending is not None)
+        raise InputError(
+            f"no bound can be found for the rays through {names}: the further out, the more it bends. "
+            "Give it a diameter, or put a stop beside it"
+        )
 
     def walk(self, aim: Aim) -> tuple[list[tuple[Array, Array]], _Slack]:
         """The region in which each stage is met, and how far rays can stray."""
@@ -259,11 +270,12 @@ class _Path:
                 if window is not None:
                     yield self.made_up(window, n, slice(0, 2))
         if not self.stop_at_views:
-            middle, half, loose = self.entrance_middle, self.entrance_half, slack[-1]
-            for part, words in ((slice(0, 2), "the grid of views"), (slice(2, 4), "the slopes of the views")):
-                window = _window(self.at_entrance, part, middle[part], half[part] + loose[part], False, words)
+            middle, half = self.entrance_middle, self.entrance_half + slack[-1]
+            for part, words in LIGHT_FIELD_BOUNDS:
+                window = _window(self.at_entrance, part, middle[part], half[part], False, words)
                 if window is not None:
                     yield self.made_up(window, len(self.legs), part)
+                    return
 
     def made_up(self, window: Window, n: int, part: slice) -> Window:
         """The window in the plane of leg n, its slopes making up for uniform diffusers before that plane."""
@@ -317,8 +329,8 @@ class _Path:
         if not self.stop_at_views:
             loose = slack[-1] - self.slack_through(n, way, slack)
             half = self.entrance_half + loose
-            for part, words in ((slice(0, 2), "the grid of views"), (slice(2, 4), "the slopes of the views")):
-                yield way, part, self.entrance_middle[part], half[part], words
+            part, words = LIGHT_FIELD_BOUNDS[0]
+            yield way, part, self.entrance_middle[part], half[part], words
 
     def slack_through(self, n: int, way: Affine, slack: list[Array]) -> Array:
         """The part of the slack beyond leg n that comes from leg n itself: cells' windows know it exactly."""

@@ -1,0 +1,263 @@
+"""Where rays are aimed, how far they stray, and what is made of functions of position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import vcc
+from vcc import kernels, surfaces
+from vcc.optics import Element, Faces
+from vcc.patterns import Circle, CosineSum
+from vcc.plan import steps
+from vcc.plan.ray_compiler import compile_rays
+from vcc.plan.rays import TABLE, CellWindows, RayPlan, Window, hashed
+from vcc.units import mm, um
+
+D = 1 / (1 / 50e-3 - 1)
+LENS = vcc.Lens(focal_length=50 * mm, diameter=6 * mm)
+
+
+def field(shape=(7, 7, 9, 11), **options) -> vcc.LightField:
+    values = np.random.default_rng(0).random(shape).astype(np.float32)
+    defaults = {"spacing": 1 * mm, "slope_per_pixel": 2e-3, "focus_distance": 1.0, "disparity_range": (-0.2, 0.4)}
+    return vcc.LightField.from_views(values, **(defaults | options))
+
+
+def plan_of(*elements: Element, sensor: vcc.Sensor | None = None, **options) -> RayPlan:
+    sensor = sensor or vcc.Sensor(D, (7, 8), D * 2e-3)
+    return compile_rays(vcc.Camera(elements, sensor), field(), **options)
+
+
+def rays_of(plan: RayPlan):
+    pixel = np.arange(plan.sensor_shape[0] * plan.sensor_shape[1])
+    return plan.looked_up(pixel, plan.block(pixel))
+
+
+def test_any_aligned_block_of_points_is_even():
+    # A (0, 2)-sequence in base 2: of 64 successive points from a multiple of 64, each of the 64 boxes of 8×8,
+    # 1×64, 2×32 … holds one (Sobol' 1967; the first two dimensions).
+    points = plan_of(LENS, vcc.Lens(focal_length=1.0, z=1 * mm)).points[:, :2].astype(float) + 0.5
+    for first in (0, 64 * 17, TABLE - 64):
+        block = points[first : first + 64]
+        for across in (1, 2, 4, 8, 16, 32, 64):
+            boxes = np.floor(block * [across, 64 // across]).astype(int)
+            assert len(np.unique(boxes, axis=0)) == 64
+
+
+def test_neighbouring_pixels_take_unrelated_blocks():
+    numbers = hashed(np.arange(2**16), 3) / 2**32
+    # Uniform to 4 standard errors, and not correlated with the next: 1/√n.
+    assert numbers.mean() == pytest.approx(0.5, abs=4 / np.sqrt(12 * 2**16))
+    assert abs(np.corrcoef(numbers[:-1], numbers[1:])[0, 1]) < 4 / 256
+    assert not np.array_equal(hashed(np.arange(9), 3), hashed(np.arange(9), 4))
+
+
+def test_through_a_stop_all_rays_count():
+    _, share = rays_of(plan_of(LENS))
+    assert (share > 0).all()
+    assert share.sum(axis=(1, 2)) == pytest.approx(np.pi * 9e-6 / D**2)
+
+
+def test_the_smallest_bound_is_aimed_at():
+    stop = vcc.Mask(Circle(2 * mm), z=30 * mm, name="stop")
+    plan = plan_of(LENS, stop)
+    assert 'mask "stop"' in plan.aim.words
+    assert isinstance(plan.aim, Window)
+    assert plan.aim.solid_angle == pytest.approx(np.pi * 1e-6 / (D - 30 * mm) ** 2)
+    # Without any stop the light field itself is the bound.
+    assert plan_of(vcc.Lens(focal_length=50 * mm)).aim.words == "the grid of views"
+
+
+def test_a_diffuser_between_is_made_up_for():
+    # Rays are drawn with what the diffuser will do, so all of them hit the stop behind it exactly.
+    for z in (10 * mm, D):
+        plan = plan_of(LENS, vcc.Diffuser(kernels.Gaussian(0.02), z=z), vcc.Mask(CosineSum(9 * mm), z=30 * mm))
+        index, _ = rays_of(plan)
+        place = field().frame(index)[..., :2]
+        assert np.hypot(place[..., 0], place[..., 1]).max() < 3 * mm * (1 + 1e-6)
+        assert np.hypot(place[..., 0], place[..., 1]).max() > 2.9 * mm
+
+
+def test_a_plate_between_widens_the_aim_just_enough():
+    plate = vcc.PhasePlate(surfaces.Cubic(50.0), diameter=8 * mm, z=10 * mm)
+    plan = plan_of(LENS, plate)
+    _, share = rays_of(plan)
+    lit = (share > 0).mean()
+    assert 0.3 < lit < 1  # some rays miss, none that count are left out:
+    everything = plan_of(vcc.Lens(focal_length=50 * mm, diameter=20 * mm), vcc.Mask(Circle(6 * mm)), plate)
+    assert rays_of(plan)[1].sum() == pytest.approx(rays_of(everything)[1].sum(), rel=2e-2)
+
+
+def test_an_unbounded_plate_that_bends_without_bound_is_refused():
+    with pytest.raises(vcc.InputError, match=r"no bound.*phase plate at z = 30 mm.*diameter"):
+        plan_of(LENS, vcc.PhasePlate(surfaces.Cubic(1e6), z=30 * mm))
+
+
+def test_lenslets_are_aimed_at_where_their_light_comes_from():
+    array = vcc.LensArray(pitch=0.5 * mm, focal_length=4 * mm, z=D)
+    plan = plan_of(LENS, array, sensor=vcc.Sensor(D + 4 * mm, (16, 18), 0.05 * mm))
+    assert isinstance(plan.aim, CellWindows)
+    _, share = rays_of(plan)
+    # f-numbers nearly match (8 and 8.8): a pixel sees the stop through one lenslet or two, never through nine.
+    cells = (share > 0).any(axis=2).sum(axis=1)
+    assert cells.max() <= 4
+    # Of the rays through those cells most pass the stop, π/4 of the square around it that is aimed at; aimed at
+    # the array as a whole, of (3 mm)² of its area, one in thirty would.
+    seen = share[(share > 0).any(axis=2)]
+    assert (seen > 0).mean() > 0.5
+
+
+@pytest.mark.parametrize(("samples", "given"), [(2, 2), (3, 4), (64, 64), (100, 128), (65536, 65536)])
+def test_samples_are_rounded_up_to_a_power_of_two(samples, given):
+    assert plan_of(LENS, samples=samples).samples == given
+
+
+@pytest.mark.parametrize("samples", [0, 1, 65537, 2.5, True, "many"])
+def test_bad_samples(samples):
+    with pytest.raises(vcc.InputError, match="samples is a whole number"):
+        plan_of(LENS, samples=samples)
+
+
+@pytest.mark.parametrize("seed", [1.5, True, "one", None])
+def test_seeds_are_whole_numbers(seed):
+    with pytest.raises(vcc.InputError, match="seed"):
+        plan_of(LENS, seed=seed)
+
+
+def test_options_that_do_not_go_together():
+    camera = vcc.Camera([LENS], vcc.Sensor(D, (4, 4), 1 * mm))
+    with pytest.raises(vcc.InputError, match="method is 'auto'"):
+        camera.capture(field(), method="guess")
+    with pytest.raises(vcc.InputError, match="samples is for pictures made by rays"):
+        camera.capture(field(), samples=8)
+    with pytest.raises(vcc.InputError, match="tolerance is for pictures made by rays"):
+        camera.capture(field(), tolerance=0.1)
+    with pytest.raises(vcc.InputError, match="tolerance is a share"):
+        camera.capture(field(), method="rays", tolerance=0.0)
+    with pytest.raises(vcc.InputError, match=r"interpolation='cubic' is for pictures made by footprints"):
+        camera.capture(field(), method="rays", interpolation="cubic")
+    with pytest.raises(vcc.InputError, match=r"refine=2 is for"):
+        camera.capture(field(), method="rays", refine=2)
+    with pytest.raises(vcc.InputError, match="between_views is"):
+        camera.capture(field(), method="rays", between_views="maybe")
+
+
+@dataclass(frozen=True)
+class Wavy(Element):
+    """A user's element: bends by a sine, lets through a disc."""
+
+    def faces(self) -> Faces:
+        return Faces(
+            deflection=lambda x, y: (0.01 * np.sin(2000 * x), 0.0 * y),
+            transmission=lambda x, y: np.exp(-(x**2 + y**2) / (3 * mm) ** 2),
+        )
+
+
+def test_functions_become_textures_as_fine_as_they_need():
+    plan = plan_of(LENS, Wavy(z=0.0))
+    bend = next(step for step in plan.steps if isinstance(step, steps.TextureUnbend))
+    weigh = next(step for step in plan.steps if isinstance(step, steps.TextureShares))
+    generator = np.random.default_rng(1)
+    x, y = generator.uniform(-3 * mm, 3 * mm, (2, 1000))
+    # A linear texture of spacing h misses a sine by h²/8 of its second derivative, 0.01·2000².
+    error = bend.texture.spacing[0] ** 2 / 8 * 0.01 * 2000**2
+    assert np.abs(bend.texture(x, y)[:, 0] - 0.01 * np.sin(2000 * x)).max() <= error * 1.01
+    assert error < 1e-6
+    assert np.abs(weigh.texture(x, y)[:, 0] - np.exp(-(x**2 + y**2) / (3 * mm) ** 2)).max() < 1e-4
+
+
+def test_what_is_too_fine_for_a_texture_is_said():
+    plan = plan_of(LENS, vcc.PhasePlate(lambda x, y: (0.01 * np.sin(4e6 * x), 0 * y), diameter=6 * mm))
+    assert any("phase plate" in note and "root mean square" in note for note in plan.notes)
+
+
+@dataclass(frozen=True)
+class Broken(Element):
+    """Elements that return what they must not."""
+
+    how: str = ""
+
+    def faces(self) -> Faces:
+        wrong = {
+            "shape": lambda x, y: (np.zeros(3), np.zeros(3)),
+            "three": lambda x, y: (x, y, x),
+            "nan": lambda x, y: (np.sqrt(x), y),
+            "number": lambda x, y: 1.0,
+        }
+        if self.how == "nothing":
+            return None  # type: ignore[return-value]
+        if self.how in ("dark", "masknan"):
+            return Faces(transmission=lambda x, y: x + np.nan if self.how == "masknan" else x * y - 1)
+        with np.errstate(invalid="ignore"):
+            return Faces(deflection=wrong[self.how])
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("shape", "shape"),
+        ("three", "two arrays"),
+        ("nan", "not finite"),
+        ("number", "two arrays"),
+        ("nothing", "must return vcc.Faces"),
+        ("dark", "between 0 and 1"),
+        ("masknan", "not finite"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_an_element_that_returns_nonsense_is_named(how, words):
+    bad = Broken(how, name="mine", z=1 * mm)
+    with pytest.raises(vcc.InputError, match=words) as caught:
+        vcc.Camera([LENS, bad], vcc.Sensor(D, (4, 4), 1 * mm)).capture(field(), method="rays")
+    assert 'broken "mine"' in str(caught.value)
+
+
+def test_lenslets_smaller_than_a_pixel_are_warned_of():
+    array = vcc.LensArray(pitch=50 * um, focal_length=0.4 * mm, z=D)
+    camera = vcc.Camera([LENS, array], vcc.Sensor(D + 0.4 * mm, (6, 6), 60 * um))
+    with pytest.warns(vcc.ResultWarning, match=r"lens array at z = .* are 50 um wide, less than a pixel .*60 um"):
+        camera.capture(field())
+    assert "less than a pixel" in camera.explain(field())
+
+
+def test_what_explain_says_of_rays():
+    array = vcc.LensArray(pitch=0.5 * mm, focal_length=4 * mm, z=D, name="lenslets")
+    camera = vcc.Camera([LENS, array], vcc.Sensor(D + 4 * mm, (50, 60), 0.05 * mm))
+    text = camera.explain(field(), samples=32, seed=7)
+    for words in (
+        'lens array "lenslets" bends rays by a function of position that is not affine',
+        'aimed at lens at z = 0 mm through each cell of lens array "lenslets"',
+        "32 rays for each pixel and lenslet that it sees, evenly spread, seed 7",
+        "expected sampling error",
+        "million rays",
+        "s expected",
+    ):
+        assert words in text
+    assert isinstance(text.plan, RayPlan)
+    assert text.expected_seconds > 0
+
+
+def test_explain_foretells_the_sampling_error_and_the_rays():
+    array = vcc.LensArray(pitch=0.5 * mm, focal_length=4 * mm, z=D)
+    camera = vcc.Camera([LENS, array], vcc.Sensor(D + 4 * mm, (70, 80), 0.05 * mm))
+    from vcc.engines import record
+
+    plan = camera.compile(field())
+    recorded = record(plan, field().values)
+    text = str(camera.explain(field()))
+    foretold = float(text.split("expected sampling error: ")[1].split()[0])
+    assert foretold == pytest.approx(recorded.sampling_error / recorded.values.mean(), rel=0.4)
+    millions = float(text.split(" million rays")[0].split()[-1])
+    assert millions == pytest.approx(recorded.rays / 1e6, rel=0.2)
+
+
+def test_masks_at_the_light_field_that_reach_beyond_it_are_missing_rays():
+    wide = vcc.Lens(focal_length=50 * mm, diameter=14 * mm)  # the grid of views is 7 mm wide
+    picture_of = vcc.Camera([wide], vcc.Sensor(D, (4, 4), D * 1e-3)).capture
+    with pytest.warns(vcc.ResultWarning, match="rays that this camera asks for are not in the light field"):
+        picture = picture_of(field(), method="rays", samples=1024)
+    # π·7² mm² asked for, 49 held
+    assert picture.missing_rays == pytest.approx(1 - 49 / (np.pi * 49), abs=2e-3)
