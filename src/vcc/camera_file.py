@@ -14,44 +14,58 @@
     pattern = "mask.png"       # .png, .tif, .npy, .csv …, found beside the camera file
     width = "30 mm"
 
+    [[elements]]
+    kind = "diffuser"
+    z = "41 mm"
+    kernel = { name = "gaussian", sigma = 0.01 }
+
     [sensor]
     z = "52 mm"
     shape = [500, 500]
     pitch = "48 um"
 
-A mask's ``pattern`` is the name of a file, rows of numbers (``[[0, 1], [1, 0]]``) or a pattern by
-name: ``{ name = "cosine_sum", period = ["1 mm", "1 mm"], harmonics = 3 }``. Names are those of the
-classes in `vcc.patterns` (``open``, ``circle``, ``polygon``, ``cells``, ``cosine_sum``,
-``bounded``) and ``mura``.
+Patterns, kernels and surfaces are written by name: the classes of `vcc.patterns` (``open``, ``circle``,
+``polygon``, ``cells``, ``cosine_sum``, ``bounded`` …, and ``mura``), of `vcc.kernels` (``gaussian``,
+``top_hat``, ``radial``, ``samples``) and of `vcc.surfaces` (``cubic``, ``zernike``, ``height_map`` …). Arrays
+are the name of a file or rows of numbers (``[[0, 1], [1, 0]]``). A field that is a dataclass of its own, such
+as a sensor's electronics, is a table: ``[sensor.electronics]``. A real lens is a ``first_order`` with
+``lens_file = "dgauss.50mm.dat"`` instead of a matrix.
 
-Reading and writing go by the fields of the dataclasses, their types and their units, so that a new
-element or pattern needs no code here.
+Reading and writing go by the fields of the dataclasses, their types and their units, so that a new element,
+pattern, kernel or surface needs no code here.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
+import inspect
 import math
 import re
 import tomllib
 import types
+import warnings
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from vcc import optics, patterns, units
+from vcc import kernels, optics, patterns, surfaces, units
+from vcc.affine import Affine
 from vcc.camera import Camera
+from vcc.describe import is_default
 from vcc.errors import InputError
-from vcc.optics import Element
+from vcc.kernels import Kernel
+from vcc.optics import Element, FirstOrder, lattice
 from vcc.patterns import Cells, FunctionPattern, Pattern
 from vcc.sensor import Sensor
+from vcc.surfaces import Surface
 
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+_ARRAY_LIKE = set(get_args(ArrayLike))
 
 
 def _friendly(kind: type) -> str:
@@ -59,28 +73,96 @@ def _friendly(kind: type) -> str:
     return _CAMEL.sub("_", kind.__name__).lower()
 
 
-ELEMENT_KINDS: dict[str, type[Element]] = {
-    _friendly(kind): kind
-    for kind in (getattr(optics, name) for name in optics.__all__)
-    if isinstance(kind, type) and issubclass(kind, Element) and kind is not Element
-}
+def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
+    """The classes of modules that can be made, by their names in a file."""
+    things = [thing for module in modules for thing in vars(module).values()]
+    kinds = [kind for kind in things if inspect.isclass(kind) and issubclass(kind, base)]
+    return {_friendly(kind): kind for kind in kinds if not inspect.isabstract(kind)}
+
+
+ELEMENT_KINDS: dict[str, type[Element]] = dict(sorted(_named(Element, optics).items()))
 """Which class each ``kind`` in a camera file stands for. Add your own to read and write them."""
 
-PATTERN_NAMES: dict[str, type[Pattern]] = {
-    _friendly(kind): kind
-    for kind in vars(patterns).values()
-    if isinstance(kind, type) and issubclass(kind, Pattern) and kind not in (Pattern, FunctionPattern)
-}
-"""Which class each ``name`` of a pattern in a camera file stands for."""
+PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice)
+"""Which class each ``name`` of a pattern in a camera file stands for. Add your own."""
+del PATTERN_NAMES[_friendly(FunctionPattern)]  # Python, which no file can hold
 
-_MURA = "mura"
+KERNEL_NAMES: dict[str, type[Kernel]] = _named(Kernel, kernels)
+"""Which class each ``name`` of a diffuser's kernel in a camera file stands for. Add your own."""
+
+SURFACE_NAMES: dict[str, type[Surface]] = _named(Surface, surfaces)
+"""Which class each ``name`` of a phase plate's surface in a camera file stands for. Add your own."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Mura:
+    """`vcc.patterns.mura` as a file writes it; its cells are an array."""
+
+    prime: int
+
+    def made(self) -> NDArray[np.float64]:
+        return patterns.mura(self.prime)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Family:
+    """Things that a file writes by name, like ``{ name = "circle", diameter = "5 mm" }``.
+
+    Args:
+        base: the class of all of them.
+        names: which class each name stands for.
+        table: where a user adds names.
+        example: of one as a file writes it.
+        way_out: what to do with a thing that has no name.
+        arrays: names that stand for an array, where a field takes arrays too.
+    """
+
+    base: type
+    names: dict[str, Any]
+    table: str
+    example: str
+    way_out: str
+    arrays: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    @property
+    def noun(self) -> str:
+        return self.base.__name__.lower()
+
+    def listed(self) -> str:
+        return _listed([*self.names, *self.arrays])
+
+
+_FAMILIES = (
+    _Family(
+        Pattern,
+        PATTERN_NAMES,
+        "PATTERN_NAMES",
+        '{ name = "circle", diameter = "5 mm" }',
+        "Mask(pattern=function(x, y), width=…) with arrays x and y of cell centres",
+        {"mura": _Mura},
+    ),
+    _Family(
+        Kernel,
+        KERNEL_NAMES,
+        "KERNEL_NAMES",
+        '{ name = "gaussian", sigma = 0.01 }',
+        "vcc.kernels.Samples(kernel.density(s, t), slope_pitch=…, normalise=True) with arrays s and t of slopes",
+    ),
+    _Family(
+        Surface,
+        SURFACE_NAMES,
+        "SURFACE_NAMES",
+        '{ name = "cubic", strength = 250.0 }',
+        "vcc.surfaces.PathMap(paths, width=…) with the optical path in metres at cell centres",
+    ),
+)
 
 
 def load_camera(path: str | PathLike[str]) -> Camera:
     """The camera that a TOML file describes; see `vcc.camera_file` for its form.
 
     Args:
-        path: the file. Pictures of masks are found relative to its folder.
+        path: the file. Arrays, pictures of masks and lens files are found relative to its folder.
 
     Raises:
         InputError: no such file, not TOML, or anything in it that is unknown, missing, of a wrong
@@ -106,16 +188,17 @@ def load_camera(path: str | PathLike[str]) -> Camera:
 def save_camera(camera: Camera, path: str | PathLike[str]) -> None:
     """Write a camera as TOML, so that `load_camera` gives back an equal one.
 
-    Masks given as arrays are written beside the file, as .npy named after it and the element,
-    unless the file that they came from is there already. Files appear whole or not at all.
+    Arrays are written beside the file, as .npy named after it and the element, in SI; a mask's not if the
+    file that it came from is there already. A real lens keeps its lens file if that is beside the camera
+    file and still gives the same lens; otherwise its matrix is written. Files appear whole or not at all.
 
     Args:
         camera: what to write.
         path: where to; an older file of that name is replaced.
 
     Raises:
-        InputError: an element or pattern that a file cannot hold (any Python function), or a folder
-            that cannot be written to.
+        InputError: an element, pattern, kernel or surface that a file cannot hold (any Python function), or a
+            folder that cannot be written to.
     """
     import tomli_w
 
@@ -165,9 +248,87 @@ def _read_element(entry: Mapping[str, Any], number: int, file: Path) -> Element:
     kind = _known(entry["kind"], ELEMENT_KINDS, f"{place}: kind")
     name = entry.get("name")
     named = f' "{name}"' if isinstance(name, str) and name else ""
+    place = f"{place} ({entry['kind']}{named})"
     given = {key: value for key, value in entry.items() if key != "kind"}
-    element: Element = _build(kind, given, f"{place} ({entry['kind']}{named})", file.parent)
+    element: Element
+    if kind in _FROM_FILES and _comes_from_file(kind, given, place):
+        form = _FROM_FILES[kind]
+        element = _made(_build(form, given, place, file.parent), f"{place}: {_first_field(form)}", file.parent)
+    else:
+        element = _build(kind, given, place, file.parent)
     return element
+
+
+def _comes_from_file(kind: type, given: Mapping[str, Any], place: str) -> bool:
+    """Whether a file describes the element, rather than its fields; it cannot be both or neither."""
+    form, fields = _FROM_FILES[kind], _fields(kind)
+    key = _first_field(form)
+    if key not in given:
+        for name in fields:
+            if _needed(fields[name]) and name not in given:
+                raise InputError(f'{place} has no field "{name}", and no "{key}" that would give it')
+        return False
+    for name in given:
+        if name in fields and name not in _fields(form):
+            raise InputError(f"{place} has a {key} and a {name}: the file gives the {name}, leave one out")
+    return True
+
+
+def _made(form: Any, what: str, *arguments: Any) -> Any:
+    """What a form that a file writes stands for."""
+    try:
+        return form.made(*arguments)
+    except InputError as error:
+        raise InputError(f"{what}: {error}") from None
+
+
+def _first_field(kind: type) -> str:
+    return dataclasses.fields(kind)[0].name
+
+
+@dataclasses.dataclass(frozen=True)
+class _LensFile:
+    """`vcc.load_lens` as a file writes it: a real lens in a file beside the camera file."""
+
+    lens_file: str
+    stop_diameter: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    f_number: float | None = None
+    wavelength: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    glasses: dict[str, float] | None = None
+    rims: bool = False
+    z: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
+    decentre: tuple[float, float] = dataclasses.field(default=(0.0, 0.0), metadata={"unit": "length"})
+    name: str = ""
+
+    def made(self, folder: Path) -> FirstOrder:
+        from vcc.prescriptions import load_lens
+
+        given = {
+            field.name: getattr(self, field.name)
+            for field in dataclasses.fields(self)[1:]
+            if getattr(self, field.name) is not None
+        }
+        lens = load_lens(folder / Path(self.lens_file).expanduser(), **given)
+        return dataclasses.replace(lens, source=self.lens_file)
+
+    @classmethod
+    def of(cls, lens: FirstOrder, folder: Path) -> _LensFile | None:
+        """The form that gives an equal lens; None if it came from no file, or that is gone or gives another."""
+        rims = lens.exit_diameter is not None
+        for stop in (None, lens.stop_diameter):
+            form = cls(lens.source, stop, rims=rims, z=lens.z, decentre=lens.decentre, name=lens.name)
+            try:
+                with warnings.catch_warnings():  # of a wide stop, which was said when it was read
+                    warnings.simplefilter("ignore")
+                    if lens.source and form.made(folder) == lens:
+                        return form
+            except (InputError, OSError):  # no such file, or a source that is no file's name at all
+                continue
+        return None
+
+
+_FROM_FILES: dict[type[Element], Any] = {FirstOrder: _LensFile}
+"""Elements that another file than an array's can describe: the form to read when its first field is given."""
 
 
 def _known(name: object, choices: Mapping[str, Any], what: str) -> Any:
@@ -245,26 +406,69 @@ def _alternatives(hint: Any) -> tuple[Any, ...]:
     return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
 
 
+def _family_of(choices: tuple[Any, ...]) -> _Family | None:
+    """The family that a field takes things of, by the types that it takes."""
+    classes = [choice for choice in choices if inspect.isclass(choice)]
+    return next((each for each in _FAMILIES if any(issubclass(one, each.base) for one in classes)), None)
+
+
+def _takes_arrays(choices: tuple[Any, ...]) -> bool:
+    return set(choices) >= _ARRAY_LIKE or any(np.ndarray in (choice, get_origin(choice)) for choice in choices)
+
+
 def _read_value(given: Any, hint: Any, unit: str | None, what: str, folder: Path) -> Any:
     """A value of a file as the type that a field wants."""
     choices = _alternatives(hint)
-    if any(isinstance(choice, type) and issubclass(choice, Pattern) for choice in choices):
-        return _read_pattern(given, len(choices) > 1, what, folder)
-    if any(get_origin(choice) is np.ndarray for choice in choices):
-        return _read_array(given, what, folder)
-    pairs = [get_args(choice) for choice in choices if get_origin(choice) is tuple]
-    if pairs and (isinstance(given, list) or not {int, float, str} & set(choices)):
-        return _read_list(given, pairs[0], unit, what, folder)
+    family, arrays = _family_of(choices), _takes_arrays(choices)
+    items = next((get_args(choice) for choice in choices if get_origin(choice) is tuple), None)
+    if (
+        family is not None
+        and not (isinstance(given, list) and items)
+        and not (arrays and not isinstance(given, dict))
+    ):
+        return _read_named(given, family, arrays, what, folder)
+    if arrays:
+        return _read_array(given, unit, family is not None and family.base is Pattern, what, folder)
+    if items and (isinstance(given, list) or not {int, float, str} & set(choices)):
+        return _read_list(given, items, unit, what, folder)
+    for choice in choices:
+        if choice is Affine:
+            return _read_affine(given, what, folder)
+        if get_origin(choice) is dict:
+            entry = get_args(choice)[1]
+            table = _checked_table(given, what)
+            return {key: _read_value(one, entry, unit, f"{what}: {key}", folder) for key, one in table.items()}
+        if dataclasses.is_dataclass(choice) and inspect.isclass(choice):
+            return _build(choice, _checked_table(given, what), what, folder)
     if unit is not None:
         return units.parse(given, unit, what)
     return _read_plain(given, choices, what)
 
 
+def _checked_table(given: Any, what: str) -> Mapping[str, Any]:
+    if not isinstance(given, dict):
+        raise InputError(
+            f"{what} is {given!r}: it is a table of fields, in braces or below a line of its own, such as "
+            f"[sensor.electronics]"
+        )
+    return given
+
+
 def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, folder: Path) -> tuple[Any, ...]:
-    example = {None: "0", "length": '"1 mm"', "angle": '"1 deg"', "time": '"1 ms"'}[unit]
-    if not isinstance(given, list) or len(given) != len(hints):
-        wanted = ", ".join([example] * len(hints))
-        raise InputError(f"{what} is {given!r}: it is a list of {len(hints)}, like [{wanted}]")
+    """A list of so many entries, or of any number where the hints are ``(float, ...)``."""
+    if len(hints) == 2 and hints[1] is Ellipsis:
+        wanted, fits = "", isinstance(given, list)
+        family = _family_of(_alternatives(hints[0]))
+        hints = (hints[0],) * (len(given) if isinstance(given, list) else 2)
+    else:
+        wanted, fits = f" of {len(hints)}", isinstance(given, list) and len(given) == len(hints)
+        family = None
+    if not fits:
+        example = {None: "0", "length": '"1 mm"', "angle": '"1 deg"', "time": '"1 ms"'}[unit]
+        if str in _alternatives(hints[0]):
+            example = '"…"'
+        example = example if family is None else family.example
+        raise InputError(f"{what} is {given!r}: it is a list{wanted}, like [{', '.join([example] * len(hints))}]")
     return tuple(
         _read_value(value, hint, unit, f"{what}, number {number} of {len(hints)},", folder)
         for number, (value, hint) in enumerate(zip(given, hints, strict=True), start=1)
@@ -279,60 +483,61 @@ def _read_plain(given: Any, choices: tuple[Any, ...], what: str) -> Any:
         return float(given)
     names = {int: "a whole number", float: "a number", str: "text in quotes", bool: "true or false"}
     wanted = " or ".join(names[choice] for choice in choices if choice in names)
-    raise InputError(f"{what} is {given!r}: it is {wanted or 'something else'}")
+    raise InputError(f"{what} is {given!r}: it is {wanted or 'something that a camera file cannot hold'}")
 
 
-def _read_pattern(given: Any, arrays: bool, what: str, folder: Path) -> Any:
-    """A pattern by name; where a field takes arrays, also one from a file or rows of numbers."""
-    if isinstance(given, dict):
-        if "name" not in given:
-            names = _listed([*PATTERN_NAMES, _MURA])
-            raise InputError(f"{what} has no name: add name = … with one of {names}")
-        parameters = {key: value for key, value in given.items() if key != "name"}
-        kind = _known(given["name"], {**PATTERN_NAMES, _MURA: _Mura}, f"{what}: name")
-        built = _build(kind, parameters, f"{what} ({given['name']})", folder)
-        if not isinstance(built, _Mura):
-            return built
-        if arrays:
-            return built.cells(what)
-    if arrays:
-        return _read_array(given, what, folder)
-    raise InputError(
-        f'{what} is {given!r}: write a pattern by name, like {{ name = "circle", diameter = "5 mm" }}'
-    )
+def _read_named(given: Any, family: _Family, arrays: bool, what: str, folder: Path) -> Any:
+    """A thing by name; where a field takes arrays, also a name that stands for one."""
+    if not isinstance(given, dict):
+        raise InputError(f"{what} is {given!r}: write a {family.noun} by name, like {family.example}")
+    extra = family.arrays if arrays else {}
+    if "name" not in given:
+        raise InputError(f"{what} has no name: add name = … with one of {_listed([*family.names, *extra])}")
+    parameters = {key: value for key, value in given.items() if key != "name"}
+    kind = _known(given["name"], {**family.names, **extra}, f"{what}: name")
+    built = _build(kind, parameters, f"{what} ({given['name']})", folder)
+    return _made(built, what) if kind in extra.values() else built
 
 
-@dataclasses.dataclass(frozen=True)
-class _Mura:
-    """`vcc.patterns.mura` as a file writes it; its cells are an array."""
-
-    prime: int
-
-    def cells(self, what: str) -> NDArray[np.float64]:
-        try:
-            return patterns.mura(self.prime)
-        except InputError as error:
-            raise InputError(f"{what}: {error}") from None
-
-
-def _read_array(given: Any, what: str, folder: Path) -> NDArray[np.float64]:
-    """Transmissions from a file beside the camera file, or from rows of numbers."""
-    if isinstance(given, str):
-        return _read_array_file(folder / Path(given).expanduser(), given, what)
+def _read_affine(given: Any, what: str, folder: Path) -> Affine:
     try:
-        values = np.array(given, dtype=np.float64)
+        return Affine(_read_array(given, None, False, what, folder))
+    except InputError as error:
+        raise InputError(str(error) if what in str(error) else f"{what}: {error}") from None
+
+
+def _read_array(given: Any, unit: str | None, transmission: bool, what: str, folder: Path) -> NDArray[np.float64]:
+    """Numbers from a file beside the camera file, or rows of them; where they have a unit, each with its own."""
+    if isinstance(given, str):
+        return _read_array_file(folder / Path(given).expanduser(), given, unit, transmission, what)
+    with_units = given if unit is None else _with_units(given, unit, what)
+    try:
+        values = np.array(with_units, dtype=np.float64)
     except (TypeError, ValueError):
         values = np.array(0.0)
-    if values.ndim != 2:
+    if values.ndim == 0:
+        example = {None: "[[0, 1], [1, 0]]", "length": '[["1 um", "2 um"], ["2 um", "1 um"]]'}.get(
+            unit, '[["1 deg", "2 deg"]]'
+        )
         raise InputError(
-            f"{what} is {given!r}: it is the name of a file, or rows of equally many numbers, "
-            "like [[0, 1], [1, 0]]"
+            f"{what} is {given!r}: it is the name of a file, or rows of equally many numbers, like {example}"
         )
     return values
 
 
-def _read_array_file(file: Path, name: str, what: str) -> NDArray[np.float64]:
-    """Transmission, 0 to 1, as float64: .npy and .csv as they are, pictures by `read_grey`."""
+def _with_units(given: Any, unit: str, what: str) -> Any:
+    if isinstance(given, list):
+        return [_with_units(each, unit, what) for each in given]
+    return units.parse(given, unit, what)
+
+
+def _read_array_file(
+    file: Path, name: str, unit: str | None, transmission: bool, what: str
+) -> NDArray[np.float64]:
+    """Numbers as float64: .npy and .csv as they are, in SI; pictures as a share of their full scale.
+
+    Where they are transmissions, whole numbers in a .npy are a share of their full scale too, as in a picture.
+    """
     if not file.is_file():
         raise InputError(f'{what}: there is no file "{name}" in {file.parent}')
     ending = file.suffix.lower()
@@ -341,10 +546,16 @@ def _read_array_file(file: Path, name: str, what: str) -> NDArray[np.float64]:
             return np.loadtxt(file, delimiter=",", dtype=np.float64, ndmin=2)
         if ending == ".npy":
             values = np.load(file, allow_pickle=False)
-            if values.ndim == 2 and values.dtype.kind == "f":
+            if values.dtype.kind not in "fiub":
+                raise ValueError(f"it holds {values.dtype}, not real numbers")
+            if values.dtype.kind == "f" or not transmission:
                 return np.asarray(values, dtype=np.float64)
     except (ValueError, OSError, EOFError) as error:
         raise InputError(f"{what}: {name} could not be read: {error}") from None
+    if unit is not None:
+        raise InputError(
+            f"{what} is {name}: only .npy and .csv hold numbers with a unit, in SI ({units.SI_NAMES[unit]}s)"
+        )
     from vcc.formats.pictures import read_grey
 
     try:
@@ -363,7 +574,8 @@ def _write_element(
         if type(element) is kind:
             slug = re.sub(r"\W+", "_", element.name) or f"{name}_{number}"
             writer = _Writer(file, element.label, slug, arrays)
-            return {"kind": name, **writer.fields_of(element)}
+            form = _FROM_FILES[kind].of(element, file.parent) if kind in _FROM_FILES else None
+            return {"kind": name, **writer.fields_of(form or element)}
     raise InputError(
         f"{element.label} cannot be written to {file.name}: a camera file knows "
         f"{_listed(ELEMENT_KINDS)}. Add its class to vcc.camera_file.ELEMENT_KINDS, "
@@ -382,52 +594,81 @@ class _Writer:
 
     def fields_of(self, thing: Any) -> dict[str, Any]:
         """The fields that differ from their defaults."""
-        table = {}
+        table, hints = {}, get_type_hints(type(thing))
         for name, field in _fields(type(thing)).items():
             value = getattr(thing, name)
-            if value is None or (not _needed(field) and value == field.default):
+            if value is None or (not _needed(field) and is_default(value, field)):
                 continue
-            if isinstance(value, Pattern):
-                table[name] = self.pattern(value, thing)
-            else:
-                table[name] = self.value(value, _unit(field), name)
+            if isinstance(value, Cells) and _is_plain_array(value, thing):
+                table[name] = self.plain_array(value.values, getattr(thing, "source", ""))
+                continue
+            self.check_writable(value, _family_of(_alternatives(hints[name])))
+            table[name] = self.value(value, _unit(field), name)
         return table
 
     def value(self, value: Any, unit: str | None, name: str) -> Any:
         if isinstance(value, tuple | list):
             return [self.value(part, unit, name) for part in value]
-        if isinstance(value, np.ndarray):
-            return self.array(value)
-        if isinstance(value, np.generic):
+        if isinstance(value, dict):
+            return {key: self.value(part, unit, name) for key, part in value.items()}
+        if isinstance(value, np.ndarray) and value.ndim:
+            return self.array(value, name)
+        if isinstance(value, Affine):
+            return value.matrix.tolist()
+        if isinstance(value, np.ndarray | np.generic):
             value = value.item()
+        family = next((each for each in _FAMILIES if isinstance(value, each.base)), None)
+        if family is not None:
+            return self.named(value, family)
+        if dataclasses.is_dataclass(value) and not isinstance(value, type | Element):
+            return self.fields_of(value)
         if unit is not None:
             return units.text(value, unit, exact=True)
         if isinstance(value, bool | int | float | str):
             return value
-        raise InputError(f"{name} of {self.label} is a {type(value).__name__}, which a camera file cannot hold")
+        raise InputError(
+            f"{name} of {self.label} is {_in_words(value)}, which a camera file cannot hold: it holds numbers, "
+            "text, lists, arrays, and dataclasses of these"
+        )
 
-    def array(self, values: NDArray[np.float64]) -> str:
+    def array(self, values: NDArray[np.float64], field: str = "") -> str:
         """The name of the file that will hold an array."""
-        name, count = f"{self.file.stem}_{self.slug}.npy", 1
+        # All arrays have values: that name would say nothing.
+        stem = f"{self.file.stem}_{self.slug}" + (f"_{field}" if field not in ("", "values") else "")
+        name, count = f"{stem}.npy", 1
         while name in self.arrays:
             count += 1
-            name = f"{self.file.stem}_{self.slug}_{count}.npy"
+            name = f"{stem}_{count}.npy"
         self.arrays[name] = values
         return name
 
-    def pattern(self, pattern: Pattern, owner: Any) -> Any:
-        if isinstance(pattern, Cells) and _is_plain_array(pattern, owner):
-            return self.plain_array(pattern.values, getattr(owner, "source", ""))
-        for name, kind in PATTERN_NAMES.items():
-            if type(pattern) is kind:
-                return {"name": name, **self.fields_of(pattern)}
-        function = getattr(pattern, "function", pattern)
-        raise InputError(
-            f"the pattern of {self.label} is {getattr(function, '__name__', repr(function))}, "
-            "a piece of Python that a camera file cannot hold. Use a pattern of vcc.patterns "
-            f"({', '.join(kind.__name__ for kind in PATTERN_NAMES.values())}) or sample it on a "
-            "grid: Mask(pattern=function(x, y), width=…) with arrays x and y of cell centres"
-        )
+    def named(self, thing: Any, family: _Family) -> dict[str, Any]:
+        """A thing of a family by its name."""
+        self.check_writable(thing, family)
+        name = next(name for name, kind in family.names.items() if type(thing) is kind)
+        return {"name": name, **self.fields_of(thing)}
+
+    def check_writable(self, thing: Any, family: _Family | None) -> None:
+        """Refuse what takes the place of a thing with a name and has none: Python functions, own classes."""
+        if (
+            family is None
+            or type(thing) in family.names.values()
+            or not (isinstance(thing, family.base) or callable(thing))
+        ):
+            return
+        known = ", ".join(kind.__name__ for kind in family.names.values())
+        function = getattr(thing, "function", thing)
+        if isinstance(function, family.base):
+            said = (
+                f"a {type(thing).__name__}, which is none that a camera file knows ({known}). Add the class to "
+                f"vcc.camera_file.{family.table}, in the program that reads the file too,"
+            )
+        else:
+            said = (
+                f"{getattr(function, '__name__', repr(function))}, a piece of Python that a camera file cannot "
+                f"hold. Use a {family.noun} of {family.base.__module__} ({known})"
+            )
+        raise InputError(f"the {family.noun} of {self.label} is {said} or sample it on a grid: {family.way_out}")
 
     def plain_array(self, values: NDArray[np.float64], source: str) -> Any:
         """The file that it came from if that is within reach, a MURA by name, else a new file."""
@@ -435,14 +676,20 @@ class _Writer:
             return source
         size = len(values)
         if values.shape == (size, size) and _is_mura(values):
-            return {"name": _MURA, "prime": size}
+            return {"name": "mura", "prime": size}
         return self.array(values)
 
     def holds(self, source: str, values: NDArray[np.float64]) -> bool:
         try:
-            return np.array_equal(_read_array(source, "", self.file.parent), values)
+            return np.array_equal(_read_array(source, None, True, "", self.file.parent), values)
         except InputError:
             return False
+
+
+def _in_words(value: Any) -> str:
+    if inspect.isroutine(value):
+        return f"the function {value.__name__}"
+    return f"a {type(value).__name__}"
 
 
 def _is_plain_array(cells: Cells, owner: Any) -> bool:

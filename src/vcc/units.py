@@ -37,7 +37,7 @@ _WRITTEN: Final[dict[str, tuple[str, ...]]] = {
     "angle": ("rad", "mrad", "deg"),
     "time": ("s", "ms", "us"),
 }
-_SI_NAMES: Final = {"length": "metre", "angle": "radian", "time": "second"}
+SI_NAMES: Final = {"length": "metre", "angle": "radian", "time": "second"}
 _EXAMPLES: Final = {"length": "50 mm", "angle": "2 deg", "time": "10 ms"}
 _QUANTITY: Final = re.compile(r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*(.*)", re.DOTALL)
 _UNIT_NAME: Final = re.compile(r"[^\W\d]+|°")
@@ -86,7 +86,7 @@ def _factor_by_pint(unit: str, dimension: str, what: str) -> float:
     import pint
 
     try:
-        return float(_registry().Quantity(1.0, unit).to(_SI_NAMES[dimension]).magnitude)
+        return float(_registry().Quantity(1.0, unit).to(SI_NAMES[dimension]).magnitude)
     except pint.UndefinedUnitError:
         raise InputError(f'{what}, and "{unit}" is not a known unit; write {kind} like "{example}"') from None
     except pint.PintError:  # another dimension, or a scale with an offset such as degC
@@ -120,8 +120,15 @@ def text(value: float, dimension: str = "length", *, exact: bool = False) -> str
 
 
 def short(value: float, dimension: str = "length", digits: int = 6) -> str:
-    """A value for people to read, rounded to so many digits: ``"59.4562 mm"``; see `text`."""
-    return text(float(f"{value:.{digits}g}"), dimension)
+    """A value for people to read, rounded to so many digits: ``"59.4562 mm"``, ``"1 deg"``; see `text`."""
+    value = float(value)
+    if dimension != "angle" or value == 0 or not math.isfinite(value):
+        return text(float(f"{value:.{digits}g}"), dimension)
+    # Rounded in each unit by itself: 1° is no round number of radians, and is not to look like one.
+    names = _WRITTEN[dimension]
+    best = _best_unit(value, names, dimension)
+    ordered = [best, *(name for name in names if name != best)]
+    return min((_written(value, name, dimension, digits) for name in ordered), key=len)
 
 
 def _best_unit(value: float, names: tuple[str, ...], dimension: str) -> str:

@@ -1,7 +1,5 @@
 """``vcc expose``: raw numbers from a camera file and a folder of views."""
 
-import dataclasses
-
 import imagecodecs
 import numpy as np
 import pytest
@@ -9,7 +7,6 @@ import tifffile
 from typer.testing import CliRunner
 
 import vcc
-import vcc.camera_file
 from vcc.cli.commands import app
 
 CAMERA = """
@@ -24,7 +21,6 @@ shape = [12, 16]
 pitch = "1 mm"
 """
 KNOWN = ["--spacing", "1 mm", "--slope-per-pixel", "0.02", "--focus-distance", "1.3 m"]
-RGGB = vcc.Electronics(color_filter="RGGB")
 
 
 @pytest.fixture
@@ -41,15 +37,10 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def electronics(monkeypatch):
+def electronics(folder):
     """The camera of the file, with electronics behind a colour filter."""
-    load = vcc.camera_file.load_camera
-
-    def load_with_electronics(path):
-        camera = load(path)
-        return vcc.Camera(camera.elements, dataclasses.replace(camera.sensor, electronics=RGGB))
-
-    monkeypatch.setattr(vcc.camera_file, "load_camera", load_with_electronics)
+    with (folder / "camera.toml").open("a") as file:
+        file.write('[sensor.electronics]\ncolor_filter = "RGGB"\n')
 
 
 def run(*arguments):
@@ -72,7 +63,7 @@ def test_expose_gives_what_the_library_gives():
     assert result.exit_code == 0, result.output
     assert "raw.tif: 16×12 pixels, grey, 12-bit raw, RGGB, exposed 20 us" in result.stdout
     light_field = vcc.open_light_field("views", spacing=1e-3, slope_per_pixel=0.02, focus_distance=1.3)
-    camera = vcc.camera_file.load_camera("camera.toml")
+    camera = vcc.load_camera("camera.toml")
     recording = camera.expose(light_field, 20e-6, seed=7, radiance=0.5)
     assert np.array_equal(tifffile.imread("raw.tif"), recording.values)
 

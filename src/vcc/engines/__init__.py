@@ -72,7 +72,7 @@ def record(
         raise InputError(f"tolerance is a share of the picture's mean, greater than 0, not {tolerance}")
     from vcc.engines import rays
 
-    traced = rays.run(plan, values, _chosen(engine, values), tolerance, progress)
+    traced = rays.run(plan, values, chosen(engine, values), tolerance, progress)
     return Recorded(
         traced.values,
         traced.missing_rays,
@@ -83,21 +83,21 @@ def record(
     )
 
 
-def _chosen(engine: EngineName | None, values: Any) -> EngineName:
+def chosen(engine: EngineName | None, values: Any) -> EngineName:
     """The engine by name, or by the arrays' type.
 
     Raises:
         InputError: an unknown engine, or one that does not take arrays of this type.
     """
-    chosen = engine or ("numba" if isinstance(values, np.ndarray) else "array_api")
-    if chosen not in get_args(EngineName):
-        raise InputError(f"there is no engine {chosen!r}: choose one of {', '.join(get_args(EngineName))}")
-    if chosen != "array_api" and not isinstance(values, np.ndarray):
+    name = engine or ("numba" if isinstance(values, np.ndarray) else "array_api")
+    if name not in get_args(EngineName):
+        raise InputError(f"there is no engine {name!r}: choose one of {', '.join(get_args(EngineName))}")
+    if name != "array_api" and not isinstance(values, np.ndarray):
         raise InputError(
-            f"engine {chosen!r} takes NumPy arrays, not {type(values).__module__}.{type(values).__name__}: "
+            f"engine {name!r} takes NumPy arrays, not {type(values).__module__}.{type(values).__name__}: "
             "use engine='array_api'"
         )
-    return chosen
+    return name
 
 
 def run_plan(
@@ -119,18 +119,18 @@ def run_plan(
     Raises:
         InputError: an unknown engine, or one that does not take arrays of this type.
     """
-    chosen = _chosen(engine, values)
+    engine = chosen(engine, values)
     if plan.view_blur is not None:
         from vcc.engines import view_blur
 
-        return view_blur.run(plan, values, chosen, progress)
+        return view_blur.run(plan, values, engine, progress)
     if plan.swap_pixel_axes:
         values = _pixel_axes_swapped(values)
-    if chosen == "reference":
+    if engine == "reference":
         from vcc.engines import reference
 
         return reference.run(plan, values, progress)
-    if chosen == "array_api":
+    if engine == "array_api":
         from vcc.engines import array_api
 
         return array_api.run(plan, values, progress)

@@ -54,7 +54,7 @@ def cell_of(layout, turn, x, y):  # type: ignore[no-untyped-def]
 def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
     """(x, y) of the centre of a cell."""
     shifted = column * turn[4]
-    if layout == 1 and row % 2 != 0:
+    if layout == 1 and row & 1:
         shifted += 0.5 * turn[4]
     down = row * turn[5]
     return turn[0] * shifted - turn[1] * down + turn[2], turn[1] * shifted + turn[0] * down + turn[3]
@@ -81,17 +81,24 @@ def mixed(table, start, width, number, columns, at):  # type: ignore[no-untyped-
 
 
 @njit(**OPTIONS)
-def take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
-    """Take a packet of n rays through all steps; ``number`` says which points of the table are theirs."""
+def take_steps(codes, whole, real, shares, slopes, points, first, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
+    """Take a packet of n rays, whose points of the table begin at ``first``, through all steps.
+
+    Numbers of a step are read before its loop, so that loops without branches run on several rays at once.
+    """
     for step in range(len(codes)):
         code, a, f = codes[step], whole[step], real[step]
         if code == 0:
+            f0, f1, f2, f3, f4, f5 = f[0], f[1], f[2], f[3], f[4], f[5]
             for p in range(n):
-                xp, sp, yp, tp = x[p], s[p], y[p], t[p]
-                x[p] = f[0] * xp + f[1] * sp + f[2]
-                s[p] = f[3] * xp + f[4] * sp + f[5]
-                y[p] = f[6] * yp + f[7] * tp + f[8]
-                t[p] = f[9] * yp + f[10] * tp + f[11]
+                xp, sp = x[p], s[p]
+                x[p] = f0 * xp + f1 * sp + f2
+                s[p] = f3 * xp + f4 * sp + f5
+            f0, f1, f2, f3, f4, f5 = f[6], f[7], f[8], f[9], f[10], f[11]
+            for p in range(n):
+                yp, tp = y[p], t[p]
+                y[p] = f0 * yp + f1 * tp + f2
+                t[p] = f3 * yp + f4 * tp + f5
         elif code == 1:
             for p in range(n):
                 xp, yp, sp, tp = x[p], y[p], s[p], t[p]
@@ -99,12 +106,17 @@ def take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t
                 y[p] = f[5] * xp + f[6] * yp + f[7] * sp + f[8] * tp + f[9]
                 s[p] = f[10] * xp + f[11] * yp + f[12] * sp + f[13] * tp + f[14]
                 t[p] = f[15] * xp + f[16] * yp + f[17] * sp + f[18] * tp + f[19]
-        elif code == 2 and a[1] * a[2] == 1:
+        elif code == 2 and a[0] == 0 and a[1] * a[2] == 1:
+            # The usual array, square and all alike: no branches.
             power, slope_x, slope_y = slopes[a[3]], slopes[a[3] + 1], slopes[a[3] + 2]
+            cosine, sine, offset_x, offset_y, pitch = f[0], f[1], f[2], f[3], f[4]
+            per_pitch = 1 / pitch
             for p in range(n):
-                _, _, centre_x, centre_y = cell_of(a[0], f, x[p], y[p])
-                s[p] += power * (x[p] - centre_x) - slope_x
-                t[p] += power * (y[p] - centre_y) - slope_y
+                dx, dy = x[p] - offset_x, y[p] - offset_y
+                across, down = (cosine * dx + sine * dy) * per_pitch, (cosine * dy - sine * dx) * per_pitch
+                across, down = math.floor(across + 0.5) * pitch, math.floor(down + 0.5) * pitch
+                s[p] += power * (dx - (cosine * across - sine * down)) - slope_x
+                t[p] += power * (dy - (sine * across + cosine * down)) - slope_y
         elif code == 2:
             for p in range(n):
                 row, column, centre_x, centre_y = cell_of(a[0], f, x[p], y[p])
@@ -143,11 +155,13 @@ def take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t
                 s[p] -= mixed(slopes, a[2], 2, 0, a[1], at)
                 t[p] -= mixed(slopes, a[2], 2, 1, a[1], at)
         elif code == 6:
+            f0, f1, f2 = f[0], f[1], f[2]
             for p in range(n):
-                share[p] *= (x[p] - f[0]) ** 2 + (y[p] - f[1]) ** 2 <= f[2]
+                share[p] = share[p] if (x[p] - f0) ** 2 + (y[p] - f1) ** 2 <= f2 else 0.0
         elif code == 7:
+            f0, f1, f2, f3 = f[0], f[1], f[2], f[3]
             for p in range(n):
-                share[p] *= (abs(x[p] - f[0]) <= f[2]) & (abs(y[p] - f[1]) <= f[3])
+                share[p] = share[p] if (abs(x[p] - f0) <= f2) & (abs(y[p] - f1) <= f3) else 0.0
         elif code == 8:
             for p in range(n):
                 column, row = math.floor((x[p] - f[0]) * f[2]), math.floor((y[p] - f[1]) * f[3])
@@ -163,15 +177,15 @@ def take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t
                 kernel = 0
                 if a[3] > 0:
                     at = corner(x[p], y[p], a[3], a[4], f)
-                    picked = points[number[p], a[2]]
+                    picked = points[a[2], first + p]
                     while kernel < a[1] - 1 and picked >= mixed(shares, a[5], a[1], kernel, a[4], at):
                         kernel += 1
                 stretch = 1.0
                 if a[6] > 0:
                     at = corner(x[p], y[p], a[6], a[7], f[4:])
                     stretch = mixed(shares, a[8], 1, 0, a[7], at)
-                s[p] -= stretch * points[number[p], a[0] + 2 * kernel]
-                t[p] -= stretch * points[number[p], a[0] + 2 * kernel + 1]
+                s[p] -= stretch * points[a[0] + 2 * kernel, first + p]
+                t[p] -= stretch * points[a[0] + 2 * kernel + 1, first + p]
 
 
 @njit(**OPTIONS)
@@ -222,45 +236,47 @@ def add_view(values, base, k, l, rows, columns, channels, weight, found):  # typ
 
 @njit(**OPTIONS)
 def add_rays(  # type: ignore[no-untyped-def]
-    values, views, channels, index, motion, between, ends, n, half, x, y, s, t, share, sums, offsets, weights,
+    values, views, channels, index, motion, between, ends, n, second, x, y, s, t, share, sums, offsets, weights,
     tally,
 ):  # fmt: skip
     """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
 
-    ``tally`` collects the weights of all rays and of those that the light field does not hold; ``offsets`` and
-    ``weights`` are room for the rows of one ray.
+    Rays from ``second`` on belong to the second half. ``tally`` collects the weights of all rays and of those that
+    the light field does not hold; ``offsets`` and ``weights`` are room for the rows of one ray. Places are
+    replaced by indices.
     """
     nv, nu, nt, ns = views[0], views[1], views[2], views[3]
-    m = index
+    to_indices(index, n, x, y, s, t)
     flat = sums.reshape(-1)
     # Where x and y do not mix, the pixels looked at in four views are two columns and two rows.
     parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
     vectors = parted and (channels == 1 or channels == 3 or channels == 4)
     line, picture, row_of_views = ns * channels, nt * ns * channels, nu * nt * ns * channels
     last = len(values) - LANES
+    # So far outside the pictures all views that a ray is between are dark.
+    dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
+    dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
     for p in range(n):
         weight = share[p]
         if weight == 0.0:
             continue
-        i = m[0, 0] * x[p] + m[0, 1] * y[p] + m[0, 2] * s[p] + m[0, 3] * t[p] + m[0, 4]
-        j = m[1, 0] * x[p] + m[1, 1] * y[p] + m[1, 2] * s[p] + m[1, 3] * t[p] + m[1, 4]
+        half = 1 if p >= second else 0
+        i, j, k, l = x[p], y[p], s[p], t[p]
         if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
             if ends:
                 tally[0] += weight
                 tally[1] += weight
             continue
         tally[0] += weight
-        k = m[2, 0] * x[p] + m[2, 1] * y[p] + m[2, 2] * s[p] + m[2, 3] * t[p] + m[2, 4]
-        l = m[3, 0] * x[p] + m[3, 1] * y[p] + m[3, 2] * s[p] + m[3, 3] * t[p] + m[3, 4]
         if not (k >= -0.5 and k <= ns - 0.5 and l >= -0.5 and l <= nt - 0.5):
             tally[1] += weight
-            if not (k > -1e9 and k < 1e9 and l > -1e9 and l < 1e9):
+            if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
                 continue
         ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
         if not between:
             i0, j0 = int(ci + 0.5), int(cj + 0.5)
             base = j0 * row_of_views + i0 * picture
-            add_view(values, base, k, l, nt, ns, channels, np.float32(weight), sums[half[p]])
+            add_view(values, base, k, l, nt, ns, channels, np.float32(weight), sums[half])
             continue
         i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
         fi, fj = ci - i0, cj - j0
@@ -288,7 +304,7 @@ def add_rays(  # type: ignore[no-untyped-def]
                 base += picture
                 put_row(offsets, weights, 6, base + r1 + c1, w11 * (1 - fl1), fk1)
                 put_row(offsets, weights, 7, base + r1 + line + c1, w11 * fl1, fk1)
-                at = half[p] * sums.shape[1]
+                at = half * sums.shape[1]
                 if channels == 3:
                     add_rows_of_3(values, offsets, weights, flat, at)
                 elif channels == 1:
@@ -308,7 +324,7 @@ def add_rays(  # type: ignore[no-untyped-def]
                 view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j
                 view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
                 base = (j0 + dj) * row_of_views + (i0 + di) * picture
-                add_view(values, base, view_k, view_l, nt, ns, channels, np.float32(w), sums[half[p]])
+                add_view(values, base, view_k, view_l, nt, ns, channels, np.float32(w), sums[half])
 
 
 @njit(**OPTIONS)
@@ -318,6 +334,30 @@ def fold_lanes(sums, channels):  # type: ignore[no-untyped-def]
         for half in range(2):
             for channel in range(channels):
                 sums[half, channel] += sums[half, channels + channel]
+
+
+@njit(**OPTIONS)
+def to_indices(index, n, x, y, s, t):  # type: ignore[no-untyped-def]
+    """Replace the places and slopes of n rays by their indices (i, j, k, l)."""
+    m = index
+    if m[0, 1] == m[0, 3] == m[1, 0] == m[1, 2] == m[2, 1] == m[2, 3] == m[3, 0] == m[3, 2] == 0.0:
+        a, b, c, d, e, f = m[0, 0], m[0, 2], m[0, 4], m[2, 0], m[2, 2], m[2, 4]
+        for p in range(n):
+            xp, sp = x[p], s[p]
+            x[p] = a * xp + b * sp + c
+            s[p] = d * xp + e * sp + f
+        a, b, c, d, e, f = m[1, 1], m[1, 3], m[1, 4], m[3, 1], m[3, 3], m[3, 4]
+        for p in range(n):
+            yp, tp = y[p], t[p]
+            y[p] = a * yp + b * tp + c
+            t[p] = d * yp + e * tp + f
+        return
+    for p in range(n):
+        xp, yp, sp, tp = x[p], y[p], s[p], t[p]
+        x[p] = m[0, 0] * xp + m[0, 1] * yp + m[0, 2] * sp + m[0, 3] * tp + m[0, 4]
+        y[p] = m[1, 0] * xp + m[1, 1] * yp + m[1, 2] * sp + m[1, 3] * tp + m[1, 4]
+        s[p] = m[2, 0] * xp + m[2, 1] * yp + m[2, 2] * sp + m[2, 3] * tp + m[2, 4]
+        t[p] = m[3, 0] * xp + m[3, 1] * yp + m[3, 2] * sp + m[3, 3] * tp + m[3, 4]
 
 
 @njit(**OPTIONS)
@@ -339,7 +379,7 @@ def hashed(number, seed):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def set_box(boxes, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
-    """Numbers by which `box_of` finds the places in a cell that light comes through, along one axis."""
+    """Numbers by which `through_cell` finds the places in a cell that light comes through, along one axis."""
     gain = cells[6, axis] + power * cells[8, axis]
     if abs(gain) < 1e-12:
         gain = 1e-12
@@ -352,11 +392,11 @@ def set_box(boxes, cells, axis, centre, power, slope):  # type: ignore[no-untype
 
 
 @njit(**OPTIONS)
-def box_of(boxes, axis, place):  # type: ignore[no-untyped-def]
-    """(low, high) of the places in a cell, along one axis, that light from a place on the sensor comes through."""
-    middle = boxes[axis, 0] + boxes[axis, 1] * place
-    low = max(middle - boxes[axis, 2], boxes[axis, 3])
-    return low, max(min(middle + boxes[axis, 2], boxes[axis, 4]), low)
+def kind_of(cell_whole, row, column):  # type: ignore[no-untyped-def]
+    """Which kind of cell this is; divisions are spared where there is one kind, the usual case."""
+    if cell_whole[1] * cell_whole[2] == 1:
+        return np.int64(0)
+    return (row % cell_whole[1]) * cell_whole[2] + column % cell_whole[2]
 
 
 @njit(**OPTIONS)
@@ -366,27 +406,84 @@ def cells_seen(cells, cell_kinds, cell_whole, x, y, pixels, near):  # type: igno
     centre_x = (cells[10, 0] - cells[9, 0] - cells[7, 0] * x) / cells[6, 0]
     centre_y = (cells[10, 1] - cells[9, 1] - cells[7, 1] * y) / cells[6, 1]
     row, column, _, _ = cell_of(cell_whole[0], turn, centre_x, centre_y)
+    # The place p(a) = gain·a + rest at the stop, over the cell and the pixel, must meet the stop.
+    loose_x, loose_y = abs(cells[7, 0]) * pixels[0, 2] / 2, abs(cells[7, 1]) * pixels[1, 2] / 2
+    rest_x = cells[7, 0] * x + cells[9, 0] - cells[10, 0]
+    rest_y = cells[7, 1] * y + cells[9, 1] - cells[10, 1]
     found = 0
     for r in range(row - cell_whole[3], row + cell_whole[3] + 1):
         for c in range(column - cell_whole[4], column + cell_whole[4] + 1):
             centre_x, centre_y = centre_of(cell_whole[0], turn, r, c)
-            kind = (r % cell_whole[1]) * cell_whole[2] + c % cell_whole[2]
+            kind = kind_of(cell_whole, r, c)
             power = cell_kinds[kind, 0]
-            seen = True
-            for axis in range(2):
-                place = x if axis == 0 else y
-                centre = centre_x if axis == 0 else centre_y
-                # p(a) = gain·a + rest over the cell and the pixel must meet the stop
-                gain = cells[6, axis] + power * cells[8, axis]
-                rest = cells[7, axis] * place - cells[8, axis] * (power * centre + cell_kinds[kind, 1 + axis])
-                off = abs(gain * centre + rest + cells[9, axis] - cells[10, axis])
-                loose = abs(gain) * cells[12, axis] + abs(cells[7, axis]) * pixels[axis, 2] / 2
-                if off > cells[11, axis] + loose * (1 + 1e-9):
-                    seen = False
-            if seen:
+            # At the centre the cell's lens does nothing: there p is beyond·centre + rest.
+            gain = abs(cells[6, 0] + power * cells[8, 0])
+            off = abs(cells[6, 0] * centre_x + rest_x - cells[8, 0] * cell_kinds[kind, 1])
+            seen = off <= cells[11, 0] + (gain * cells[12, 0] + loose_x) * (1 + 1e-9)
+            gain = abs(cells[6, 1] + power * cells[8, 1])
+            off = abs(cells[6, 1] * centre_y + rest_y - cells[8, 1] * cell_kinds[kind, 2])
+            if seen and off <= cells[11, 1] + (gain * cells[12, 1] + loose_y) * (1 + 1e-9):
                 near[found, 0], near[found, 1] = r, c
                 found += 1
     return found
+
+
+@njit(**OPTIONS)
+def at_pixel(points, start, n, middle_x, middle_y, wide, high, x, y):  # type: ignore[no-untyped-def]
+    """Places of n rays over the sensitive area of a pixel."""
+    for p in range(n):
+        x[p] = middle_x + points[0, start + p] * wide
+        y[p] = middle_y + points[1, start + p] * high
+
+
+@njit(**OPTIONS)
+def through_window(points, start, n, window, scatter, x, y, s, t, share):  # type: ignore[no-untyped-def]
+    """Slopes and weights of n rays towards a window, making up for diffusers; see `vcc.plan.rays.Window`."""
+    f0, f1, f2, f3, f4 = window[0, 0], window[0, 1], window[0, 2], window[0, 3], window[0, 4]
+    g0, g1, g2, g3, g4 = window[1, 0], window[1, 1], window[1, 2], window[1, 3], window[1, 4]
+    solid_angle = window[2, 0]
+    for p in range(n):
+        a, b = points[2, start + p], points[3, start + p]
+        s[p] = f0 * a + f1 * b + f2 * x[p] + f3 * y[p] + f4
+        t[p] = g0 * a + g1 * b + g2 * x[p] + g3 * y[p] + g4
+        share[p] = solid_angle
+    for term in range(len(scatter)):
+        column = int(scatter[term, 0])
+        f0, f1, g0, g1 = scatter[term, 1], scatter[term, 2], scatter[term, 3], scatter[term, 4]
+        for p in range(n):
+            a, b = points[column, start + p], points[column + 1, start + p]
+            s[p] += f0 * a + f1 * b
+            t[p] += g0 * a + g1 * b
+
+
+@njit(**OPTIONS)
+def through_cell(points, start, n, boxes, cells, x, y, s, t, share):  # type: ignore[no-untyped-def]
+    """Slopes and weights of n rays through the part of a cell that the stop is seen through, along each axis."""
+    for axis in range(2):
+        place, slope = (x, s) if axis == 0 else (y, t)
+        middle, along, half = boxes[axis, 0], boxes[axis, 1], boxes[axis, 2]
+        left, right = boxes[axis, 3], boxes[axis, 4]
+        from_sensor, offset, per_slope = cells[3, axis], cells[5, axis], 1 / cells[4, axis]
+        weight = abs(per_slope)
+        for p in range(n):
+            centre = middle + along * place[p]
+            low = max(centre - half, left)
+            high = max(min(centre + half, right), low)
+            a = (low + high) / 2 + (high - low) / 2 * points[2 + axis, start + p]
+            slope[p] = (a - from_sensor * place[p] - offset) * per_slope
+            share[p] = weight * (high - low) * (share[p] if axis == 1 else 1.0)
+
+
+@njit(**OPTIONS)
+def keep_own(cells, cell_whole, row, column, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
+    """Drop rays that meet another cell than the one whose rectangle they were aimed at."""
+    turn = cells[0:3].ravel()
+    for p in range(n):
+        a = cells[3, 0] * x[p] + cells[4, 0] * s[p] + cells[5, 0]
+        b = cells[3, 1] * y[p] + cells[4, 1] * t[p] + cells[5, 1]
+        own_row, own_column, _, _ = cell_of(cell_whole[0], turn, a, b)
+        if own_row != row or own_column != column:
+            share[p] = 0.0
 
 
 @njit(**OPTIONS)
@@ -406,7 +503,7 @@ def add_tile(  # type: ignore[no-untyped-def]
         samples: rays a pixel.
         block_shift: which block beside the hashed one is taken, see `vcc.engines.rays`.
         seed: of the hash.
-        points: the table.
+        points: the table, (columns, points).
         window: (2, 5): slopes from point, from sensor, and offset; and a third row with the solid angle.
         scatter: (diffusers, 5): column of the table and slopes from what the diffuser does, see `Window`.
         cells: rows of numbers by axis (x, y) where rays are aimed through cells, else empty.
@@ -425,19 +522,14 @@ def add_tile(  # type: ignore[no-untyped-def]
         tally: (weights of rays, of missing rays, squared differences of the halves, rays) are added here.
     """
     x, y, s, t, share = np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET)
-    number, half = np.empty(PACKET, dtype=np.int64), np.empty(PACKET, dtype=np.int64)
     sums = np.zeros((2, max(channels, LANES)), dtype=np.float32)
     offsets, weights = np.empty(8, dtype=np.int64), np.empty(16, dtype=np.float32)
     rows_there, columns_there = picture.shape[0], picture.shape[1]
     by_cell = cells.shape[0] > 0
-    blocks = points.shape[0] // samples
+    blocks = points.shape[1] // samples
     near = np.empty((256, 2), dtype=np.int64)
     turn = cells[0:3].ravel()
     boxes = np.empty((2, 5))
-    box_is_cell = cell_whole[0] == 0 and (not by_cell or turn[1] == 0.0)
-    per_slope_x = 1 / cells[4, 0] if by_cell else 1.0
-    per_slope_y = 1 / cells[4, 1] if by_cell else 1.0
-    cell_row = cell_column = 0
     for row in range(tile[0], min(tile[1], rows_there)):
         for column in range(tile[2], min(tile[3], columns_there)):
             middle_x = pixels[0, 0] + column * pixels[0, 1]
@@ -445,76 +537,36 @@ def add_tile(  # type: ignore[no-untyped-def]
             block = (np.int64(hashed(row * columns_there + column, seed)) * blocks) >> 32
             first = (block ^ block_shift) * samples
             sums[:] = 0
-            n, rays = 0, 0
             cells_near = 1
             if by_cell:
                 cells_near = cells_seen(cells, cell_kinds, cell_whole, middle_x, middle_y, pixels, near)
             for q in range(cells_near):
                 if by_cell:
-                    cell_row, cell_column = near[q, 0], near[q, 1]
-                    centre_x, centre_y = centre_of(cell_whole[0], turn, cell_row, cell_column)
-                    kind = (cell_row % cell_whole[1]) * cell_whole[2] + cell_column % cell_whole[2]
+                    centre_x, centre_y = centre_of(cell_whole[0], turn, near[q, 0], near[q, 1])
+                    kind = kind_of(cell_whole, near[q, 0], near[q, 1])
                     set_box(boxes, cells, 0, centre_x, cell_kinds[kind, 0], cell_kinds[kind, 1])
                     set_box(boxes, cells, 1, centre_y, cell_kinds[kind, 0], cell_kinds[kind, 2])
-                for sample in range(samples):
-                    point = points[first + sample]
-                    px = middle_x + point[0] * pixels[0, 2]
-                    py = middle_y + point[1] * pixels[1, 2]
+                for done in range(0, samples, PACKET):
+                    n = min(PACKET, samples - done)
+                    start = first + done
+                    at_pixel(points, start, n, middle_x, middle_y, pixels[0, 2], pixels[1, 2], x, y)
                     if by_cell:
-                        low_x, high_x = box_of(boxes, 0, px)
-                        low_y, high_y = box_of(boxes, 1, py)
-                        area = (high_x - low_x) * (high_y - low_y)
-                        if area <= 0.0:
-                            continue
-                        a = (low_x + high_x) / 2 + (high_x - low_x) / 2 * point[2]
-                        b = (low_y + high_y) / 2 + (high_y - low_y) / 2 * point[3]
-                        if not box_is_cell:
-                            own_row, own_column, _, _ = cell_of(cell_whole[0], turn, a, b)
-                            if own_row != cell_row or own_column != cell_column:
-                                continue
-                        s[n] = (a - cells[3, 0] * px - cells[5, 0]) * per_slope_x
-                        t[n] = (b - cells[3, 1] * py - cells[5, 1]) * per_slope_y
-                        share[n] = area * abs(per_slope_x * per_slope_y)
+                        through_cell(points, start, n, boxes, cells, x, y, s, t, share)
+                        if cell_whole[0] == 1 or turn[1] != 0.0:  # a cell is not the rectangle around it
+                            keep_own(cells, cell_whole, near[q, 0], near[q, 1], n, x, y, s, t, share)
                     else:
-                        a, b = np.float64(point[2]), np.float64(point[3])
-                        s[n] = (
-                            window[0, 0] * a
-                            + window[0, 1] * b
-                            + window[0, 2] * px
-                            + window[0, 3] * py
-                            + window[0, 4]
-                        )
-                        t[n] = (
-                            window[1, 0] * a
-                            + window[1, 1] * b
-                            + window[1, 2] * px
-                            + window[1, 3] * py
-                            + window[1, 4]
-                        )
-                        for term in range(len(scatter)):
-                            at = int(scatter[term, 0])
-                            s[n] += scatter[term, 1] * point[at] + scatter[term, 2] * point[at + 1]
-                            t[n] += scatter[term, 3] * point[at] + scatter[term, 4] * point[at + 1]
-                        share[n] = window[2, 0]
-                    x[n], y[n] = px, py
-                    number[n], half[n] = first + sample, 1 if 2 * sample >= samples else 0
-                    n += 1
-                    if n == PACKET:
-                        take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t, share)
-                        add_rays(
-                            values, views, channels, index, motion, between, ends, n, half, x, y, s, t, share,
-                            sums, offsets, weights, tally,
-                        )  # fmt: skip
-                        rays += n
-                        n = 0
-            if n > 0:
-                take_steps(codes, whole, real, shares, slopes, points, number, n, x, y, s, t, share)
-                add_rays(
-                    values, views, channels, index, motion, between, ends, n, half, x, y, s, t, share, sums,
-                    offsets, weights, tally,
-                )  # fmt: skip
-                rays += n
-            tally[3] += rays
+                        through_window(points, start, n, window, scatter, x, y, s, t, share)
+                    traced = 0
+                    for p in range(n):
+                        traced += share[p] > 0.0
+                    if traced == 0:
+                        continue
+                    tally[3] += traced
+                    take_steps(codes, whole, real, shares, slopes, points, start, n, x, y, s, t, share)
+                    add_rays(
+                        values, views, channels, index, motion, between, ends, n, samples // 2 - done,
+                        x, y, s, t, share, sums, offsets, weights, tally,
+                    )  # fmt: skip
             fold_lanes(sums, channels)
             for channel in range(channels):
                 one, two = sums[0, channel] * scale / samples, sums[1, channel] * scale / samples

@@ -148,11 +148,12 @@ def _tile_adder(
     else:
         cells, kinds, whole = _cell_tables(plan.aim)
     steps = plan.packed().arrays()
+    points = np.ascontiguousarray(plan.points.T)
 
     def add(picture: NDArray[np.float32], tile: tuple[int, int, int, int]) -> Array:
         tally = np.zeros(4)
         kernels.add_tile(
-            flat, plan.views, channels, plan.scale, pixels, tile, plan.samples, beside, plan.seed, plan.points,
+            flat, plan.views, channels, plan.scale, pixels, tile, plan.samples, beside, plan.seed, points,
             window, scatter, cells, kinds, whole, *steps, plan.index_from_ray.matrix[:4].copy(), plan.motion,
             plan.between_views, plan.views_may_end, picture, tally,
         )  # fmt: skip

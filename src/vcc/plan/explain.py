@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import textwrap
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,6 +21,12 @@ from vcc.units import short
 
 if TYPE_CHECKING:
     from vcc.camera import Camera
+
+
+COLUMNS = 80
+"""Into which an explanation's lines fit, but for words that are longer."""
+PLACES_END = 20
+"""The column at which an element's words begin, behind its place on the axis."""
 
 
 class Explanation(str):
@@ -49,9 +57,31 @@ def explain(camera: Camera, light_field: LightField, **options: Any) -> Explanat
     else:
         seconds = expected_seconds(plan, light_field, engine)
         parts = [_sampling(plan), _cost(plan, light_field, seconds), _warnings(plan)]
-    result = Explanation("\n\n".join([_what(camera, light_field), how, *parts]))
+    result = Explanation(_wrapped("\n\n".join([_what(camera, light_field), how, *parts])))
     result.plan, result.expected_seconds = plan, seconds
     return result
+
+
+def _wrapped(text: str) -> str:
+    """Text whose lines fit a terminal: what is longer goes on in the next line, further to the right."""
+    lines = []
+    for line in text.split("\n"):
+        indent = len(line) - len(line.lstrip())
+        # A quantity stays in one piece.
+        whole = re.sub(
+            r"z = (?=[-\d])", "z\xa0=\xa0", re.sub(r"(?<=\d) (?=(?:[mun]?m|s|MB|pixels)\b)", "\xa0", line)
+        )
+        further = " " * (indent + (2 if "z =" not in line[:6] else PLACES_END - indent))
+        pieces = textwrap.wrap(
+            whole, COLUMNS, subsequent_indent=further, break_long_words=False, break_on_hyphens=False
+        )
+        lines += [piece.replace("\xa0", " ") for piece in pieces] or [""]
+    return "\n".join(lines)
+
+
+def _place(z: float) -> str:
+    """The beginning of an element's line."""
+    return f"  z = {z * 1e3:9.6g} mm  "
 
 
 def _what(camera: Camera, light_field: LightField) -> str:
@@ -62,7 +92,7 @@ def _what(camera: Camera, light_field: LightField) -> str:
         f"{to_dtype(light_field.values)}; {describe_geometry(light_field)}"
     ]
     lines += [
-        f"  z = {short(element.z):>9}  {element.kind}"
+        f"{_place(element.z)}{element.kind}"
         + (f' "{element.name}"' if element.name else "")
         + (f", {element.described()}" if element.described() else "")
         for element in camera.elements
@@ -70,7 +100,7 @@ def _what(camera: Camera, light_field: LightField) -> str:
     rows, columns = camera.sensor.shape
     vertical, horizontal = camera.sensor.pitches
     pitch = short(vertical) if vertical == horizontal else f"{short(vertical)} × {short(horizontal)}"
-    lines.append(f"  z = {short(camera.sensor.z):>9}  sensor, {rows}×{columns} pixels of {pitch}")
+    lines.append(f"{_place(camera.sensor.z)}sensor, {rows}×{columns} pixels of {pitch}")
     return "\n".join(lines)
 
 

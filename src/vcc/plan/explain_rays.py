@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,8 +15,11 @@ from vcc.light_field import LightField
 from vcc.plan.rays import CellWindows, RayPlan
 from vcc.sampled import known
 
-PATCH = 40
-"""Pixels a side of the pieces of the picture that are traced to foretell time and error."""
+if TYPE_CHECKING:
+    from vcc.engines import Recorded
+
+PATCH = 32
+"""Pixels a side, and for each thread, of the pieces of the picture that are traced to foretell time and error."""
 PLACES = (0.1, 0.5, 0.9)
 """Where they lie along each axis, as a share of the sensor's size."""
 
@@ -38,27 +42,35 @@ def _pilot(plan: RayPlan, light_field: LightField, engine: Any) -> tuple[float, 
 
     None where the samples cannot be run (an array under a tracer).
     """
-    from vcc.engines import record
+    from vcc.engines import chosen, record
 
     if known(light_field.values[:1, :1, :1, :1]) is None:
         return None
+
+    def traced_in(patches: list[RayPlan]) -> tuple[list[Recorded], float]:
+        start = time.perf_counter()
+        found = [record(patch, light_field.values, engine=engine) for patch in patches]
+        return found, (time.perf_counter() - start) / len(patches)
+
     rows, columns = plan.sensor_shape
-    patches = list(_patches(plan))
-    record(patches[0], light_field.values, engine=engine)  # the first run may compile
-    start = time.perf_counter()
-    traced = [record(patch, light_field.values, engine=engine) for patch in patches]
-    seconds = time.perf_counter() - start
+    compiled = chosen(engine, light_field.values) == "numba"
+    patches = list(_patches(plan, (os.cpu_count() or 1) if compiled else 1))
+    pixel = replace(plan, sensor_shape=(1, 1))
+    traced_in([pixel])  # the first run may compile
+    _, fixed = traced_in([pixel])
+    traced, each = traced_in(patches)
     factor = rows * columns / sum(math.prod(patch.sensor_shape) for patch in patches)
+    seconds = fixed + max(each - fixed, 0.0) * len(patches) * factor
     means = [float(np.mean(known(one.values), dtype=np.float64)) for one in traced]  # type: ignore[arg-type]
     error = math.sqrt(sum(one.sampling_error**2 for one in traced) / len(traced))
     mean = abs(sum(means) / len(means))
     missing = sum(one.missing_rays for one in traced) / len(traced)
-    return seconds * factor, sum(one.rays for one in traced) * factor, error / mean if mean > 0 else 0.0, missing
+    return seconds, sum(one.rays for one in traced) * factor, error / mean if mean > 0 else 0.0, missing
 
 
-def _patches(plan: RayPlan) -> Iterator[RayPlan]:
+def _patches(plan: RayPlan, threads: int) -> Iterator[RayPlan]:
     """Pieces of the sensor, evenly placed; neighbouring pixels look at neighbouring samples and stay together."""
-    rows, columns = (min(n, PATCH) for n in plan.sensor_shape)
+    rows, columns = min(plan.sensor_shape[0], PATCH), min(plan.sensor_shape[1], PATCH * threads)
     for down in PLACES:
         for across in PLACES:
             row = round(down * (plan.sensor_shape[0] - rows))
@@ -97,9 +109,8 @@ def _cost(plan: RayPlan, light_field: LightField, pilot: Any) -> str:
 
 def expected_memory(plan: RayPlan, light_field: LightField) -> int:
     """Bytes that a run of the plan takes beside the light field and the picture, estimated."""
-    codes, whole, real, shares, slopes = plan.packed().arrays()
-    # Once in the plan's steps and once as the kernel reads them.
-    tables = codes.nbytes + whole.nbytes + real.nbytes + 2 * (shares.nbytes + slopes.nbytes)
+    # Once in the plan's steps and once as the kernel reads them; a single large table is not copied.
+    tables = 2 * sum(table.nbytes for table in plan.packed().arrays())
     values = light_field.values
     copied = 0
     if isinstance(values, np.ndarray) and (values.dtype == np.float16 or not values.flags.c_contiguous):

@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 DEFAULT_SAMPLES = 64
 MOST_CELLS = 81
 """Cells of a lens array that are looked at for one pixel; with more, rays are aimed at the array as a whole."""
+ROUNDING = 1e-6
+"""In cells: how far a place may seem from where it is."""
 TEXTURE_SIZES = (513, 1025, 2049)
 """Points a side of textures for functions of position, tried until they are fine enough."""
 FINE_ENOUGH = 1e-6
@@ -302,10 +304,11 @@ class _Path:
                 return None
             if _mixed(leg.from_sensor):
                 return None
+            pixel = np.array(self.camera.sensor.sensitive_pitches[::-1])
             found = [
                 windows
                 for bound in self.bounds_beyond(n, slack)
-                if (windows := _cell_windows(leg, bending, *bound)) is not None
+                if (windows := _cell_windows(leg, bending, pixel, *bound)) is not None
             ]
             return min(found, key=self.mean_solid_angle, default=None)
         return None
@@ -427,9 +430,19 @@ def _window(there: Affine, part: slice, middle: Array, half: Array, disc: bool, 
 
 
 def _cell_windows(
-    leg: _Leg, bending: CellDeflection, way: Affine, part: slice, middle: Array, half: Array, words: str
+    leg: _Leg,
+    bending: CellDeflection,
+    pixel: Array,
+    way: Affine,
+    part: slice,
+    middle: Array,
+    half: Array,
+    words: str,
 ) -> CellWindows | None:
-    """Windows in the cells of an array towards a bound beyond it; None where they would be no help."""
+    """Windows in the cells of an array towards a bound beyond it; None where they would be no help.
+
+    ``pixel`` is the size (x, y) of a pixel's sensitive area.
+    """
     if _mixed(way):
         return None
     axes = np.arange(2)
@@ -457,11 +470,15 @@ def _cell_windows(
     # |p(centre)| ≤ half + |gain of the cell|·cell + |prism|, in cells
     power_gain = np.abs(a + b / from_slope + bending.powers.reshape(-1, 1) * b).max(axis=0)
     prism = np.abs(b) * np.abs(bending.slopes).reshape(-1, 2).max(axis=0)
-    distance = (half + power_gain * cell_half + prism) / gain
+    across_pixel = np.abs(b / from_slope * from_sensor) * pixel / 2
+    distance = (half + power_gain * cell_half + prism + across_pixel) / gain
     sideways = turned @ distance  # along the lattice's own axes
+    # The place looked from is up to half a cell off the centre of the nearest one; hexagonal cells are 4/3 of a
+    # row high, and every second row is half a cell to the side.
+    off = np.array([0.5, 0.5] if lattice.layout == "square" else [1.0, 2 / 3]) + ROUNDING
     reach = (
-        math.ceil(sideways[1] / lattice.row_height) + 1,
-        math.ceil(sideways[0] / lattice.pitch) + 1,
+        math.floor(sideways[1] / lattice.row_height + off[1]),
+        math.floor(sideways[0] / lattice.pitch + off[0]),
     )
     if (2 * reach[0] + 1) * (2 * reach[1] + 1) > MOST_CELLS:
         return None
@@ -550,7 +567,8 @@ def _transmission(
     texture, error = _textured(sampled, region)
     if error > WORTH_SAYING:
         notes.append(f"{label} is finer than its texture shows: {error:.1%} root mean square of its largest value")
-    return [steps.TextureShares(texture, label)]
+    single = replace(texture, values=texture.values.astype(np.float32))
+    return [steps.TextureShares(single, label)]
 
 
 def _deflection(stage: Stage, region: tuple[Array, Array], label: str, notes: list[str]) -> steps.Step:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,9 +71,14 @@ class Packer:
         for n, (whole_row, real_row) in enumerate(zip(self.whole, self.real, strict=True)):
             whole[n, : len(whole_row)] = whole_row
             real[n, : len(real_row)] = real_row
-        shares = np.concatenate([*self._shares, np.zeros(1, dtype=np.float32)])
-        slopes = np.concatenate([*self._slopes, np.zeros(1)])
+        shares = _one_after_another(self._shares or [np.zeros(1, dtype=np.float32)])
+        slopes = _one_after_another(self._slopes or [np.zeros(1)])
         return np.array(self.codes, dtype=np.int64), whole, real, shares, slopes
+
+
+def _one_after_another(tables: list[Any]) -> Any:
+    """Tables in one array; a single one, often large, is not copied."""
+    return tables[0] if len(tables) == 1 else np.concatenate(tables)
 
 
 class Step(Protocol):

@@ -11,12 +11,27 @@ if TYPE_CHECKING:
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
 """Of the palette of Okabe and Ito (2008), which people with any colour vision tell apart."""
 GLASS, GLASS_EDGE = "#CFE6F5", "#4A7A9C"
+FROST, FROST_EDGE = "#F1F1EC", "#8A8A80"
 INK, QUIET = "#222222", "#777777"
 NOTHING = "#DDDDDD"
 """Where a light field holds no samples: neither black nor white."""
 
 TITLE, TEXT, SMALL = 12, 11, 10
 """Points; readable at 100 dots per inch."""
+
+
+def frost_tones() -> Any:
+    """A colour map for ground glass, from hardly rough (0) to as rough as it gets (1)."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("frost", ["#FDFDFA", "#A9A99C"])
+
+
+def black_tones() -> Any:
+    """A colour map from opaque black (0) to nothing at all (1), for what stops light in front of something else."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("black", [(0.1, 0.1, 0.1, 1.0), (0.1, 0.1, 0.1, 0.0)])
 
 
 def new_axes(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:

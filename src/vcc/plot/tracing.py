@@ -1,17 +1,28 @@
-"""Single rays through a camera, for drawing: where they go, and where they end."""
+"""Single rays through a camera, for drawing: where they go, how they split, and where they end."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.affine import Affine
-from vcc.camera import Camera
+from vcc.camera import Camera, Stage, about
+from vcc.kernels import Kernel
+from vcc.optics import Element, Faces, Scatter
 
 Array = NDArray[np.float64]
+
+BRANCHES = (1 / 6, 1 / 2, 5 / 6)
+"""A ray that is scattered goes on as three, at these quantiles of the kernel, each for a third of the light.
+Of a Gaussian they are its middle and ±0.97 σ; of two spots they are the spots, not the dark between them."""
+MOST_RAYS = 1500
+"""Rays are not split into more than this: beyond, each goes on by one of its branches, in turns."""
+BINS = 257
+"""Into which the reach of a kernel is divided to find its quantiles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,43 +31,201 @@ class Paths:
 
     Args:
         z: of each plane, metres: (planes,). The last one is the sensor's.
-        positions: (x, y) of each ray at each plane, metres: (rays, planes, 2).
+        positions: (x, y) of each ray at each plane, metres: (rays, planes, 2). At a plane inside a thick element
+            they lie on the straight line from where the ray enters it to where it leaves it.
         shares: what is left of each ray on arrival at each plane, 0 to 1: (rays, planes).
+        starts: the plane from which on each ray is one of its own, (rays,): 0, or that of the diffuser at which
+            it branched off. Before, it is the ray that it branched off from.
     """
 
     z: Array
     positions: Array
     shares: Array
+    starts: NDArray[np.int64]
 
 
-def trace(camera: Camera, rays: ArrayLike, start: float = 0.0) -> Paths:
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """A plane of an element that light crosses.
+
+    Args:
+        z: of the plane, metres. Of what is inside a thick element only a map of rays is known: it is drawn where
+            a ray through the middle of the entrance would have got so far by free flight.
+        step: rays from the crossing before, or from just before the element, to here; centred on the element.
+        from_entrance: rays from just before the element to here, likewise.
+        faces: what stands there.
+    """
+
+    z: float
+    step: Affine
+    from_entrance: Affine
+    faces: Faces
+
+
+def crossings(element: Element) -> list[Crossing]:
+    """The planes of an element in order: one of a thin element; of a thick one its entrance, all faces, its exit."""
+    parts = element.parts()
+    steps_ahead = sum(isinstance(part, Affine) for part in parts)
+    end = element.z + element.length
+    found: list[Crossing] = []
+    step = total = Affine.identity()
+    for part in parts:
+        if isinstance(part, Affine):
+            if not found:
+                found.append(Crossing(element.z, step, total, Faces()))
+            step, total = part @ step, part @ total
+            steps_ahead -= 1
+            continue
+        flown = float(total.matrix[0, 2])
+        z = end if steps_ahead == 0 else min(max(element.z + flown, found[-1].z if found else element.z), end)
+        found.append(Crossing(z, step, total, part))
+        step = Affine.identity()
+    if isinstance(parts[-1], Affine):
+        found.append(Crossing(end, step, total, Faces()))
+    return found
+
+
+def trace(camera: Camera, rays: ArrayLike, start: float = 0.0, split_along: int | None = None) -> Paths:
     """The paths of rays from a plane before the camera through its elements to the sensor.
 
     Args:
-        camera: whose elements bend and absorb.
+        camera: whose elements bend, absorb and scatter.
         rays: (u, v, s, t) of each ray at the entrance plane z = 0: (rays, 4), metres and slopes.
         start: where to start drawing, metres, 0 or less.
+        split_along: the axis, 0 for x and 1 for y, along which scattered rays split into three (`BRANCHES`);
+            None lets diffusers pass rays unscattered.
+
+    Raises:
+        InputError: an element that returns what it must not.
     """
-    rays = np.asarray(rays, dtype=np.float64)
-    share = np.ones(len(rays))
-    places, positions, shares = [start], [Affine.propagation(start)(rays)[:, :2]], [share]
-    for stage in camera.stages:
-        rays = stage.approach(rays)
-        places.append(stage.z)
-        positions.append(rays[:, :2])
-        shares.append(share)
-        x, y = (rays[:, :2] - stage.element.decentre).T
+    given = np.asarray(rays, dtype=np.float64)
+    bundle = _Bundle(given, np.ones(len(given)), np.zeros(len(given), dtype=np.int64), [], [], [])
+    bundle.cross(start, Affine.propagation(start)(given)[:, :2])
+    here = 0.0
+    for element in camera.elements:
+        bundle.rays = Affine.propagation(element.z - here)(bundle.rays)
+        here = element.z + element.length
+        first = len(bundle.z)
+        for crossing in crossings(element):
+            bundle.rays = about(element.decentre, crossing.step)(bundle.rays)
+            bundle.cross(crossing.z, bundle.rays[:, :2])
+            bundle.meet(Stage(element, crossing.z, Affine.identity(), crossing.faces), split_along)
+        bundle.straighten(first)
+    bundle.rays = Affine.propagation(camera.sensor.z - here)(bundle.rays)
+    bundle.cross(camera.sensor.z, bundle.rays[:, :2])
+    return Paths(
+        np.array(bundle.z), np.stack(bundle.positions, axis=1), np.stack(bundle.shares, axis=1), bundle.starts
+    )
+
+
+@dataclass
+class _Bundle:
+    """Rays on their way, and what is known of them so far: one entry of the lists a plane."""
+
+    rays: Array
+    share: Array
+    starts: NDArray[np.int64]
+    z: list[float]
+    positions: list[Array]
+    shares: list[Array]
+
+    def cross(self, z: float, positions: Array) -> None:
+        """Note that the rays arrive at a plane."""
+        self.z.append(z)
+        self.positions.append(positions)
+        self.shares.append(self.share)
+
+    def meet(self, stage: Stage, split_along: int | None) -> None:
+        """Absorb, bend and scatter the rays."""
+        x, y = (self.rays[:, :2] - stage.element.decentre).T
         if stage.faces.pattern is not None:
-            share = share * stage.faces.pattern(x, y)
+            self.share = self.share * stage.faces.pattern(x, y)
         if stage.centred is not None:
-            rays = stage.centred(rays)
+            self.rays = stage.centred(self.rays)
         elif stage.faces.bending is not None:
-            rays = rays + np.column_stack([np.zeros((len(rays), 2)), *stage.bent(*rays[:, :2].T)])
-    rays = camera.approach_to_sensor(rays)
-    places.append(camera.sensor.z)
-    positions.append(rays[:, :2])
-    shares.append(share)
-    return Paths(np.array(places), np.stack(positions, axis=1), np.stack(shares, axis=1))
+            slopes = stage.bent(*self.rays[:, :2].T)
+            self.rays = self.rays + np.column_stack([np.zeros((len(self.rays), 2)), *slopes])
+        if stage.faces.spread is not None and split_along is not None:
+            with stage.named():
+                slopes = branches(stage.faces.spread, split_along, x, y)
+            self.split(slopes, split_along)
+
+    def split(self, slopes: Array, axis: int) -> None:
+        """Let each ray go on as several, of these changes of slope, (rays, branches)."""
+        count, branch = slopes.shape
+        middle = branch // 2
+        if count * branch > MOST_RAYS:
+            self.rays = self.rays.copy()
+            self.rays[:, 2 + axis] += slopes[np.arange(count), np.arange(count) % branch]
+            return
+        parent = np.repeat(np.arange(count), branch)
+        self.rays, self.share = self.rays[parent], self.share[parent] / branch
+        self.rays[:, 2 + axis] += slopes.ravel()
+        self.positions = [positions[parent] for positions in self.positions]
+        self.shares = [shares[parent] for shares in self.shares]
+        # The middle one is drawn as the ray that was there before.
+        own = np.arange(count * branch) % branch == middle
+        self.starts = np.where(own, self.starts[parent], len(self.z) - 1)
+
+    def straighten(self, first: int) -> None:
+        """Put the places between the first and the last plane of a thick element on the line between them."""
+        length = self.z[-1] - self.z[first]
+        for plane in range(first + 1, len(self.z) - 1):
+            if length > 0:
+                way = (self.z[plane] - self.z[first]) / length
+                self.positions[plane] = (1 - way) * self.positions[first] + way * self.positions[-1]
+
+
+def branches(scatter: Scatter, axis: int, x: Array, y: Array) -> Array:
+    """Changes of slope along an axis at the quantiles `BRANCHES` of the kernels at places x, y: (places, 3)."""
+    slopes, shares, widths = _mixed(scatter, axis, x, y)
+    order = np.argsort(slopes)
+    running = np.cumsum(shares[:, order], axis=1)
+    # The first that reaches the share: never between two spots, where there is no light.
+    picked = [np.argmax(running >= share * running[:, -1:], axis=1) for share in BRANCHES]
+    return np.asarray(slopes[order][np.stack(picked, axis=-1)] * widths[:, None])
+
+
+def spread_along(scatter: Scatter, axis: int, x: Array, y: Array) -> Array:
+    """The standard deviation of the change of slope along an axis at places x, y: (places,)."""
+    slopes, shares, widths = _mixed(scatter, axis, x, y)
+    mean = shares @ slopes
+    return np.asarray(widths * np.sqrt(np.maximum(shares @ slopes**2 - mean**2, 0.0)))
+
+
+def _mixed(scatter: Scatter, axis: int, x: Array, y: Array) -> tuple[Array, Array, Array]:
+    """Changes of slope (n,) of all kernels, their shares at each place (places, n), and the widths (places,)."""
+    mix, widths = scatter.at(x, y)
+    marginals = [_marginal(kernel, axis) for kernel in scatter.kernels]
+    shares = np.concatenate([mix[:, n, None] * share for n, (_, share) in enumerate(marginals)], axis=1)
+    return np.concatenate([slopes for slopes, _ in marginals]), shares, widths
+
+
+def _marginal(kernel: Kernel, axis: int) -> tuple[Array, Array]:
+    """A kernel's distribution along one axis: changes of slope, and the share of light at each."""
+    slopes, shares = kernel.quadrature()
+    slopes, reach = slopes[:, axis], kernel.reach[axis]
+    bins = np.clip(((slopes / reach + 1) / 2 * BINS).astype(np.int64), 0, BINS - 1) if reach > 0 else 0 * shares
+    bins = bins.astype(np.int64)
+    total = np.bincount(bins, shares)
+    lit = total > 0
+    return np.bincount(bins, shares * slopes)[lit] / total[lit], total[lit]
+
+
+def openings(camera: Camera, axis: int) -> Iterator[tuple[Element, Affine, float]]:
+    """What is opaque around an opening of known size.
+
+    Yields:
+        The element, the map of rays from the entrance plane to the opening (through all that is affine), and
+        half of the opening's size along the axis, metres.
+    """
+    ray = Affine.identity()
+    for stage in camera.stages:
+        ray = stage.approach @ ray
+        if stage.faces.pattern is not None and math.isfinite(stage.faces.pattern.size[axis]):
+            yield stage.element, ray, stage.faces.pattern.size[axis] / 2
+        if stage.centred is not None:
+            ray = stage.centred @ ray
 
 
 def fan(positions: ArrayLike, distance: float, offset: float, axis: int, cross: float = 0.0) -> Array:

@@ -1,0 +1,500 @@
+"""What each optical element looks like from the side: the shape of its glass, what it stops, how it scatters.
+
+An element is drawn by what its faces do, so that a user's own needs no code here: glass has the profile whose
+slopes bend rays as the element does, a scatterer is frosted, and what lets no light through is black.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.errors import InputError
+from vcc.optics import (
+    Biprism,
+    CellDeflection,
+    CodedDiffuser,
+    Diffuser,
+    Element,
+    Faces,
+    FirstOrder,
+    Lens,
+    LensArray,
+    PhasePlate,
+    Prism,
+    PrismArray,
+    Pyramid,
+    Scatter,
+)
+from vcc.patterns import Pattern
+from vcc.plot import style
+from vcc.plot.tracing import Crossing, crossings, spread_along
+from vcc.sensor import Sensor
+from vcc.surfaces import Surface
+from vcc.units import mm, short
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+MOST_CELLS = 60
+"""Of an array with more cells than this in the height of the drawing, fewer and larger ones are drawn."""
+CELLS_INSTEAD = 40
+"""About so many."""
+POINTS = 801
+"""At which the profile of a piece of glass is looked at."""
+LONGEST_WORDS = 26
+"""Letters of a surface's description on a label; of a longer one only the kind is told."""
+
+
+@dataclass(frozen=True)
+class Pen:
+    """Where and how large to draw.
+
+    Args:
+        axes: in millimetres.
+        axis: 0 draws x upwards, 1 draws y.
+        low: the lowest height drawn, metres.
+        high: the highest, metres.
+        thick: half the thickness of a lens, metres: thin elements have none, and are drawn with a symbol.
+    """
+
+    axes: Axes
+    axis: int
+    low: float
+    high: float
+    thick: float
+
+    @property
+    def half(self) -> float:
+        """Half the height of the drawing, metres."""
+        return (self.high - self.low) / 2
+
+    def fill(self, z: Any, height: Any, **options: Any) -> None:
+        """A closed polygon; z and height in metres."""
+        from matplotlib.patches import Polygon
+
+        points = np.column_stack([np.asarray(z) / mm, np.asarray(height) / mm])
+        self.axes.add_patch(Polygon(points, closed=True, **options))
+
+    def line(self, z: Any, height: Any, **options: Any) -> None:
+        """A line; z and height in metres."""
+        self.axes.plot(np.asarray(z) / mm, np.asarray(height) / mm, **options)
+
+    def glass(self, z: Any, height: Any, bounded: bool, **options: Any) -> None:
+        """A closed piece of glass, its outline dashed where it has no rim."""
+        looks = {"facecolor": style.GLASS, "edgecolor": style.GLASS_EDGE, "alpha": 0.85, "linewidth": 1.2}
+        self.fill(z, height, linestyle="-" if bounded else (0, (4, 2)), **{"zorder": 1, **looks, **options})
+
+
+def half_size(element: Element, axis: int) -> float:
+    """Half the height of an element, metres; infinite where it has no rim.
+
+    Of a thick one, half the widest beam of light from far away that gets through any of its openings.
+    """
+    halves = []
+    for crossing in crossings(element):
+        half = _half_opening(crossing.faces, axis)
+        growth = abs(float(crossing.from_entrance.matrix[axis, axis]))
+        if math.isfinite(half):
+            halves.append(max(half, half / growth if growth > 0.1 else half))
+    return max(halves, default=math.inf)
+
+
+def _half_opening(faces: Faces, axis: int) -> float:
+    return math.inf if faces.pattern is None else faces.pattern.size[axis] / 2
+
+
+def draw_element(pen: Pen, element: Element) -> None:
+    """Draw an element in its place."""
+    planes = crossings(element)
+    if len(planes) > 1 or element.length > 0:
+        _draw_block(pen, element, planes)
+    elif isinstance(element, Lens):
+        _draw_lens(pen, element)
+    elif isinstance(element, Prism):
+        _draw_prism(pen, element)
+    else:
+        _draw_by_faces(pen, element, planes[0].faces)
+
+
+def _draw_lens(pen: Pen, lens: Lens) -> None:
+    """Two arcs, bulging for a converging lens and hollow for a diverging one; a stop outside the rim."""
+    half = lens.diameter / 2 if lens.diameter is not None else 1.02 * pen.half
+    across = np.linspace(-1, 1, 41)
+    bulge = 1 - across**2
+    depth = pen.thick * (0.1 + bulge if lens.focal_length > 0 else 1.05 - 0.8 * bulge)
+    height = half * across + lens.decentre[pen.axis]
+    pen.glass(
+        np.concatenate([lens.z - depth, lens.z + depth[::-1]]),
+        np.concatenate([height, height[::-1]]),
+        bounded=lens.diameter is not None,
+    )
+    if lens.diameter is not None:
+        _draw_stop(pen, lens.z, lens.decentre[pen.axis], half)
+
+
+def _draw_prism(pen: Pen, prism: Prism) -> None:
+    """A wedge, thick on the side to which it deflects."""
+    half = 1.02 * pen.half
+    side = 1.0 if prism.deflection[pen.axis] >= 0 else -1.0
+    flat = prism.deflection[pen.axis] == 0  # it deflects along the other axis only
+    middle = (pen.low + pen.high) / 2
+    top, base = middle - half * side, middle + half * side
+    tip = pen.thick if flat else 0.05 * pen.thick
+    pen.glass(
+        prism.z + np.array([-tip, tip, pen.thick, -pen.thick]), np.array([top, top, base, base]), bounded=False
+    )
+
+
+def _draw_block(pen: Pen, element: Element, planes: list[Crossing]) -> None:
+    """A thick element: glass from end to end, its rims and stop, and principal planes where there are any."""
+    centre = element.decentre[pen.axis]
+    half = half_size(element, pen.axis)
+    bounded = math.isfinite(half)
+    half = min(1.08 * half, 1.02 * pen.half)
+    start, end = element.z, element.z + element.length
+    if element.length == 0:
+        start, end = start - pen.thick / 2, end + pen.thick / 2
+    corners = np.array([start, end, end, start]), centre + half * np.array([-1, -1, 1, 1])
+    pen.glass(*corners, bounded=bounded, alpha=0.5)
+    for plane in planes:
+        opening = _half_opening(plane.faces, pen.axis)
+        if math.isfinite(opening):
+            _draw_stop(pen, plane.z, centre, opening, half)
+    for z, name, side in _principal_planes(element):
+        left, right = sorted(pen.axes.get_xlim())
+        if not left < z / mm < right:
+            continue
+        pen.line([z, z], [centre - half, centre + half], color=style.GLASS_EDGE, linewidth=1, dashes=(5, 3), zorder=1.5)
+        pen.axes.annotate(
+            name,
+            (z / mm, (centre - half if pen.axis == 0 else centre + half) / mm),
+            xytext=(3 * side, 3),
+            textcoords="offset points",
+            ha="left" if side > 0 else "right",
+            va="bottom",
+            fontsize=style.SMALL,
+            color=style.GLASS_EDGE,
+        )
+
+
+def _principal_planes(element: Element) -> list[tuple[float, str, int]]:
+    """(z, name, side of the line on which the name has room) of each."""
+    if not isinstance(element, FirstOrder):
+        return []
+    try:
+        front = element.z + element.front_principal_distance
+        back = element.z + element.length + element.back_principal_distance
+    except InputError:  # afocal, or without an axis of symmetry: it has none
+        return []
+    return [(front, "H", -1 if front <= back else 1), (back, "H′", 1 if front <= back else -1)]
+
+
+def _draw_by_faces(pen: Pen, element: Element, faces: Faces) -> None:
+    """Any thin element: glass that bends as it does, a frosted sheet where it scatters, black where it stops."""
+    bends, scatters = faces.deflection is not None, faces.spread is not None
+    half = _half_opening(faces, pen.axis)
+    if bends:
+        _draw_glass(pen, element, faces)
+    if faces.spread is not None:
+        _draw_frosted(pen, element, faces.spread, half)
+    if faces.pattern is None:
+        if not (bends or scatters):
+            _draw_sheet(pen, element)
+        return
+    if not (bends or scatters):
+        _draw_mask(pen, element, faces.pattern)
+    elif not _all_clear(pen, element, faces):
+        _draw_mask(pen, element, faces.pattern, scale=_magnification(pen, element, faces), over_glass=True)
+    if math.isfinite(half):
+        _draw_stop(pen, element.z, element.decentre[pen.axis], half)
+
+
+def _range(pen: Pen, element: Element, half: float) -> tuple[float, float]:
+    """From which to which height, from its middle, an element is drawn, metres."""
+    centre = element.decentre[pen.axis]
+    margin = 0.02 * pen.half
+    return max(-half, pen.low - margin - centre), min(half, pen.high + margin - centre)
+
+
+def _along(axis: int, places: Array) -> tuple[Array, Array]:
+    """(x, y) of places on the drawn line through an element's middle."""
+    return (places, np.zeros_like(places)) if axis == 0 else (np.zeros_like(places), places)
+
+
+def _all_clear(pen: Pen, element: Element, faces: Faces) -> bool:
+    assert faces.pattern is not None
+    low, high = _range(pen, element, _half_opening(faces, pen.axis))
+    places = np.linspace(low, high, 2 * POINTS + 1)[1:-1] / _magnification(pen, element, faces)
+    return bool((faces.pattern(*_along(pen.axis, places)) == 1).all())
+
+
+def _magnification(pen: Pen, element: Element, faces: Faces) -> int:
+    """By how much the cells of an array are drawn larger, so that they can be told apart."""
+    if not isinstance(faces.bending, CellDeflection):
+        return 1
+    low, high = _range(pen, element, _half_opening(faces, pen.axis))
+    cells = (high - low) / faces.bending.lattice.pitch
+    return 1 if cells <= MOST_CELLS else math.ceil(cells / CELLS_INSTEAD)
+
+
+def _draw_glass(pen: Pen, element: Element, faces: Faces) -> None:
+    """Glass flat at the element's place; towards the scene it has the profile of its optical path."""
+    half = _half_opening(faces, pen.axis)
+    low, high = _range(pen, element, half)
+    if high <= low:
+        return
+    if isinstance(faces.bending, CellDeflection):
+        height, depth = _cell_profile(faces.bending, pen.axis, low, high, _magnification(pen, element, faces))
+    else:
+        height = np.linspace(low, high, POINTS)
+        depth = _profile(faces, pen.axis, height)
+    deepest = float(depth.max())
+    depth = pen.thick * (0.4 + 1.1 * (depth / deepest if deepest > 0 else depth))
+    centre = element.decentre[pen.axis]
+    pen.glass(
+        np.concatenate([[element.z], element.z - depth, [element.z]]),
+        centre + np.concatenate([[low], height, [high]]),
+        bounded=math.isfinite(half),
+    )
+
+
+def _profile(faces: Faces, axis: int, places: Array) -> Array:
+    """The optical path along the drawn line, from 0 on, metres: the integral of the slopes that rays gain."""
+    x, y = _along(axis, places)
+    if faces.affine is not None:
+        slopes = faces.affine(np.stack([x, y, 0 * x, 0 * x], axis=-1))[:, 2 + axis]
+    else:
+        assert faces.bending is not None
+        slopes = np.asarray(faces.bending(x, y)[axis])
+    steps = np.diff(places) * (slopes[1:] + slopes[:-1]) / 2
+    path = np.concatenate([[0.0], np.cumsum(steps)])
+    path -= path.min()
+    # What rounding leaves of a plane is no shape.
+    return path if path.max() > 1e-12 * max(1e-3, float(np.ptp(places))) else np.zeros_like(path)
+
+
+def _cell_profile(cells: CellDeflection, axis: int, low: float, high: float, scale: int) -> tuple[Array, Array]:
+    """Heights, and the glass of each cell there above its thinnest place, metres; cells ``scale`` times as large."""
+    lattice = cells.lattice
+    count = (high - low) / (lattice.pitch * scale)
+    places = np.linspace(low, high, int(min(max(24 * count, POINTS), 4000)))
+    x, y = _along(axis, places / scale)
+    row, column = lattice.cell_of(x, y)
+    centre_x, centre_y = lattice.centre_of(row, column)
+    rows, columns = cells.powers.shape
+    power, slope = cells.powers[row % rows, column % columns], cells.slopes[row % rows, column % columns]
+    dx, dy = x - centre_x, y - centre_y
+    path = slope[:, 0] * dx + slope[:, 1] * dy - power * (dx * dx + dy * dy) / 2
+    first = np.flatnonzero(np.r_[True, (np.diff(row) != 0) | (np.diff(column) != 0)])
+    thinnest = np.minimum.reduceat(path, first)
+    return places, path - np.repeat(thinnest, np.diff(np.r_[first, len(path)]))
+
+
+def _draw_frosted(pen: Pen, element: Element, scatter: Scatter, half: float) -> None:
+    """A sheet with a rough side towards the sensor; where it scatters more it is rougher and darker."""
+    low, high = _range(pen, element, half)
+    if high <= low:
+        return
+    teeth = max(int(90 * (high - low) / (2 * pen.half)), 6)
+    height = np.linspace(low, high, 2 * teeth + 1)
+    spread = spread_along(scatter, pen.axis, *_along(pen.axis, height))
+    strength = spread / spread.max() if spread.max() > 0 else 0 * spread
+    # The teeth are uneven, as ground glass is, and the same on every drawing.
+    tooth = np.where(np.arange(len(height)) % 2 == 0, 0.0, np.random.default_rng(0).uniform(0.4, 1, len(height)))
+    centre, thick = element.decentre[pen.axis], pen.thick
+    pen.fill(
+        np.concatenate([[element.z], element.z + thick * tooth * (0.1 + 0.9 * strength), [element.z]]),
+        centre + np.concatenate([[low], height, [high]]),
+        facecolor=style.FROST,
+        edgecolor=style.FROST_EDGE,
+        linewidth=0.8,
+        zorder=1,
+    )
+    edges = centre + np.linspace(low, high, 2 * teeth + 1)
+    pen.axes.pcolormesh(
+        np.array([element.z - 0.5 * thick, element.z]) / mm,
+        edges / mm,
+        ((strength[1:] + strength[:-1]) / 2)[:, None],
+        cmap=style.frost_tones(),
+        vmin=0,
+        vmax=1,
+        zorder=1.1,
+    )
+    bounded = math.isfinite(half)
+    outline = np.array([-0.5, 0, 0, -0.5]) * thick + element.z, centre + np.array([low, low, high, high])
+    looks = {"facecolor": "none", "edgecolor": style.FROST_EDGE, "linewidth": 1.0, "zorder": 1.2}
+    pen.fill(*outline, linestyle="-" if bounded else (0, (4, 2)), **looks)
+
+
+def _draw_sheet(pen: Pen, element: Element) -> None:
+    """What has neither a known shape nor a transmission: a thin sheet."""
+    middle = (pen.low + pen.high) / 2
+    ends = middle + 1.02 * pen.half * np.array([-1, 1])
+    pen.line([element.z, element.z], ends, color=style.GLASS_EDGE, linewidth=2, zorder=1)
+
+
+def _draw_mask(pen: Pen, element: Element, pattern: Pattern, scale: int = 1, over_glass: bool = False) -> None:
+    """The mask's middle row as a bar, black where it is opaque and white (on glass: nothing) where it is open."""
+    low, high = _range(pen, element, pattern.size[pen.axis] / 2)
+    if high <= low:
+        return
+    points = 1024 if scale == 1 and not over_glass else 4096
+    steps = (np.arange(points) + 0.5) / points
+    values = np.asarray(pattern(*_along(pen.axis, (low + (high - low) * steps) / scale)))
+    # Neighbours that are alike become one piece, so that a picture for print stays small.
+    cuts = np.flatnonzero(np.diff(values)) + 1
+    edges = low + (high - low) * np.concatenate([[0.0], cuts / points, [1.0]]) + element.decentre[pen.axis]
+    wide = 0.45 * pen.thick
+    sides = np.array([element.z - wide, element.z + (0 if over_glass else wide)])
+    pen.axes.pcolormesh(
+        sides / mm,
+        edges / mm,
+        values[np.concatenate([[0], cuts])][:, None],
+        cmap=style.black_tones() if over_glass else "gray",
+        vmin=0,
+        vmax=1,
+        zorder=3,
+    )
+    if over_glass:
+        return
+    pen.fill(
+        sides[[0, 1, 1, 0]],
+        edges[[0, 0, -1, -1]],
+        facecolor="none",
+        edgecolor=style.INK,
+        linewidth=0.8,
+        zorder=3.1,
+    )
+    if math.isfinite(pattern.size[pen.axis]):
+        _draw_stop(pen, element.z, element.decentre[pen.axis], pattern.size[pen.axis] / 2)
+
+
+def _draw_stop(pen: Pen, z: float, centre: float, half: float, reach: float = math.inf) -> None:
+    """The opaque surroundings of an opening: heavy at its edge, thin further out, no further than ``reach``."""
+    for side in (-1, 1):
+        edge = centre + side * half
+        border = (pen.high if side > 0 else pen.low) + side * 0.06 * pen.half
+        outmost = border if math.isinf(reach) else centre + side * reach
+        for end, width in ((edge + side * 0.08 * pen.half, 3.0), (outmost, 1.0)):
+            end = min(end, outmost) if side > 0 else max(end, outmost)
+            if side * (end - edge) > 0:
+                pen.line([z, z], [edge, end], color=style.INK, linewidth=width, solid_capstyle="butt", zorder=3)
+
+
+def draw_sensor(pen: Pen, sensor: Sensor, most_pixels: int = 0) -> None:
+    """The sensor, and the borders of its pixels where no more than so many lie within the drawing."""
+    half, thick = sensor.size[1 - pen.axis] / 2, 1.25 * pen.thick
+    centre = sensor.decentre[pen.axis]
+    low, high = max(centre - half, pen.low - pen.half), min(centre + half, pen.high + pen.half)
+    pen.fill(
+        sensor.z + np.array([0, thick, thick, 0]),
+        np.array([low, low, high, high]),
+        facecolor="#5A5A5A",
+        edgecolor=style.INK,
+        linewidth=1.0,
+        zorder=3,
+    )
+    pitch = sensor.pitches[1 - pen.axis]
+    if 2 * pen.half / pitch <= most_pixels:
+        first, last = math.ceil((low - centre + half) / pitch), math.floor((high - centre + half) / pitch)
+        for border in centre - half + pitch * np.arange(first, last + 1):
+            pen.line(sensor.z + np.array([0, thick]), [border, border], color="white", linewidth=0.7, zorder=3.2)
+
+
+# --- words ---
+
+
+def label(element: Element, pen: Pen) -> str:
+    """What stands above an element: its kind and name, and what matters most of it."""
+    first = f"{element.kind} {element.name}".strip()
+    for kind, words in _WORDS.items():
+        if isinstance(element, kind):
+            return "\n".join([first, *(line for line in words(element, pen) if line)])
+    return first
+
+
+def length(value: float) -> str:
+    """A length on a drawing, to 4 digits."""
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    return short(value, digits=4).replace("um", "µm").replace("-", "−")
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}".replace("-", "−")
+
+
+def _lens_words(lens: Any, pen: Pen) -> list[str]:
+    return [f"f = {length(lens.focal_length)}"]
+
+
+def _prism_words(prism: Any, pen: Pen) -> list[str]:
+    return [f"δ = {_number(prism.deflection[0])}, {_number(prism.deflection[1])}"]
+
+
+def _facet_words(prism: Any, pen: Pen) -> list[str]:
+    sides = f"{prism.sides} sides, " if isinstance(prism, Pyramid) else ""
+    return [f"{sides}δ = {_number(prism.deflection)}"]
+
+
+def _array_words(array: Any, pen: Pen) -> list[str]:
+    faces = array.faces()
+    half = _half_opening(faces, pen.axis)
+    pitch = array.pitch if pen.axis == 0 else array.lattice.row_height
+    count = f"{round(2 * half / pitch)} × " if math.isfinite(half) else "pitch "
+    focal = array.focal_lengths if isinstance(array, LensArray) else (array.focal_length,)
+    focal = ["∞" if math.isinf(one) else length(one) for one in focal if one is not None]
+    scale = _magnification(pen, array, faces)
+    return [
+        count + length(pitch),
+        f"f = {', '.join(focal)}" if focal and focal != ["∞"] else "",
+        f"(drawn {scale}× as large)" if scale > 1 else "",
+    ]
+
+
+def _plate_words(plate: Any, pen: Pen) -> list[str]:
+    if not isinstance(plate.surface, Surface):
+        return [f"slopes by {getattr(plate.surface, '__name__', type(plate.surface).__name__)}"]
+    words = plate.surface.described().replace("-", "−").replace("um", "µm")
+    return [words if len(words) <= LONGEST_WORDS else words.split(" (")[0]]
+
+
+def _scatter_words(diffuser: Any, pen: Pen) -> list[str]:
+    faces = diffuser.faces()
+    low, high = _range(pen, diffuser, _half_opening(faces, pen.axis))
+    spread = spread_along(faces.spread, pen.axis, *_along(pen.axis, np.linspace(low, high, POINTS)))
+    least, most = _number(float(spread.min())), _number(float(spread.max()))
+    return [f"σ = {least}" if least == most else f"σ = {least} to {most}"]
+
+
+def _system_words(system: Any, pen: Pen) -> list[str]:
+    try:
+        focal_length = system.focal_length
+    except InputError:  # without an axis of symmetry it has none
+        return [""]
+    words = "afocal" if math.isinf(focal_length) else f"f = {length(focal_length)}"
+    if system.stop_diameter is None or math.isinf(focal_length):
+        return [words]
+    return [f"{words}, f/{_number(system.f_number)}"]
+
+
+_WORDS: dict[type[Any], Callable[[Any, Pen], list[str]]] = {
+    Lens: _lens_words,
+    Prism: _prism_words,
+    Biprism: _facet_words,
+    Pyramid: _facet_words,
+    LensArray: _array_words,
+    PrismArray: _array_words,
+    PhasePlate: _plate_words,
+    Diffuser: _scatter_words,
+    CodedDiffuser: _scatter_words,
+    FirstOrder: _system_words,
+}
