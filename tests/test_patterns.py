@@ -261,6 +261,17 @@ def test_functions_that_return_no_transmission_are_refused(function, message):
         FunctionPattern(leak)(np.zeros((2, 3)), np.zeros((2, 3)))
 
 
+def test_in_a_camera_such_functions_are_told_by_element():
+    def leak(x, y):
+        return 2.0 + 0 * x
+
+    camera = vcc.Camera([vcc.Mask(leak, 4e-3, name="code", z=1e-3)], vcc.Sensor(2e-3, (2, 2), 1e-4))
+    light_field = vcc.LightField.from_views(np.ones((2, 2, 3, 3), np.float32), 1e-3, 0.1, 1.0)
+    for method in ("footprints", "rays"):
+        with pytest.raises(vcc.InputError, match='mask "code": pattern leak returned transmission from 2 to 2'):
+            camera.capture(light_field, method=method)
+
+
 def test_the_frame_of_an_array_points_to_its_cells():
     values = np.random.default_rng(5).random((3, 5))
     cells = Cells(values, width=10.0, middle=(1.0, -2.0))

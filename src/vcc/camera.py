@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -16,6 +16,7 @@ from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.optics.faces import Element, Faces
+from vcc.patterns import owned
 from vcc.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -45,6 +46,11 @@ class Stage:
     z: float
     approach: Affine
     faces: Faces
+
+    def __post_init__(self) -> None:
+        if self.faces.pattern is not None:
+            named = owned(self.faces.pattern, self.element.label)
+            object.__setattr__(self, "faces", replace(self.faces, transmission=named))
 
     @property
     def centred(self) -> Affine | None:

@@ -12,7 +12,7 @@ import abc
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -386,9 +386,11 @@ class FunctionPattern(Pattern):
 
     Args:
         function: called with x and y in metres (arrays that broadcast); returns transmission, 0 to 1.
+        owner: the element whose pattern it is, named when the function returns something else.
     """
 
     function: Callable[[Array, Array], ArrayLike]
+    owner: str = ""
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """What the function returns, checked."""
@@ -396,18 +398,28 @@ class FunctionPattern(Pattern):
         # As whole arrays: a function of x alone then returns one number for each place, too.
         x, y = np.broadcast_arrays(x, y)
         shape = x.shape
-        name = getattr(self.function, "__name__", repr(self.function))
+        name = f"pattern {getattr(self.function, '__name__', repr(self.function))}"
+        name = f"{self.owner}: {name}" if self.owner else name
         values = np.asarray(self.function(x, y), dtype=np.float64)
         if values.shape not in (shape, ()):
-            raise InputError(f"pattern {name} returned shape {values.shape} for positions of shape {shape}")
+            raise InputError(f"{name} returned shape {values.shape} for positions of shape {shape}")
         if not np.isfinite(values).all():
-            raise InputError(f"pattern {name} returned numbers that are not finite")
+            raise InputError(f"{name} returned numbers that are not finite")
         if values.min() < 0 or values.max() > 1:
             raise InputError(
-                f"pattern {name} returned transmission from {values.min():g} to {values.max():g}; "
+                f"{name} returned transmission from {values.min():g} to {values.max():g}; "
                 "it lies between 0 and 1"
             )
         return np.broadcast_to(values, shape)
+
+
+def owned(pattern: Pattern, owner: str) -> Pattern:
+    """The pattern, whose functions name their owner when they return something else than transmissions."""
+    if isinstance(pattern, FunctionPattern):
+        return replace(pattern, owner=owner)
+    if isinstance(pattern, Bounded):
+        return replace(pattern, pattern=owned(pattern.pattern, owner))
+    return pattern
 
 
 def as_pattern(pattern: Pattern | Callable[[Array, Array], ArrayLike]) -> Pattern:

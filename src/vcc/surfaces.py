@@ -15,6 +15,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -705,8 +706,8 @@ def _check_sheet(what: str, width: float, height: float | None) -> None:
         _positive(f"height of {what}", height)
 
 
-def _check_glass(what: str, refractive_index: float) -> None:
-    if not (refractive_index > 1 and math.isfinite(refractive_index)):
+def _check_glass(what: str, refractive_index: Any) -> None:
+    if not (isinstance(refractive_index, Real) and 1 < refractive_index < math.inf):  # type: ignore[operator]
         raise InputError(
             f"refractive_index of {what} is {refractive_index}: a surface with no glass bends "
             "nothing; glass has more than 1, such as 1.5"
