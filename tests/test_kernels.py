@@ -259,7 +259,7 @@ def test_a_kernel_far_within_a_step_stays_where_it_is(kernel):
 
 def test_a_kernel_over_more_steps_than_fit_is_refused():
     with pytest.raises(
-        vcc.InputError, match=r"gaussian \(sigma 1\.0\).* covers 80001 steps.* 8192 are the most.*narrower"
+        vcc.InputError, match=r"gaussian \(sigma 1\).* covers 80001 steps.* 8192 are the most.*narrower"
     ):
         Gaussian(1.0).weights(np.diag([1e4, 1.0]))
     with pytest.raises(vcc.InputError, match="2×2 matrix of finite numbers"):

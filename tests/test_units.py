@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from vcc import InputError
-from vcc.units import deg, mm, parse, text, um
+from vcc.units import deg, mm, parse, short, text, um
 
 
 @pytest.mark.parametrize(
@@ -84,6 +84,26 @@ def test_refuses_what_is_no_quantity(written, dimension, message):
 )
 def test_writes_the_unit_that_reads_best(value, dimension, written):
     assert text(value, dimension) == written
+
+
+@pytest.mark.parametrize(
+    ("value", "dimension", "digits", "written"),
+    [
+        (59.45621789 * mm, "length", 6, "59.4562 mm"),
+        (59.45621789 * mm, "length", 3, "59.5 mm"),
+        (1 * deg, "angle", 6, "1°"),
+        (0.3 * deg, "angle", 6, "0.3°"),
+        (-math.pi / 2, "angle", 6, "-90°"),
+        (0.123456789, "angle", 6, "7.07355°"),
+        (0.005, "angle", 6, "5 mrad"),
+        (0.0, "angle", 6, "0 rad"),
+        (1 / 3, "time", 3, "333 ms"),
+    ],
+)
+def test_writes_for_people(value, dimension, digits, written):
+    assert short(value, dimension, digits) == written
+    if value:
+        assert parse(written, dimension, "it") == pytest.approx(value, rel=10.0**-digits * 5)
 
 
 def test_what_code_writes_stays_short():

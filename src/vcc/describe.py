@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcc.units import short
 
 LONGEST_LIST = 6
-"""Of longer lists only the number of entries is told."""
+"""Of more numbers than this only how many they are and their range are told."""
 
 
 def parameters_in_words(thing: Any, leave_out: tuple[str, ...] = ()) -> str:
     """The parameters of a dataclass that differ from their defaults, such as ``"diameter 20 mm"``.
 
-    Numbers are rounded to 6 digits; of arrays and long lists only the size is told.
+    Numbers are rounded to 6 digits; of arrays and long lists the shape and the range are told, of dataclasses in
+    fields their own words (``described()`` where they have it).
 
     Args:
         thing: an instance of a dataclass; fields with ``metadata={"unit": ...}`` are written with that unit.
@@ -58,20 +61,46 @@ def is_default(value: Any, parameter: Field[Any]) -> bool:
 
 def _value(value: Any, unit: str | None) -> str:
     if isinstance(value, np.ndarray):
-        return f"{'×'.join(map(str, value.shape))} numbers" if value.ndim else _value(value.item(), unit)
+        return _array(value, unit) if value.ndim else _value(value.item(), unit)
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, tuple | list):
-        if len(value) > LONGEST_LIST:
-            return f"({len(value)} values)"
-        return "(" + ", ".join(_value(part, unit) for part in value) + ")"
+        return _list(value, unit)
     if isinstance(value, int | float) and not isinstance(value, bool):
-        if unit is not None:
-            return short(value, unit)
-        return f"{value:.6g}" if isinstance(value, float) else str(value)
+        return _number(value, unit)
     described = getattr(value, "described", None)
     if described is not None:
         return str(described())
     if is_dataclass(value) and not isinstance(value, type):
-        return f"({parameters_in_words(value)})"
-    return str(getattr(value, "__name__", value))
+        kind = type(value).__name__
+        words = parameters_in_words(value)
+        return f"{kind} ({words})" if words else kind
+    # A function has a name; what has neither that nor words of its own may print itself at any length.
+    return str(getattr(value, "__name__", None) or (value if isinstance(value, str) else type(value).__name__))
+
+
+def _number(value: float, unit: str | None) -> str:
+    if unit is not None:
+        return short(value, unit) if math.isfinite(value) else ("infinite" if value > 0 else "minus infinite")
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _list(values: tuple[Any, ...] | list[Any], unit: str | None) -> str:
+    try:
+        numbers = np.asarray(values)
+    except ValueError:  # lists of different lengths inside
+        numbers = np.asarray([])
+    if numbers.size > LONGEST_LIST and numbers.dtype.kind in "biuf":
+        return _array(numbers, unit)
+    if len(values) > LONGEST_LIST:
+        return f"({len(values)} values)"
+    return "(" + ", ".join(_value(part, unit) for part in values) + ")"
+
+
+def _array(values: NDArray[Any], unit: str | None) -> str:
+    """The shape, and from where to where the numbers lie."""
+    what = f"{'×'.join(map(str, values.shape))} numbers" if values.ndim > 1 else f"{values.size} numbers"
+    if values.size == 0 or values.dtype.kind not in "biuf":
+        return what
+    low, high = (_number(float(end), unit) for end in (values.min(), values.max()))
+    return f"{what}, all {low}" if low == high else f"{what} from {low} to {high}"

@@ -120,7 +120,7 @@ def text(value: float, dimension: str = "length", *, exact: bool = False) -> str
 
 
 def short(value: float, dimension: str = "length", digits: int = 6) -> str:
-    """A value for people to read, rounded to so many digits: ``"59.4562 mm"``, ``"1 deg"``; see `text`."""
+    """A value for people to read, rounded to so many digits: ``"59.4562 mm"``, ``"1°"``; see `text`."""
     value = float(value)
     if dimension != "angle" or value == 0 or not math.isfinite(value):
         return text(float(f"{value:.{digits}g}"), dimension)
@@ -128,7 +128,7 @@ def short(value: float, dimension: str = "length", digits: int = 6) -> str:
     names = _WRITTEN[dimension]
     best = _best_unit(value, names, dimension)
     ordered = [best, *(name for name in names if name != best)]
-    return min((_written(value, name, dimension, digits) for name in ordered), key=len)
+    return min((_written(value, name, dimension, digits).replace(" deg", "°") for name in ordered), key=len)
 
 
 def _best_unit(value: float, names: tuple[str, ...], dimension: str) -> str:

@@ -21,7 +21,7 @@ def test_it_names_what_was_folded_and_what_was_pulled_to_the_samples():
     code = vcc.Mask(np.eye(4), width=20 * mm, z=30 * mm, name="code")
     print_ = vcc.Mask(np.ones((2, 2)), width=20 * mm, z=52 * mm, name="print")
     lens = vcc.Lens(50 * mm, name="L1")
-    text = str(camera(lens, stop, code, print_).explain(light_field()))
+    text = " ".join(camera(lens, stop, code, print_).explain(light_field()).split())
     assert 'folded into one matrix: lens "L1"' in text
     assert 'the open share of its cell: mask "stop"' in text
     assert 'pulled from mid-path: mask "code"' in text
@@ -34,6 +34,14 @@ def test_it_shows_itself_plainly_at_the_prompt():
     assert repr(explanation) == str(explanation)
     assert explanation.expected_seconds is not None
     assert explanation.expected_seconds > 0
+
+
+def test_its_lines_fit_a_terminal():
+    fine = vcc.Mask(np.random.default_rng(1).random((200, 200)).round(), width=17 * mm, z=51.8 * mm)
+    lines = camera(vcc.Lens(50 * mm, diameter=12 * mm), fine).explain(light_field()).splitlines()
+    assert max(map(len, lines)) <= 80
+    (element,) = (n for n, line in enumerate(lines) if line.startswith("  z =      51.8 mm  mask, pattern"))
+    assert lines[element + 1].startswith((" " * 20, "  z ="))
 
 
 @pytest.mark.parametrize(("z", "filled"), [(52 * mm, False), (200 * mm, True)])

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.camera import Camera
+from vcc.affine import Affine
+from vcc.camera import Camera, Stage
 from vcc.errors import InputError
 from vcc.light_field import LightField
-from vcc.optics import Element, Lens, Prism
+from vcc.optics import CellDeflection, Element, FirstOrder, Lens
 from vcc.plot import style
-from vcc.plot.tracing import Paths, fan, trace
+from vcc.plot.elements import Pen, draw_element, draw_sensor, half_size, label_of, length_in_words, magnification
+from vcc.plot.tracing import Paths, fan, openings, trace
 from vcc.units import mm, short
 
 if TYPE_CHECKING:
@@ -25,28 +27,68 @@ Array = NDArray[np.float64]
 
 RAYS = 9
 """In each fan from a point on the axis; odd, so that one goes along the axis."""
+RAYS_THAT_SPLIT = 5
+"""In each fan where diffusers split rays."""
+OFF_AXIS_RAYS = 3
+"""In the fan from a point off the axis."""
 SCENE_SHARE = 0.45
 """How much of the scene's side is drawn, as a share of the camera's length."""
 NEAR_BLUR = 0.25
 """The nearer point is taken so near that it blurs over this share of the entrance."""
+LABEL_GAP = 14
+"""Pixels between labels."""
+CELLS_MAGNIFIED = 5
+"""Of an array, in the magnified piece beside the drawing."""
+RAYS_A_CELL = 5
+"""There, about so many of a fan go through each cell."""
 
 
 def focused_distance(camera: Camera) -> float | None:
     """How far before the entrance plane a point must be to be sharp on the sensor, metres.
 
-    With position and slope at the entrance mapped to the sensor by x = A·u + B·s, a point at
-    distance Z sends s = u/Z, and all its rays meet where A + B/Z = 0.
+    With position and slope at the entrance mapped to a plane by x = A·u + B·s, a point at distance Z sends
+    s = u/Z, and all its rays meet there where A + B/Z = 0. The plane is the sensor's; or the one that an array of
+    lenslets of focal length f, b before the sensor, relays to it: a before the array, 1/a + 1/b = 1/f (Lumsdaine
+    and Georgiev 2009). At b = f, where a is infinite, optics before the array are taken to be focused on the array
+    itself (Ng et al. 2005). Of lenslets of several focal lengths it is the first.
 
     Returns:
         The distance; infinite if parallel light is brought to a point; None if no real point is
         sharp (a camera without a lens, or one focused beyond infinity).
     """
-    matrix = camera.rays_at(camera.sensor.z, before=True).matrix
+    matrix = _to_focus(camera).matrix
     position, slope = float(matrix[0, 0]), float(matrix[0, 2])
-    if abs(position) <= 1e-12:
+    if abs(position) <= 1e-12 * max(1.0, abs(slope)):
         return math.inf if slope != 0 else None
     distance = -slope / position
     return distance if distance > 0 else None
+
+
+def _lenslets(camera: Camera) -> Stage | None:
+    """The last array of cells with a power, before the sensor and not on it."""
+    found = None
+    for stage in camera.stages:
+        cells = stage.faces.bending
+        if isinstance(cells, CellDeflection) and cells.powers.flat[0] != 0 and stage.z < camera.sensor.z:
+            found = stage
+    return found
+
+
+def _to_focus(camera: Camera) -> Affine:
+    """Rays from the entrance plane to the plane in which a picture must stand to be sharp on the sensor."""
+    stage = _lenslets(camera)
+    if stage is None:
+        return camera.rays_at(camera.sensor.z, before=True)
+    assert isinstance(stage.faces.bending, CellDeflection)
+    behind = camera.sensor.z - stage.z
+    vergence = float(stage.faces.bending.powers.flat[0]) - 1 / behind
+    to_array = camera.rays_at(stage.z)
+    if abs(vergence * behind) > 1e-6:
+        return Affine.propagation(-1 / vergence) @ to_array
+    if to_array.matrix[2, 0] == 0 or to_array.matrix[0, 2] == 0:
+        # Nothing before the array can focus on it: light that is parallel there is sharp, x = s.
+        return Affine.abcd(((0.0, 1.0), (-1.0, 0.0))) @ to_array
+    return to_array
 
 
 def plot_camera(
@@ -55,56 +97,79 @@ def plot_camera(
     light_field: LightField | None = None,
     object_distances: Sequence[float] | None = None,
     across: str = "x",
-    rays: int = RAYS,
+    rays: int | None = None,
+    magnified: Axes | bool | None = None,
     axes: Axes | None = None,
 ) -> Axes:
     """Draw a camera from the side: light goes to the right, the scene is at the left.
 
-    Elements stand in their true places with their true heights (their thickness is a symbol), rays
-    bend as in the camera, and one that a mask or a rim stops ends there. Heights are magnified
-    against z as the axes show. Of the scene's side only a piece is drawn: rays enter with their
-    true slopes.
+    Elements stand in their true places with their true heights; their thickness is a symbol, and glass that bends
+    rays otherwise than a lens or a prism has the profile that does so. Rays bend as in the camera, and one that a
+    mask or a rim stops ends there in a dot. Where a diffuser scatters, each ray goes on as three, fainter ones, at
+    the 1/6, 1/2 and 5/6 quantiles of the kernel, each with a third of the light. Heights are magnified against z
+    as the axes show. Of the scene's side only a piece is drawn: rays enter with their true slopes.
+
+    An array of very many cells is drawn with fewer, larger ones (its label says so), while rays bend as the true
+    cells do; some true cells, the sensor's pixels and their rays are shown magnified beside the drawing.
 
     Args:
         camera: what to draw.
         light_field: whose width on the entrance plane the rays fill; without it they fill the
-            first element that has a rim.
+            first lens that has a rim, or else the first element that has one.
         object_distances: of points on the axis, metres before the entrance plane (infinity for
             parallel light), one colour for each. None draws the distance in focus, also off the
             axis, and a nearer one.
         across: ``"x"`` or ``"y"``, the axis drawn upwards in the figure (y points down).
-        rays: how many from each point.
+        rays: how many from each point; None takes 9, and 5 where diffusers split them.
+        magnified: whether to draw a magnified piece of an array of cells beside a new figure's drawing, or the
+            axes in which to draw it; None does so on a new figure, for arrays whose cells are too small to see.
         axes: where to draw; None makes a new figure.
 
     Returns:
         The axes; ``.figure.savefig(path)`` writes them to a file.
 
     Raises:
-        InputError: another axis, fewer than 2 rays or an object distance of 0 or less.
+        InputError: another axis, fewer than 2 rays, an object distance of 0 or less, a magnified piece of a
+            camera without an array before its sensor or without axes for it beside given ones, or an element that
+            returns what it must not.
     """
     if across not in ("x", "y"):
         raise InputError(f'across is "x" or "y", not {across!r}')
-    if rays < 2:
+    if rays is not None and rays < 2:
         raise InputError(f"a fan has 2 rays or more, not {rays}")
+    if magnified is True and axes is not None:
+        raise InputError("beside axes that are given, a magnified piece needs axes too: pass them as magnified=")
+    from matplotlib.lines import Line2D
+
     axis = "xy".index(across)
+    scattering = any(stage.faces.spread is not None for stage in camera.stages)
+    rays = rays or (RAYS_THAT_SPLIT if scattering else RAYS)
     points = _points(camera, object_distances, axis)
-    if axes is None:
-        axes = style.new_axes(9.5, 4.8)
     start = -_scene_length(camera, points)
     paths = [
-        _trace_point(camera, point, light_field, axis, rays if not point.offset else 3, start) for point in points
+        _trace_point(camera, point, light_field, axis, OFF_AXIS_RAYS if point.offset else rays, start)
+        for point in points
     ]
     half = _half_height(camera, paths, axis)
-    pen = _Pen(axes, axis, half, camera.sensor.z - start)
+    wanted = axes is None if magnified is None else magnified is not False
+    array = _array_to_magnify(camera, axis, half, needed=bool(magnified)) if wanted else None
+    beside = None if isinstance(magnified, bool) else magnified
+    own_figure = axes is None
+    if axes is None:
+        if array is None or beside is not None:
+            axes = style.new_axes(9.5, 4.8)
+        else:
+            axes, beside = style.new_axes(11.5, 4.8, 1, 2, width_ratios=(2.4, 1))
+    pen = Pen(axes, axis, -half, half, 0.016 * (camera.sensor.z - start))
     _set_limits(axes, start, camera.sensor.z, half, across)
-    axes.axhline(0, color=style.QUIET, linewidth=0.8, linestyle=(0, (8, 3, 1, 3)), zorder=0)
+    _draw_axis(axes)
     for point, path in zip(points, paths, strict=True):
-        _draw_paths(axes, point, path, axis, start)
+        _draw_paths(axes, point, path, axis)
     for element in camera.elements:
-        _draw_element(pen, element)
-    _draw_sensor(pen, camera)
-    _draw_labels(pen, camera)
+        draw_element(pen, element, _beam(element, paths, axis))
+    draw_sensor(pen, camera.sensor)
     axes.legend(
+        handles=[Line2D([], [], color=point.colour, label=point.label) for point in points],
         loc="upper center",
         bbox_to_anchor=(0.5, -0.16),
         ncols=len(points),
@@ -114,6 +179,9 @@ def plot_camera(
         columnspacing=1.6,
     )
     style.tidy(axes, "z [mm], light goes to the right", f"{across} [mm]")
+    if array is not None and beside is not None:
+        _draw_magnified(beside, axes, camera, array, points, light_field, axis)
+    _draw_labels(pen, camera, own_figure)
     return axes
 
 
@@ -181,7 +249,7 @@ def _trace_point(
     """The fan from a point; it starts at the point itself where that is in the drawing."""
     low, high = _entrance(camera, point, light_field, axis)
     bundle = fan(np.linspace(low, high, rays), point.distance, point.offset, axis)
-    return trace(camera, bundle, max(start, -point.distance))
+    return trace(camera, bundle, max(start, -point.distance), split_along=axis)
 
 
 def _entrance(camera: Camera, point: _Point, light_field: LightField | None, axis: int) -> tuple[float, float]:
@@ -191,56 +259,46 @@ def _entrance(camera: Camera, point: _Point, light_field: LightField | None, axi
         corners = np.array([[-0.5, -0.5, 0, 0], [ends[0], ends[1], 0, 0]])
         low, high = np.sort(light_field.frame(corners)[:, axis])
         return float(low), float(high)
-    for rim in (True, False):  # a lens's rim says more about a camera than a mask's sheet
-        for element in camera.elements:
-            half = _half_size(element, axis)
-            if math.isinf(half) or isinstance(element, Lens) != rim:
-                continue
-            matrix = camera.rays_at(element.z, before=True).matrix
-            growth = float(matrix[axis, axis] + matrix[axis, axis + 2] / point.distance)
-            if growth:
-                # Just inside: the outermost ray must not end at the rim by rounding.
-                reach = 0.97 * half / abs(growth)
-                shift = (element.decentre[axis] + matrix[axis, axis + 2] * point.offset) / growth
-                return shift - reach, shift + reach
+    found = list(openings(camera, axis))
+    lenses = [one for one in found if isinstance(one[0], Lens | FirstOrder)]
+    # A lens's rim says more about a camera than a mask's sheet; of a thick one all rims count.
+    first = (lenses or found)[:1]
+    rims = [one for one in found if one[0] is first[0][0]] if first else []
+    low, high = -math.inf, math.inf
+    for element, ray, half in rims:
+        matrix = ray.matrix
+        growth = float(matrix[axis, axis] + matrix[axis, axis + 2] / point.distance)
+        if growth:
+            # Just inside: the outermost ray must not end at the rim by rounding.
+            reach = 0.97 * half / abs(growth)
+            shift = element.decentre[axis] - matrix[axis, 4] + matrix[axis, axis + 2] * point.offset
+            low, high = max(low, shift / growth - reach), min(high, shift / growth + reach)
+    if low < high and math.isfinite(high - low):
+        return low, high
     half = camera.sensor.size[1 - axis] / 3
     return -half, half
-
-
-def _half_size(element: Element, axis: int) -> float:
-    pattern = element.faces().pattern
-    return math.inf if pattern is None else pattern.size[axis] / 2
 
 
 # --- drawing ---
 
 
-@dataclass(frozen=True)
-class _Pen:
-    """Where and how large to draw: the axes, 0 for x or 1 for y, half the height and the length, m."""
-
-    axes: Axes
-    axis: int
-    half: float
-    length: float
-
-    def fill(self, z: Any, height: Any, **options: Any) -> None:
-        from matplotlib.patches import Polygon
-
-        points = np.column_stack([np.asarray(z) / mm, np.asarray(height) / mm])
-        self.axes.add_patch(Polygon(points, closed=True, **options))
-
-
 def _half_height(camera: Camera, paths: list[Paths], axis: int) -> float:
     """Half the height of the drawing, metres: bounded elements, the sensor, and rays within reason."""
     sizes = [camera.sensor.size[1 - axis] / 2 + abs(camera.sensor.decentre[axis])]
-    sizes += [
-        1.08 * _half_size(element, axis) + abs(element.decentre[axis])
-        for element in camera.elements
-        if math.isfinite(_half_size(element, axis))
-    ]
+    halves = [(half_size(element, axis), abs(element.decentre[axis])) for element in camera.elements]
+    sizes += [1.08 * half + decentre for half, decentre in halves if math.isfinite(half)]
     highest = max(float(np.abs(path.positions[:, 1:, axis]).max()) for path in paths)
     return max(*sizes, min(highest, 2 * max(sizes)))
+
+
+def _beam(element: Element, paths: list[Paths], axis: int) -> float:
+    """Half the height, around an element's middle, of the rays that are drawn through it, metres."""
+    highest = 0.0
+    for path in paths:
+        inside = (path.z >= element.z) & (path.z <= element.z + element.length) & (path.z < path.z[-1])
+        heights = np.abs(path.positions[:, inside, axis] - element.decentre[axis])
+        highest = max(highest, float(np.where(path.shares[:, inside] > 0, heights, 0.0).max(initial=0.0)))
+    return highest
 
 
 def _set_limits(axes: Axes, start: float, end: float, half: float, across: str) -> None:
@@ -250,12 +308,15 @@ def _set_limits(axes: Axes, start: float, end: float, half: float, across: str) 
     axes.set_ylim(-1.12 * up * half / mm, 1.12 * up * half / mm)
 
 
-def _draw_paths(axes: Axes, point: _Point, paths: Paths, axis: int, start: float) -> None:
-    """Each ray piece by piece, fainter where a mask took part of it; a dot where one is stopped."""
+def _draw_axis(axes: Axes) -> None:
+    axes.axhline(0, color=style.QUIET, linewidth=0.8, linestyle=(0, (8, 3, 1, 3)), zorder=0)
+
+
+def _draw_paths(axes: Axes, point: _Point, paths: Paths, axis: int, width: float = 1.1) -> None:
+    """Each ray piece by piece, fainter where it lost light; a dot where one is stopped."""
     z, heights = paths.z / mm, paths.positions[..., axis] / mm
-    label = point.label
-    for height, shares in zip(heights, paths.shares, strict=True):
-        for piece in range(len(z) - 1):
+    for height, shares, first in zip(heights, paths.shares, paths.starts, strict=True):
+        for piece in range(first, len(z) - 1):
             share = shares[piece + 1]
             if share <= 0:
                 if shares[piece] > 0:
@@ -265,147 +326,112 @@ def _draw_paths(axes: Axes, point: _Point, paths: Paths, axis: int, start: float
                 z[piece : piece + 2],
                 height[piece : piece + 2],
                 color=point.colour,
-                linewidth=1.1,
-                alpha=0.25 + 0.6 * share,
+                linewidth=width * (0.6 + 0.4 * share),
+                alpha=0.3 + 0.55 * share,
                 solid_capstyle="round",
                 zorder=2,
-                label=label,
             )
-            label = ""
-    if point.distance <= -start:
+    if z[0] <= -point.distance / mm:
         axes.plot(z[0], heights[:, 0].mean(), "o", color=point.colour, markersize=5)
 
 
-def _draw_element(pen: _Pen, element: Element) -> None:
-    if isinstance(element, Lens):
-        _draw_lens(pen, element)
-    elif isinstance(element, Prism):
-        _draw_prism(pen, element)
-    elif element.faces().pattern is None:
-        _draw_sheet(pen, element)
-    if element.faces().pattern is not None and not isinstance(element, Lens):
-        _draw_mask(pen, element)
+# --- a magnified piece of an array ---
 
 
-def _draw_lens(pen: _Pen, lens: Lens) -> None:
-    """Two arcs, bulging for a converging lens and hollow for a diverging one; a stop outside the rim."""
-    bounded = lens.diameter is not None
-    half = lens.diameter / 2 if lens.diameter is not None else 1.02 * pen.half
-    across = np.linspace(-1, 1, 41)
-    thick = 0.016 * pen.length
-    bulge = 1 - across**2
-    depth = thick * (0.1 + bulge) if lens.focal_length > 0 else thick * (1.05 - 0.8 * bulge)
-    height = half * across + lens.decentre[pen.axis]
-    pen.fill(
-        np.concatenate([lens.z - depth, lens.z + depth[::-1]]),
-        np.concatenate([height, height[::-1]]),
-        facecolor=style.GLASS,
-        edgecolor=style.GLASS_EDGE,
-        alpha=0.85,
-        linewidth=1.2,
-        linestyle="-" if bounded else (0, (4, 2)),
-        zorder=1,
-    )
-    if bounded:
-        _draw_stop(pen, lens, half)
+def _array_to_magnify(camera: Camera, axis: int, half: float, needed: bool) -> Stage | None:
+    """The last array of cells before the sensor; None where it has none, or (unless needed) none that is small."""
+    arrays = [
+        stage
+        for stage in camera.stages
+        if isinstance(stage.faces.bending, CellDeflection) and stage.z < camera.sensor.z
+    ]
+    if needed:
+        if not arrays:
+            raise InputError("magnified needs an array of cells before the sensor, and this camera has none")
+        return arrays[-1]
+    small = [one for one in arrays if magnification(one.element, one.faces, axis, -half, half) > 1]
+    return small[-1] if small else None
 
 
-def _draw_stop(pen: _Pen, element: Element, half: float) -> None:
-    """The opaque surroundings of an opening: heavy at its edge, thin further out."""
-    centre, z = element.decentre[pen.axis], element.z / mm
-    for side in (-1, 1):
-        edge = centre + side * half
-        for end, width in ((edge + side * 0.08 * pen.half, 3.0), (side * 1.06 * pen.half, 1.0)):
-            if side * (end - edge) > 0:
-                pen.axes.plot(
-                    [z, z],
-                    [edge / mm, end / mm],
-                    color=style.INK,
-                    linewidth=width,
-                    solid_capstyle="butt",
-                    zorder=3,
-                )
+def _draw_magnified(
+    inset: Axes,
+    axes: Axes,
+    camera: Camera,
+    stage: Stage,
+    points: list[_Point],
+    light_field: LightField | None,
+    axis: int,
+) -> None:
+    """Some cells in the middle of an array, with what is behind them up to the sensor."""
+    cells = stage.faces.bending
+    assert isinstance(cells, CellDeflection)
+    pitch = cells.lattice.pitch
+    gap = camera.sensor.z - stage.z
+    centre = np.array(stage.element.decentre)
+    middle = float((centre + cells.lattice.centre_of(*cells.lattice.cell_of(*-centre)))[axis])
+    low, high = middle - CELLS_MAGNIFIED / 2 * pitch, middle + CELLS_MAGNIFIED / 2 * pitch
+    inset.set_xlim((stage.z - 0.45 * gap) / mm, (camera.sensor.z + 0.12 * gap) / mm)
+    inset.set_ylim(*((low / mm, high / mm) if axis == 0 else (high / mm, low / mm)))
+    pen = Pen(inset, axis, low, high, 0.035 * gap)
+    _draw_axis(inset)
+    to_array = camera.rays_at(stage.z)
+    for point in points:
+        # Off the axis so far that its light goes through the next cell.
+        aside = to_array.matrix[axis, axis + 2]
+        if point.offset and aside:
+            point = replace(point, offset=-pitch / float(aside))
+        ends = _trace_point(camera, point, light_field, axis, 2, 0.0)
+        at_array = ends.positions[:, int(np.argmax(ends.z >= stage.z)), axis]
+        number = int(np.clip(RAYS_A_CELL * np.ptp(at_array) / pitch, RAYS, 20 * RAYS))
+        _draw_paths(inset, point, _trace_point(camera, point, light_field, axis, number, 0.0), axis, width=0.9)
+    for element in camera.elements:
+        if element.z >= stage.z:
+            draw_element(pen, element)
+    draw_sensor(pen, camera.sensor, most_pixels=200)
+    inset.locator_params(nbins=4)
+    inset.set_title(f"{CELLS_MAGNIFIED} cells magnified", fontsize=style.SMALL, color=style.INK)
+    style.tidy(inset, "z [mm]", f"{'xy'[axis]} [mm]")
+    inset.spines[["top", "right"]].set_visible(True)
+    inset.spines[:].set_color(style.QUIET)
+    inset.yaxis.set_label_position("right")
+    inset.yaxis.tick_right()
+    _join(axes, (camera.sensor.z, low, high), inset)
 
 
-def _draw_prism(pen: _Pen, prism: Prism) -> None:
-    """A wedge, thick on the side to which it deflects."""
-    half, thick = 1.02 * pen.half, 0.016 * pen.length
-    side = 1.0 if prism.deflection[pen.axis] >= 0 else -1.0
-    flat = prism.deflection[pen.axis] == 0  # it deflects along the other axis only
-    top, base = half * -side, half * side
-    tip = thick if flat else 0.05 * thick
-    pen.fill(
-        prism.z + np.array([-tip, tip, thick, -thick]),
-        np.array([top, top, base, base]),
-        facecolor=style.GLASS,
-        edgecolor=style.GLASS_EDGE,
-        alpha=0.85,
-        linewidth=1.2,
-        linestyle=(0, (4, 2)),
-        zorder=1,
-    )
+def _join(axes: Axes, piece: tuple[float, float, float], inset: Axes) -> None:
+    """Lines from a piece of the drawing, (z, low, high) in metres, to the axes in which it is magnified."""
+    from matplotlib.patches import ConnectionPatch
+
+    z, low, high = piece
+    for height, corner in ((low, 0.0), (high, 1.0)):
+        up = 1 - corner if inset.yaxis_inverted() else corner
+        line = ConnectionPatch(
+            (z / mm, height / mm),
+            (0.0, up),
+            axes.transData,
+            inset.transAxes,
+            axesA=axes,
+            axesB=inset,
+            color=style.QUIET,
+            linewidth=0.8,
+            zorder=4,
+        )
+        line.set_in_layout(False)
+        axes.figure.add_artist(line)
 
 
-def _draw_sheet(pen: _Pen, element: Element) -> None:
-    """What has neither a known shape nor a transmission: a thin sheet."""
-    z = element.z / mm
-    limit = 1.02 * pen.half / mm
-    pen.axes.plot([z, z], [-limit, limit], color=style.GLASS_EDGE, linewidth=2, zorder=1)
+# --- words ---
 
 
-def _draw_mask(pen: _Pen, element: Element) -> None:
-    """The mask's middle row as a bar, black where it is opaque and white where it is open."""
-    pattern = element.faces().pattern
-    assert pattern is not None
-    half = min(pattern.size[pen.axis] / 2, 1.02 * pen.half)
-    steps = (np.arange(1024) + 0.5) / 512 - 1
-    places = [half * steps, np.zeros(1)]
-    x, y = places if pen.axis == 0 else places[::-1]
-    values = np.asarray(pattern(x, y))
-    # Neighbours that are alike become one piece, so that a picture for print stays small.
-    cuts = np.flatnonzero(np.diff(values)) + 1
-    edges = half * np.concatenate([[-1.0], cuts / 512 - 1, [1.0]]) + element.decentre[pen.axis]
-    wide = 0.007 * pen.length
-    pen.axes.pcolormesh(
-        np.array([element.z - wide, element.z + wide]) / mm,
-        edges / mm,
-        values[np.concatenate([[0], cuts])][:, None],
-        cmap="gray",
-        vmin=0,
-        vmax=1,
-        zorder=3,
-    )
-    pen.fill(
-        element.z + wide * np.array([-1, 1, 1, -1]),
-        edges[[0, 0, -1, -1]],
-        facecolor="none",
-        edgecolor=style.INK,
-        linewidth=0.8,
-        zorder=3.1,
-    )
-    if math.isfinite(pattern.size[pen.axis]):
-        _draw_stop(pen, element, half)
-
-
-def _draw_sensor(pen: _Pen, camera: Camera) -> None:
-    sensor = camera.sensor
-    half, thick = sensor.size[1 - pen.axis] / 2, 0.02 * pen.length
-    pen.fill(
-        sensor.z + np.array([0, thick, thick, 0]),
-        sensor.decentre[pen.axis] + half * np.array([-1, -1, 1, 1]),
-        facecolor="#5A5A5A",
-        edgecolor=style.INK,
-        linewidth=1.0,
-        zorder=3,
-    )
-
-
-def _draw_labels(pen: _Pen, camera: Camera) -> None:
+def _draw_labels(pen: Pen, camera: Camera, own_figure: bool) -> None:
     """What each thing is, side by side above the drawing, each with a line to its place."""
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
     sensor = camera.sensor
     rows, columns = sensor.shape
-    pitch = short(sensor.pitches[1 - pen.axis], digits=4).replace("um", "µm")
-    things = [(element.z, _describe(element)) for element in camera.elements]
+    pitch = length_in_words(sensor.pitches[1 - pen.axis])
+    things = [(element.z + element.length / 2, label_of(element, pen)) for element in camera.elements]
     things.append((sensor.z, f"sensor\n{rows} × {columns}, {pitch}"))
     frame = pen.axes.get_xaxis_transform()
     labels = [
@@ -431,12 +457,17 @@ def _draw_labels(pen: _Pen, camera: Camera) -> None:
         )
         for z, words in _merged(things)
     ]
-    left, right = pen.axes.get_xlim()
-    millimetres = (right - left) / pen.axes.bbox.width  # per pixel
-    widths = [(label.get_window_extent().width + 10) * millimetres for label in labels]
-    places = spread([label.xy[0] for label in labels], widths)
-    for label, place in zip(labels, places, strict=True):
-        label.set_position((place, 1.07))
+    # The layout of an own figure follows the labels, and they follow it.
+    for _ in range(2 if own_figure else 1):
+        if own_figure:
+            figure = pen.axes.figure
+            assert isinstance(figure, Figure)
+            figure.draw_without_rendering()
+        left, right = pen.axes.get_xlim()
+        millimetres = (right - left) / pen.axes.bbox.width  # per pixel
+        widths = [(Text.get_window_extent(label).width + LABEL_GAP) * millimetres for label in labels]
+        for label, place in zip(labels, spread([label.xy[0] for label in labels], widths), strict=True):
+            label.set_position((place, 1.07))
 
 
 def spread(wanted: Sequence[float], widths: Sequence[float]) -> list[float]:
@@ -468,13 +499,3 @@ def _merged(things: list[tuple[float, str]]) -> list[tuple[float, str]]:
         else:
             merged.append((z, words))
     return merged
-
-
-def _describe(element: Element) -> str:
-    first = f"{element.kind} {element.name}".strip()
-    if isinstance(element, Lens):
-        focal_length = short(element.focal_length, digits=4).replace("-", "−")
-        return f"{first}\nf = {focal_length}"
-    if isinstance(element, Prism):
-        return f"{first}\nδ = {element.deflection[0]:.3g}, {element.deflection[1]:.3g}".replace("-", "−")
-    return first

@@ -111,11 +111,18 @@ def _half_opening(faces: Faces, axis: int) -> float:
     return math.inf if faces.pattern is None else faces.pattern.size[axis] / 2
 
 
-def draw_element(pen: Pen, element: Element) -> None:
-    """Draw an element in its place."""
+def draw_element(pen: Pen, element: Element, beam: float = 0.0) -> None:
+    """Draw an element in its place.
+
+    Args:
+        pen: where and how large.
+        element: what to draw.
+        beam: half the height of the rays that are drawn through it, metres: a thick element whose rims are not
+            known is drawn as high.
+    """
     planes = crossings(element)
     if len(planes) > 1 or element.length > 0:
-        _draw_block(pen, element, planes)
+        _draw_block(pen, element, planes, beam)
     elif isinstance(element, Lens):
         _draw_lens(pen, element)
     elif isinstance(element, Prism):
@@ -153,12 +160,12 @@ def _draw_prism(pen: Pen, prism: Prism) -> None:
     )
 
 
-def _draw_block(pen: Pen, element: Element, planes: list[Crossing]) -> None:
+def _draw_block(pen: Pen, element: Element, planes: list[Crossing], beam: float) -> None:
     """A thick element: glass from end to end, its rims and stop, and principal planes where there are any."""
     centre = element.decentre[pen.axis]
     half = half_size(element, pen.axis)
     bounded = math.isfinite(half)
-    half = min(1.08 * half, 1.02 * pen.half)
+    half = min(1.08 * max(half, beam), 1.02 * pen.half)
     start, end = element.z, element.z + element.length
     if element.length == 0:
         start, end = start - pen.thick / 2, end + pen.thick / 2
@@ -172,7 +179,9 @@ def _draw_block(pen: Pen, element: Element, planes: list[Crossing]) -> None:
         left, right = sorted(pen.axes.get_xlim())
         if not left < z / mm < right:
             continue
-        pen.line([z, z], [centre - half, centre + half], color=style.GLASS_EDGE, linewidth=1, dashes=(5, 3), zorder=1.5)
+        pen.line(
+            [z, z], [centre - half, centre + half], color=style.GLASS_EDGE, linewidth=1, dashes=(5, 3), zorder=1.5
+        )
         pen.axes.annotate(
             name,
             (z / mm, (centre - half if pen.axis == 0 else centre + half) / mm),
@@ -180,7 +189,8 @@ def _draw_block(pen: Pen, element: Element, planes: list[Crossing]) -> None:
             textcoords="offset points",
             ha="left" if side > 0 else "right",
             va="bottom",
-            fontsize=style.SMALL,
+            fontsize=style.TEXT,
+            bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
             color=style.GLASS_EDGE,
         )
 
@@ -212,7 +222,13 @@ def _draw_by_faces(pen: Pen, element: Element, faces: Faces) -> None:
     if not (bends or scatters):
         _draw_mask(pen, element, faces.pattern)
     elif not _all_clear(pen, element, faces):
-        _draw_mask(pen, element, faces.pattern, scale=_magnification(pen, element, faces), over_glass=True)
+        _draw_mask(
+            pen,
+            element,
+            faces.pattern,
+            scale=magnification(element, faces, pen.axis, pen.low, pen.high),
+            over_glass=True,
+        )
     if math.isfinite(half):
         _draw_stop(pen, element.z, element.decentre[pen.axis], half)
 
@@ -232,15 +248,26 @@ def _along(axis: int, places: Array) -> tuple[Array, Array]:
 def _all_clear(pen: Pen, element: Element, faces: Faces) -> bool:
     assert faces.pattern is not None
     low, high = _range(pen, element, _half_opening(faces, pen.axis))
-    places = np.linspace(low, high, 2 * POINTS + 1)[1:-1] / _magnification(pen, element, faces)
+    places = np.linspace(low, high, 2 * POINTS + 1)[1:-1] / magnification(
+        element, faces, pen.axis, pen.low, pen.high
+    )
     return bool((faces.pattern(*_along(pen.axis, places)) == 1).all())
 
 
-def _magnification(pen: Pen, element: Element, faces: Faces) -> int:
-    """By how much the cells of an array are drawn larger, so that they can be told apart."""
+def magnification(element: Element, faces: Faces, axis: int, bottom: float, top: float) -> int:
+    """By how much the cells of an array are drawn larger, so that they can be told apart; 1 of what has no cells.
+
+    Args:
+        element: the array.
+        faces: of it.
+        axis: 0 draws x upwards, 1 draws y.
+        bottom: of the drawing, metres.
+        top: of the drawing, metres.
+    """
     if not isinstance(faces.bending, CellDeflection):
         return 1
-    low, high = _range(pen, element, _half_opening(faces, pen.axis))
+    half, centre = _half_opening(faces, axis), element.decentre[axis]
+    low, high = max(-half, bottom - centre), min(half, top - centre)
     cells = (high - low) / faces.bending.lattice.pitch
     return 1 if cells <= MOST_CELLS else math.ceil(cells / CELLS_INSTEAD)
 
@@ -252,7 +279,9 @@ def _draw_glass(pen: Pen, element: Element, faces: Faces) -> None:
     if high <= low:
         return
     if isinstance(faces.bending, CellDeflection):
-        height, depth = _cell_profile(faces.bending, pen.axis, low, high, _magnification(pen, element, faces))
+        height, depth = _cell_profile(
+            faces.bending, pen.axis, low, high, magnification(element, faces, pen.axis, pen.low, pen.high)
+        )
     else:
         height = np.linspace(low, high, POINTS)
         depth = _profile(faces, pen.axis, height)
@@ -268,21 +297,21 @@ def _draw_glass(pen: Pen, element: Element, faces: Faces) -> None:
 
 def _profile(faces: Faces, axis: int, places: Array) -> Array:
     """The optical path along the drawn line, from 0 on, metres: the integral of the slopes that rays gain."""
-    x, y = _along(axis, places)
+    # In the middles between places: at a place two facets may meet.
+    x, y = _along(axis, (places[1:] + places[:-1]) / 2)
     if faces.affine is not None:
         slopes = faces.affine(np.stack([x, y, 0 * x, 0 * x], axis=-1))[:, 2 + axis]
     else:
         assert faces.bending is not None
         slopes = np.asarray(faces.bending(x, y)[axis])
-    steps = np.diff(places) * (slopes[1:] + slopes[:-1]) / 2
-    path = np.concatenate([[0.0], np.cumsum(steps)])
+    path = np.concatenate([[0.0], np.cumsum(np.diff(places) * slopes)])
     path -= path.min()
     # What rounding leaves of a plane is no shape.
     return path if path.max() > 1e-12 * max(1e-3, float(np.ptp(places))) else np.zeros_like(path)
 
 
 def _cell_profile(cells: CellDeflection, axis: int, low: float, high: float, scale: int) -> tuple[Array, Array]:
-    """Heights, and the glass of each cell there above its thinnest place, metres; cells ``scale`` times as large."""
+    """Heights, and each cell's glass there above its thinnest place, metres; cells ``scale`` times as large."""
     lattice = cells.lattice
     count = (high - low) / (lattice.pitch * scale)
     places = np.linspace(low, high, int(min(max(24 * count, POINTS), 4000)))
@@ -303,7 +332,7 @@ def _draw_frosted(pen: Pen, element: Element, scatter: Scatter, half: float) -> 
     low, high = _range(pen, element, half)
     if high <= low:
         return
-    teeth = max(int(90 * (high - low) / (2 * pen.half)), 6)
+    teeth = max(int(60 * (high - low) / (2 * pen.half)), 6)
     height = np.linspace(low, high, 2 * teeth + 1)
     spread = spread_along(scatter, pen.axis, *_along(pen.axis, height))
     strength = spread / spread.max() if spread.max() > 0 else 0 * spread
@@ -412,7 +441,7 @@ def draw_sensor(pen: Pen, sensor: Sensor, most_pixels: int = 0) -> None:
 # --- words ---
 
 
-def label(element: Element, pen: Pen) -> str:
+def label_of(element: Element, pen: Pen) -> str:
     """What stands above an element: its kind and name, and what matters most of it."""
     first = f"{element.kind} {element.name}".strip()
     for kind, words in _WORDS.items():
@@ -421,7 +450,7 @@ def label(element: Element, pen: Pen) -> str:
     return first
 
 
-def length(value: float) -> str:
+def length_in_words(value: float) -> str:
     """A length on a drawing, to 4 digits."""
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
@@ -433,7 +462,7 @@ def _number(value: float) -> str:
 
 
 def _lens_words(lens: Any, pen: Pen) -> list[str]:
-    return [f"f = {length(lens.focal_length)}"]
+    return [f"f = {length_in_words(lens.focal_length)}"]
 
 
 def _prism_words(prism: Any, pen: Pen) -> list[str]:
@@ -449,14 +478,14 @@ def _array_words(array: Any, pen: Pen) -> list[str]:
     faces = array.faces()
     half = _half_opening(faces, pen.axis)
     pitch = array.pitch if pen.axis == 0 else array.lattice.row_height
-    count = f"{round(2 * half / pitch)} × " if math.isfinite(half) else "pitch "
-    focal = array.focal_lengths if isinstance(array, LensArray) else (array.focal_length,)
-    focal = ["∞" if math.isinf(one) else length(one) for one in focal if one is not None]
-    scale = _magnification(pen, array, faces)
+    count = f"{round(2 * half / pitch)} cells of " if math.isfinite(half) else "pitch "
+    given = array.focal_lengths if isinstance(array, LensArray) else (array.focal_length,)
+    focal = [length_in_words(one) for one in given if one is not None]
+    scale = magnification(array, faces, pen.axis, pen.low, pen.high)
     return [
-        count + length(pitch),
+        count + length_in_words(pitch),
         f"f = {', '.join(focal)}" if focal and focal != ["∞"] else "",
-        f"(drawn {scale}× as large)" if scale > 1 else "",
+        f"drawn {scale}× as large" if scale > 1 else "",
     ]
 
 
@@ -471,7 +500,7 @@ def _scatter_words(diffuser: Any, pen: Pen) -> list[str]:
     faces = diffuser.faces()
     low, high = _range(pen, diffuser, _half_opening(faces, pen.axis))
     spread = spread_along(faces.spread, pen.axis, *_along(pen.axis, np.linspace(low, high, POINTS)))
-    least, most = _number(float(spread.min())), _number(float(spread.max()))
+    least, most = (f"{value:.2g}" for value in (float(spread.min()), float(spread.max())))
     return [f"σ = {least}" if least == most else f"σ = {least} to {most}"]
 
 
@@ -480,7 +509,7 @@ def _system_words(system: Any, pen: Pen) -> list[str]:
         focal_length = system.focal_length
     except InputError:  # without an axis of symmetry it has none
         return [""]
-    words = "afocal" if math.isinf(focal_length) else f"f = {length(focal_length)}"
+    words = "afocal" if math.isinf(focal_length) else f"f = {length_in_words(focal_length)}"
     if system.stop_diameter is None or math.isinf(focal_length):
         return [words]
     return [f"{words}, f/{_number(system.f_number)}"]

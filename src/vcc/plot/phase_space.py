@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vcc.camera import Camera
 from vcc.errors import InputError
 from vcc.light_field import LightField
+from vcc.optics import Faces
 from vcc.plot import style
 from vcc.sampled import to_numpy
 from vcc.units import mm
@@ -100,8 +101,16 @@ def plot_phase_space_stages(
         The figure; ``.savefig(path)`` writes it to a file.
 
     Raises:
-        InputError: what `plot_phase_space` refuses.
+        InputError: what `plot_phase_space` refuses; an element that bends rays otherwise than a lens or a prism
+            does (behind it no frame holds the cells).
     """
+    for element in camera.elements:
+        if any(isinstance(part, Faces) and part.bending is not None for part in element.parts()):
+            raise InputError(
+                f"{element.label} bends rays otherwise than a lens or a prism: behind it cells of phase space are "
+                "no longer parallelograms of one frame, and they are what this figure draws. Draw the rays "
+                "(camera.plot), or a camera of the elements before it"
+            )
     piece = _slice(light_field, row, pixel_row, across)  # first: what follows works on few samples
     stages = [("entrance, z = 0 mm", piece)]
     for z, title in _planes(camera):
@@ -184,7 +193,8 @@ def _planes(camera: Camera) -> list[tuple[float, str]]:
     behind: dict[float, str] = {}
     for element in camera.elements:
         name = f"{element.kind} {element.name}".strip()
-        behind[element.z] = f"{behind[element.z]} and {name}" if element.z in behind else name
+        z = element.z + element.length
+        behind[z] = f"{behind[z]} and {name}" if z in behind else name
     planes = [(z, f"behind {names}, z = {z / mm:g} mm") for z, names in behind.items()]
     if camera.sensor.z in behind:
         return planes

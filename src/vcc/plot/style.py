@@ -28,7 +28,7 @@ def frost_tones() -> Any:
 
 
 def black_tones() -> Any:
-    """A colour map from opaque black (0) to nothing at all (1), for what stops light in front of something else."""
+    """A colour map from opaque black (0) to nothing at all (1), for what stops light on something else."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("black", [(0.1, 0.1, 0.1, 1.0), (0.1, 0.1, 0.1, 0.0)])

@@ -31,8 +31,7 @@ class Paths:
 
     Args:
         z: of each plane, metres: (planes,). The last one is the sensor's.
-        positions: (x, y) of each ray at each plane, metres: (rays, planes, 2). At a plane inside a thick element
-            they lie on the straight line from where the ray enters it to where it leaves it.
+        positions: (x, y) of each ray at each plane, metres: (rays, planes, 2).
         shares: what is left of each ray on arrival at each plane, 0 to 1: (rays, planes).
         starts: the plane from which on each ray is one of its own, (rays,): 0, or that of the diffuser at which
             it branched off. Before, it is the ray that it branched off from.
@@ -63,7 +62,7 @@ class Crossing:
 
 
 def crossings(element: Element) -> list[Crossing]:
-    """The planes of an element in order: one of a thin element; of a thick one its entrance, all faces, its exit."""
+    """The planes of an element in order: one of a thin one; of a thick one its entrance, all faces, its exit."""
     parts = element.parts()
     steps_ahead = sum(isinstance(part, Affine) for part in parts)
     end = element.z + element.length
@@ -105,12 +104,10 @@ def trace(camera: Camera, rays: ArrayLike, start: float = 0.0, split_along: int 
     for element in camera.elements:
         bundle.rays = Affine.propagation(element.z - here)(bundle.rays)
         here = element.z + element.length
-        first = len(bundle.z)
         for crossing in crossings(element):
             bundle.rays = about(element.decentre, crossing.step)(bundle.rays)
             bundle.cross(crossing.z, bundle.rays[:, :2])
             bundle.meet(Stage(element, crossing.z, Affine.identity(), crossing.faces), split_along)
-        bundle.straighten(first)
     bundle.rays = Affine.propagation(camera.sensor.z - here)(bundle.rays)
     bundle.cross(camera.sensor.z, bundle.rays[:, :2])
     return Paths(
@@ -147,8 +144,8 @@ class _Bundle:
             self.rays = self.rays + np.column_stack([np.zeros((len(self.rays), 2)), *slopes])
         if stage.faces.spread is not None and split_along is not None:
             with stage.named():
-                slopes = branches(stage.faces.spread, split_along, x, y)
-            self.split(slopes, split_along)
+                scattered = branches(stage.faces.spread, split_along, x, y)
+            self.split(scattered, split_along)
 
     def split(self, slopes: Array, axis: int) -> None:
         """Let each ray go on as several, of these changes of slope, (rays, branches)."""
@@ -166,14 +163,6 @@ class _Bundle:
         # The middle one is drawn as the ray that was there before.
         own = np.arange(count * branch) % branch == middle
         self.starts = np.where(own, self.starts[parent], len(self.z) - 1)
-
-    def straighten(self, first: int) -> None:
-        """Put the places between the first and the last plane of a thick element on the line between them."""
-        length = self.z[-1] - self.z[first]
-        for plane in range(first + 1, len(self.z) - 1):
-            if length > 0:
-                way = (self.z[plane] - self.z[first]) / length
-                self.positions[plane] = (1 - way) * self.positions[first] + way * self.positions[-1]
 
 
 def branches(scatter: Scatter, axis: int, x: Array, y: Array) -> Array:
@@ -205,9 +194,9 @@ def _marginal(kernel: Kernel, axis: int) -> tuple[Array, Array]:
     """A kernel's distribution along one axis: changes of slope, and the share of light at each."""
     slopes, shares = kernel.quadrature()
     slopes, reach = slopes[:, axis], kernel.reach[axis]
-    bins = np.clip(((slopes / reach + 1) / 2 * BINS).astype(np.int64), 0, BINS - 1) if reach > 0 else 0 * shares
-    bins = bins.astype(np.int64)
-    total = np.bincount(bins, shares)
+    places = (slopes / reach + 1) / 2 * BINS if reach > 0 else 0 * slopes
+    bins = np.clip(places, 0, BINS - 1).astype(np.int64)
+    total = np.asarray(np.bincount(bins, shares), dtype=np.float64)
     lit = total > 0
     return np.bincount(bins, shares * slopes)[lit] / total[lit], total[lit]
 
