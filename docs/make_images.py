@@ -1,16 +1,29 @@
-"""Make the pictures that README and docs show, from the demo's own output: python docs/make_images.py."""
+"""Make the pictures that README and docs show, the demo's own and those of the elements.
+
+python docs/make_images.py
+"""
 
 from __future__ import annotations
 
 import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
+import element_images
 import matplotlib.image
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+import vcc
 from vcc.demo import run_demo
+from vcc.demo.scene import demo_scene
+from vcc.formats.pictures import auto_exposure
+from vcc.formats.transfer import encode
+from vcc.plot import style
+from vcc.units import mm
 
 HERE = Path(__file__).parent / "images"
 PICTURES = [
@@ -38,6 +51,68 @@ def main() -> None:
         figure.savefig(HERE / "demo.png")
         for name in ("example-1-phase-space-points", "example-2-coded-camera", "check-close-ups"):
             shutil.copyfile(demo / f"{name}.png", HERE / f"{name}.png")
+    draw_sensor(HERE / "sensor.png")
+    element_images.main(HERE / "elements")
+
+
+def draw_sensor(path: Path) -> None:
+    """docs/sensor.md: a photon transfer curve, and the demo's scene through a colour filter, well and ill lit."""
+    electronics = vcc.Electronics(color_filter="RGGB")
+    figure = Figure(figsize=(13, 4.1), dpi=100, layout="constrained")
+    FigureCanvasAgg(figure)
+    curve, raw, bright, dark = figure.subplots(1, 4, width_ratios=(1.45, 1, 1, 1))
+    _draw_photon_transfer(curve, electronics)
+
+    light_field = demo_scene().light_field(
+        (7, 7), (500, 500), spacing=1 * mm, slope_per_pixel=0.0008, focus_distance=1.3
+    )
+    z = 1 / (1 / 0.050 - 1 / 1.3)
+    sensor = vcc.Sensor(z=z, shape=(500, 500), pitch=0.0008 * z, electronics=electronics)
+    image = vcc.Camera([vcc.Lens(focal_length=50 * mm, diameter=6 * mm)], sensor).capture(light_field)
+    well = vcc.expose_image(image, sensor, "auto", seed=1)
+    ill = vcc.expose_image(image, sensor, well.exposure / 60, seed=2)
+    place = (slice(252, 316), slice(256, 320))  # the chart's star, and beside it its colours
+    mosaic = np.zeros((500, 500, 3), np.float32)
+    numbers = well.image().values
+    for row, column in np.ndindex(2, 2):
+        here = (slice(row, None, 2), slice(column, None, 2))
+        mosaic[(*here, electronics.tile[row][column])] = numbers[here]
+    white = auto_exposure(well.demosaiced().values)
+    pictures = [
+        (raw, "what each pixel recorded", mosaic),
+        (bright, "demosaiced", well.demosaiced().values),
+        (dark, "a sixtieth of the light", ill.demosaiced().values),
+    ]
+    for axes, title, values in pictures:
+        axes.imshow(encode(values[::-1, ::-1][place] * white, 8), interpolation="nearest")
+        axes.set_title(title, fontsize=style.TITLE, color=style.INK)
+        axes.set_axis_off()
+    figure.savefig(path)
+
+
+def _draw_photon_transfer(axes: Axes, electronics: vcc.Electronics) -> None:
+    """Noise against signal, both without their dark part but for the read noise, on logarithmic axes."""
+    charges = np.geomspace(1, 1.3 * electronics.saturation, 40)
+    sensor = vcc.Sensor(z=0, shape=(256, 256), pitch=5e-6, electronics=replace(electronics, color_filter=None))
+    time = 1e-3
+    per_light = electronics.electrons_per_joule() * sensor.sensitive_area * time
+    signal, noise = [], []
+    for n, charge in enumerate(charges):
+        light = vcc.Image(np.full(sensor.shape, charge / per_light, np.float32), sensor.frame)
+        one, two = (vcc.expose_image(light, sensor, time, seed=2 * n + k).values.astype(float) for k in (0, 1))
+        signal.append((one.mean() + two.mean()) / 2 - electronics.black_level)
+        noise.append(((one - two).var() / 2) ** 0.5)
+    gain, read = electronics.gain, electronics.read_noise
+    axes.loglog(gain * charges, (gain**2 * charges) ** 0.5, color=style.BLUE, lw=1.2)
+    axes.axhline(((gain * read) ** 2 + 1 / 12) ** 0.5, color=style.GREEN, lw=1.2)
+    axes.loglog(signal, noise, "o", ms=4, color=style.INK)
+    axes.axvline(gain * electronics.full_well, color=style.ORANGE, lw=1.2)
+    axes.text(0.5, 7, "shot noise √(K · signal)", color=style.BLUE, fontsize=style.SMALL)
+    axes.text(25, 0.72, "read noise and rounding", color=style.GREEN, fontsize=style.SMALL)
+    axes.text(3300, 0.4, "full well", color=style.ORANGE, fontsize=style.SMALL, ha="right")
+    axes.set_ylim(0.3, 80)
+    axes.set_title("photon transfer curve", fontsize=style.TITLE, color=style.INK)
+    style.tidy(axes, "signal, numbers above black", "temporal noise, numbers rms")
 
 
 if __name__ == "__main__":

@@ -144,3 +144,29 @@ def test_faces_refuse_what_is_no_deflection_or_transmission():
         vcc.Faces(deflection=Affine.identity(2))
     with pytest.raises(vcc.InputError, match=r"a pattern is .*, not int"):
         vcc.Faces(transmission=3)
+
+
+@dataclass(frozen=True)
+class Wrong(vcc.Element):
+    """A user's element whose faces are not made rightly."""
+
+    given: dict[str, object] = field(default_factory=dict)
+
+    def faces(self) -> vcc.Faces:
+        """Whatever was given."""
+        return vcc.Faces(**self.given)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"deflection": 5}, 'wrong "mine": a deflection is an Affine, .*, not int'),
+        ({"transmission": 0.5}, 'wrong "mine": a pattern is .*, not float'),
+        ({"scatter": 3}, 'wrong "mine": scatter is a Kernel or a Scatter, not int'),
+        ({"deflection": Affine.propagation(1.0)}, 'wrong "mine": '),
+    ],
+)
+def test_faces_that_cannot_be_made_name_their_element(given, message):
+    camera = vcc.Camera([Wrong(given, name="mine")], SENSOR)
+    with pytest.raises(vcc.InputError, match=message):
+        camera.capture(light_field())

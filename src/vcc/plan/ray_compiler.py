@@ -516,8 +516,7 @@ def _steps(
         stage, faces, label = leg.stage, leg.stage.faces, leg.stage.element.label
         here: list[steps.Step] = []
         with stage.named():
-            # What is aimed at as a disc lets all rays pass that are aimed at it.
-            if faces.pattern is not None and not (isinstance(aim, Window) and aim.disc and aim.words == label):
+            if faces.pattern is not None and not _is_aimed_at(aim, leg):
                 here += _transmission(faces.pattern, stage, region, label, notes)
             if faces.bending is not None:
                 here.append(_deflection(stage, region, label, notes))
@@ -531,6 +530,23 @@ def _steps(
             pending = Affine.identity()
     index = path.light_field.frame.inverse() @ path.last @ pending
     return made, index, scatters
+
+
+def _is_aimed_at(aim: Aim, leg: _Leg) -> bool:
+    """Whether the leg's stop is the very disc aimed at, which lets all rays pass that are aimed at it.
+
+    Elements without names in one plane have one label, so that the disc itself counts too.
+    """
+    pattern, element = leg.stage.faces.pattern, leg.stage.element
+    if not (isinstance(aim, Window) and aim.disc and aim.words == element.label and isinstance(pattern, Circle)):
+        return False
+    middle, half = np.array(element.decentre), np.full(2, pattern.diameter / 2)
+    own = _window(leg.from_sensor, slice(0, 2), middle, half, True, element.label)
+    return (
+        own is not None
+        and np.allclose(own.slope_from_point, aim.slope_from_point, rtol=1e-9, atol=0)
+        and np.allclose(own.offset, aim.offset, rtol=1e-9, atol=1e-12)
+    )
 
 
 def _transmission(

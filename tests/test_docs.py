@@ -1,0 +1,163 @@
+"""What the pages show runs: their Python, their camera files, their links, and the example of an own element."""
+
+import re
+import runpy
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import imagecodecs
+import numpy as np
+import pytest
+
+import vcc
+from vcc.camera_file import ELEMENT_KINDS
+from vcc.sources import PlanesScene, TexturedPlane
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+LENS = """# a doublet with a stop: radius, thickness, index, diameter in mm
+40 6 1.5168 20
+-35 2 1.62 20
+-120 5 1 20
+0 10 1 12
+60 4 1.5168 16
+-90 40 1 16
+"""
+A_SENSOR = '[sensor]\nz = "150 mm"\nshape = [8, 8]\npitch = "1 mm"\n'
+
+
+def name_of(page):
+    return str(page.relative_to(ROOT))
+
+
+def blocks(page, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S)
+
+
+def pages_with(language):
+    return pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, language)], ids=name_of)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the files that the pages name."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_views").mkdir()
+    texture = np.random.default_rng(1).integers(40, 255, (24, 28, 3), np.uint8)
+    for row, column in np.ndindex(3, 3):
+        view = np.ascontiguousarray(texture[2 - row : 22 - row, 2 - column : 26 - column])
+        (tmp_path / "my_views" / f"view_{row}_{column}.png").write_bytes(imagecodecs.png_encode(view))
+    (tmp_path / "dgauss.50mm.dat").write_text(LENS)
+    places = np.linspace(-1, 1, 16) * 5e-3
+    np.save("cap.npy", -(places[:, None] ** 2 + places**2) / 0.1)
+    np.savetxt("wavefront.csv", 1e-6 * np.outer(places, places), delimiter=",")
+    np.save("slopes.npy", np.zeros((3, 3, 2)))
+    np.save("widths.npy", np.full((4, 4), 0.01))
+    np.save("code.npy", np.eye(4))
+    return tmp_path
+
+
+@pytest.fixture
+def names(folder):
+    """What the pages' Python takes for given."""
+    light_field = vcc.LightField.from_views(
+        np.random.default_rng(2).random((3, 3, 24, 28, 3), np.float32), spacing=2e-3, slope_per_pixel=0.01
+    )
+    counts = np.ones((3, 5))
+    kinds = dict(ELEMENT_KINDS)
+    yield {
+        "light_field": light_field,
+        "counts": counts,
+        "shares": counts / counts.sum(),
+        "sigma_map": np.full((4, 4), 0.01),
+    }
+    ELEMENT_KINDS.clear()  # a page may have added its own
+    ELEMENT_KINDS.update(kinds)
+
+
+@pages_with("python")
+def test_python_runs(page, names):
+    with warnings.catch_warnings():
+        # The light field is far smaller than those that the pages speak of.
+        warnings.simplefilter("ignore", vcc.ResultWarning)
+        for block in blocks(page, "python"):
+            exec(compile(block, name_of(page), "exec"), names)
+
+
+@pages_with("toml")
+def test_camera_files_load(page, folder):
+    shown = []
+    for block in blocks(page, "toml"):
+        if block.startswith("surface = "):  # a page may list lines of one element
+            shown += [f'[[elements]]\nkind = "phase_plate"\n{line}\n' for line in block.splitlines()]
+        elif block.startswith("kernel = "):
+            shown += [f'[[elements]]\nkind = "diffuser"\n{line}\n' for line in block.splitlines()]
+        elif block.startswith("pattern = "):
+            shown += [f'[[elements]]\nkind = "mask"\nwidth = "30 mm"\n{line}\n' for line in block.splitlines()]
+        else:
+            shown.append(block)
+    for text in shown:
+        if "[sensor]" not in text:
+            text = A_SENSOR + text if text.startswith("[sensor.") else text + A_SENSOR
+        Path("camera.toml").write_text(text, encoding="utf-8")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", vcc.ResultWarning)
+            camera = vcc.load_camera("camera.toml")
+        camera.save("again.toml")
+        assert vcc.load_camera("again.toml") == camera
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        if "://" in target:
+            continue
+        file, _, heading = target.partition("#")
+        there = page.parent / file if file else page
+        assert there.exists(), f"{name_of(page)} links to {target}"
+        if heading:
+            titles = re.findall(r"^#+ (.*)$", there.read_text(encoding="utf-8"), re.M)
+            slugs = [re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles]
+            assert heading in slugs, f"{name_of(page)} links to {target}"
+
+
+def test_every_element_has_a_page_with_a_picture():
+    index = (ROOT / "docs" / "elements.md").read_text(encoding="utf-8")
+    for page in (ROOT / "docs" / "elements").glob("*.md"):
+        assert f"elements/{page.name}" in index
+        text = page.read_text(encoding="utf-8")
+        assert "](../images/elements/" in text
+        assert "\n## Limits\n" in text
+    pages = " ".join(p.read_text(encoding="utf-8") for p in (ROOT / "docs" / "elements").glob("*.md"))
+    for kind, element in ELEMENT_KINDS.items():
+        assert f'kind = "{kind}"' in pages
+        assert re.search(rf"vcc\.{element.__name__}\b", pages)
+
+
+def test_own_element_makes_rings_of_its_closed_form():
+    """Slopes a/r, so that light of a point lands at radii ρ = a·z/r, r between the plate's two radii."""
+    example = runpy.run_path(str(ROOT / "examples" / "own_element.py"))
+    plate = example["SpiralPlate"](
+        charge=20, wavelength=550e-9, inner_diameter=4e-3, outer_diameter=10e-3, name="spiral"
+    )
+    camera = example["camera_with"](plate)
+    # The example's scene, but no more of it than its middle point needs.
+    scene = PlanesScene([TexturedPlane(example["points_of_light"], 10.0)]).light_field(
+        (13, 13), (200, 200), spacing=1e-3, slope_per_pixel=20e-6, focus_distance=10.0
+    )
+    camera = vcc.Camera(camera.elements, replace(camera.sensor, shape=(100, 100)))
+    image = camera.capture(scene, samples=256).to_numpy()[..., 1]
+    pitch = camera.sensor.pitches[0]
+    rows, columns = image.shape
+    y, x = np.mgrid[:rows, :columns]
+    radius = np.hypot(x - (columns - 1) / 2, y - (rows - 1) / 2) * pitch
+    a = 20 * 550e-9 / (2 * np.pi) * camera.sensor.z
+    inner, outer = a / 5e-3, a / 2e-3
+    # The point itself is a Gaussian of σ = 0.25 mm at 10 m, 2.5 µm on the sensor, and the views are cells of
+    # 1 mm in the plate's plane: 4 σ and two pixels on either side hold all of a ring.
+    margin = 4 * 2.5e-6 + 2 * pitch
+    near = radius < 95e-6  # where other rings hardly reach
+    ring = (radius > inner - margin) & (radius < outer + margin)
+    assert image[near & ring].sum() > 0.999 * image[near].sum()
+    assert image[radius < inner - margin].max() == 0
