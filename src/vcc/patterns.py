@@ -407,8 +407,7 @@ class FunctionPattern(Pattern):
             raise InputError(f"{name} returned numbers that are not finite")
         if values.min() < 0 or values.max() > 1:
             raise InputError(
-                f"{name} returned transmission from {values.min():g} to {values.max():g}; "
-                "it lies between 0 and 1"
+                f"{name} returned transmission from {values.min():g} to {values.max():g}; it lies between 0 and 1"
             )
         return np.broadcast_to(values, shape)
 
