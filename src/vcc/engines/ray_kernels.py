@@ -12,11 +12,12 @@ import math
 import numpy as np
 from numba import njit
 
-from vcc.engines.vector_gather import LANES, add_rows_of_1, add_rows_of_3, add_rows_of_4
+from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add_views_of_4
 
 PACKET = 256
 """Rays at a time: six numbers each, which stay in the first-level cache."""
 
+INLINED = {"nogil": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy", "inline": "always"}
 OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy"}
 
 
@@ -80,7 +81,7 @@ def mixed(table, start, width, number, columns, at):  # type: ignore[no-untyped-
     return above * (1 - fr) + below * fr
 
 
-@njit(**OPTIONS)
+@njit(**INLINED)
 def take_steps(codes, whole, real, shares, slopes, points, first, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
     """Take a packet of n rays, whose points of the table begin at ``first``, through all steps.
 
@@ -234,16 +235,14 @@ def add_view(values, base, k, l, rows, columns, channels, weight, found):  # typ
                     found[channel] += w * values[base + ((r + dr) * columns + c + dc) * channels + channel]
 
 
-@njit(**OPTIONS)
+@njit(**INLINED)
 def add_rays(  # type: ignore[no-untyped-def]
-    values, views, channels, index, motion, between, ends, n, second, x, y, s, t, share, sums, offsets, weights,
-    tally,
+    values, views, channels, index, motion, between, ends, n, second, x, y, s, t, share, sums, tally,
 ):  # fmt: skip
     """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
 
     Rays from ``second`` on belong to the second half. ``tally`` collects the weights of all rays and of those that
-    the light field does not hold; ``offsets`` and ``weights`` are room for the rows of one ray. Places are
-    replaced by indices.
+    the light field does not hold. Places are replaced by indices.
     """
     nv, nu, nt, ns = views[0], views[1], views[2], views[3]
     to_indices(index, n, x, y, s, t)
@@ -253,9 +252,11 @@ def add_rays(  # type: ignore[no-untyped-def]
     vectors = parted and (channels == 1 or channels == 3 or channels == 4)
     line, picture, row_of_views = ns * channels, nt * ns * channels, nu * nt * ns * channels
     last = len(values) - LANES
+    one = np.float32(1)
     # So far outside the pictures all views that a ray is between are dark.
     dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
     dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
+    asked = missing = 0.0
     for p in range(n):
         weight = share[p]
         if weight == 0.0:
@@ -264,12 +265,12 @@ def add_rays(  # type: ignore[no-untyped-def]
         i, j, k, l = x[p], y[p], s[p], t[p]
         if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
             if ends:
-                tally[0] += weight
-                tally[1] += weight
+                asked += weight
+                missing += weight
             continue
-        tally[0] += weight
+        asked += weight
         if not (k >= -0.5 and k <= ns - 0.5 and l >= -0.5 and l <= nt - 0.5):
-            tally[1] += weight
+            missing += weight
             if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
                 continue
         ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
@@ -290,27 +291,36 @@ def add_rays(  # type: ignore[no-untyped-def]
             c0, c1, r0, r1 = int(kf0) * channels, int(kf1) * channels, int(lf0) * line, int(lf1) * line
             base = j0 * row_of_views + i0 * picture
             if inside and base + row_of_views + picture + max(r0, r1) + line + max(c0, c1) <= last:
-                fk0, fk1, fl0, fl1 = k0 - kf0, k1 - kf1, l0 - lf0, l1 - lf1
-                w0, w1 = weight * (1 - fj), weight * fj
-                w00, w01, w10, w11 = w0 * (1 - fi), w0 * fi, w1 * (1 - fi), w1 * fi
-                put_row(offsets, weights, 0, base + r0 + c0, w00 * (1 - fl0), fk0)
-                put_row(offsets, weights, 1, base + r0 + line + c0, w00 * fl0, fk0)
-                base += picture
-                put_row(offsets, weights, 2, base + r0 + c1, w01 * (1 - fl0), fk1)
-                put_row(offsets, weights, 3, base + r0 + line + c1, w01 * fl0, fk1)
-                base += row_of_views - picture
-                put_row(offsets, weights, 4, base + r1 + c0, w10 * (1 - fl1), fk0)
-                put_row(offsets, weights, 5, base + r1 + line + c0, w10 * fl1, fk0)
-                base += picture
-                put_row(offsets, weights, 6, base + r1 + c1, w11 * (1 - fl1), fk1)
-                put_row(offsets, weights, 7, base + r1 + line + c1, w11 * fl1, fk1)
+                fi, fj = np.float32(fi), np.float32(fj)
+                fk0, fk1 = np.float32(k0 - kf0), np.float32(k1 - kf1)
+                fl0, fl1 = np.float32(l0 - lf0), np.float32(l1 - lf1)
+                lower = np.float32(weight) * fj
+                upper = np.float32(weight) - lower
+                above_1, below_1 = upper * fl0, lower * fl1
+                left_1, right_1 = (one - fi) * fk0, fi * fk1
+                upper_left = base + r0 + c0
+                upper_right = base + picture + r0 + c1
+                lower_left = base + row_of_views + r1 + c0
+                lower_right = base + row_of_views + picture + r1 + c1
                 at = half * sums.shape[1]
                 if channels == 3:
-                    add_rows_of_3(values, offsets, weights, flat, at)
+                    add_views_of_3(
+                        values, upper_left, upper_right, lower_left, lower_right, line,
+                        upper - above_1, above_1, lower - below_1, below_1,
+                        one - fi - left_1, left_1, fi - right_1, right_1, flat, at,
+                    )  # fmt: skip
                 elif channels == 1:
-                    add_rows_of_1(values, offsets, weights, flat, at)
+                    add_views_of_1(
+                        values, upper_left, upper_right, lower_left, lower_right, line,
+                        upper - above_1, above_1, lower - below_1, below_1,
+                        one - fi - left_1, left_1, fi - right_1, right_1, flat, at,
+                    )  # fmt: skip
                 else:
-                    add_rows_of_4(values, offsets, weights, flat, at)
+                    add_views_of_4(
+                        values, upper_left, upper_right, lower_left, lower_right, line,
+                        upper - above_1, above_1, lower - below_1, below_1,
+                        one - fi - left_1, left_1, fi - right_1, right_1, flat, at,
+                    )  # fmt: skip
                 continue
         for dj in range(2):
             wj = weight * (fj if dj else 1.0 - fj)
@@ -325,6 +335,8 @@ def add_rays(  # type: ignore[no-untyped-def]
                 view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
                 base = (j0 + dj) * row_of_views + (i0 + di) * picture
                 add_view(values, base, view_k, view_l, nt, ns, channels, np.float32(w), sums[half])
+    tally[0] += asked
+    tally[1] += missing
 
 
 @njit(**OPTIONS)
@@ -336,7 +348,7 @@ def fold_lanes(sums, channels):  # type: ignore[no-untyped-def]
                 sums[half, channel] += sums[half, channels + channel]
 
 
-@njit(**OPTIONS)
+@njit(**INLINED)
 def to_indices(index, n, x, y, s, t):  # type: ignore[no-untyped-def]
     """Replace the places and slopes of n rays by their indices (i, j, k, l)."""
     m = index
@@ -361,14 +373,6 @@ def to_indices(index, n, x, y, s, t):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def put_row(offsets, weights, row, offset, weight, right):  # type: ignore[no-untyped-def]
-    """One row of two pixels: where it begins, and the weights of the left and the right one."""
-    offsets[row] = offset
-    weights[2 * row] = np.float32(weight * (1 - right))
-    weights[2 * row + 1] = np.float32(weight * right)
-
-
-@njit(**OPTIONS)
 def hashed(number, seed):  # type: ignore[no-untyped-def]
     """See `vcc.plan.rays.hashed`."""
     h = np.uint32(number & 0xFFFFFFFF) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
@@ -377,7 +381,7 @@ def hashed(number, seed):  # type: ignore[no-untyped-def]
     return np.uint32(h ^ (h >> np.uint32(16)))
 
 
-@njit(**OPTIONS)
+@njit(**INLINED)
 def set_box(boxes, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
     """Numbers by which `through_cell` finds the places in a cell that light comes through, along one axis."""
     gain = cells[6, axis] + power * cells[8, axis]
@@ -399,7 +403,7 @@ def kind_of(cell_whole, row, column):  # type: ignore[no-untyped-def]
     return (row % cell_whole[1]) * cell_whole[2] + column % cell_whole[2]
 
 
-@njit(**OPTIONS)
+@njit(**INLINED)
 def cells_seen(cells, cell_kinds, cell_whole, x, y, pixels, near):  # type: ignore[no-untyped-def]
     """Fill ``near`` with the (row, column) of the cells through which a pixel sees the stop; returns how many."""
     turn = cells[0:3].ravel()
@@ -428,22 +432,34 @@ def cells_seen(cells, cell_kinds, cell_whole, x, y, pixels, near):  # type: igno
     return found
 
 
-@njit(**OPTIONS)
-def at_pixel(points, start, n, middle_x, middle_y, wide, high, x, y):  # type: ignore[no-untyped-def]
+@njit(**INLINED)
+def at_pixel(points, start, n, moved, middle_x, middle_y, wide, high, x, y):  # type: ignore[no-untyped-def]
     """Places of n rays over the sensitive area of a pixel."""
+    right, down = moved[0], moved[1]
     for p in range(n):
-        x[p] = middle_x + points[0, start + p] * wide
-        y[p] = middle_y + points[1, start + p] * high
+        a = points[0, start + p] + right
+        x[p] = middle_x + (a - math.floor(a + 0.5)) * wide
+        b = points[1, start + p] + down
+        y[p] = middle_y + (b - math.floor(b + 0.5)) * high
 
 
-@njit(**OPTIONS)
-def through_window(points, start, n, window, scatter, x, y, s, t, share):  # type: ignore[no-untyped-def]
+@njit(**INLINED)
+def through_window(  # type: ignore[no-untyped-def]
+    points, start, n, moved, window, scatter, x, y, s, t, share
+):  # fmt: skip
     """Slopes and weights of n rays towards a window, making up for diffusers; see `vcc.plan.rays.Window`."""
     f0, f1, f2, f3, f4 = window[0, 0], window[0, 1], window[0, 2], window[0, 3], window[0, 4]
     g0, g1, g2, g3, g4 = window[1, 0], window[1, 1], window[1, 2], window[1, 3], window[1, 4]
-    solid_angle = window[2, 0]
+    solid_angle, right, down, side = window[2, 0], 2.0 * moved[2], 2.0 * moved[3], 2.0
+    if window[2, 1] == 1.0:  # a disc is turned, not shifted
+        turn = 2.0 * math.pi * moved[2]
+        cosine, sine = math.cos(turn), math.sin(turn)
+        f0, f1 = f0 * cosine + f1 * sine, f1 * cosine - f0 * sine
+        g0, g1 = g0 * cosine + g1 * sine, g1 * cosine - g0 * sine
+        right = down = side = 0.0
     for p in range(n):
-        a, b = points[2, start + p], points[3, start + p]
+        a, b = points[2, start + p] + right, points[3, start + p] + down
+        a, b = a - side * math.floor(0.5 * a + 0.5), b - side * math.floor(0.5 * b + 0.5)
         s[p] = f0 * a + f1 * b + f2 * x[p] + f3 * y[p] + f4
         t[p] = g0 * a + g1 * b + g2 * x[p] + g3 * y[p] + g4
         share[p] = solid_angle
@@ -456,20 +472,22 @@ def through_window(points, start, n, window, scatter, x, y, s, t, share):  # typ
             t[p] += g0 * a + g1 * b
 
 
-@njit(**OPTIONS)
-def through_cell(points, start, n, boxes, cells, x, y, s, t, share):  # type: ignore[no-untyped-def]
+@njit(**INLINED)
+def through_cell(points, start, n, moved, boxes, cells, x, y, s, t, share):  # type: ignore[no-untyped-def]
     """Slopes and weights of n rays through the part of a cell that the stop is seen through, along each axis."""
     for axis in range(2):
         place, slope = (x, s) if axis == 0 else (y, t)
         middle, along, half = boxes[axis, 0], boxes[axis, 1], boxes[axis, 2]
         left, right = boxes[axis, 3], boxes[axis, 4]
         from_sensor, offset, per_slope = cells[3, axis], cells[5, axis], 1 / cells[4, axis]
-        weight = abs(per_slope)
+        weight, shift = abs(per_slope), 2.0 * moved[2 + axis]
         for p in range(n):
+            point = points[2 + axis, start + p] + shift
+            point -= 2.0 * math.floor(0.5 * point + 0.5)
             centre = middle + along * place[p]
             low = max(centre - half, left)
             high = max(min(centre + half, right), low)
-            a = (low + high) / 2 + (high - low) / 2 * points[2 + axis, start + p]
+            a = (low + high) / 2 + (high - low) / 2 * point
             slope[p] = (a - from_sensor * place[p] - offset) * per_slope
             share[p] = weight * (high - low) * (share[p] if axis == 1 else 1.0)
 
@@ -504,7 +522,7 @@ def add_tile(  # type: ignore[no-untyped-def]
         block_shift: which block beside the hashed one is taken, see `vcc.engines.rays`.
         seed: of the hash.
         points: the table, (columns, points).
-        window: (2, 5): slopes from point, from sensor, and offset; and a third row with the solid angle.
+        window: (2, 5): slopes from point, from sensor, and offset; and a third row: solid angle, 1 for a disc.
         scatter: (diffusers, 5): column of the table and slopes from what the diffuser does, see `Window`.
         cells: rows of numbers by axis (x, y) where rays are aimed through cells, else empty.
         cell_kinds: (kinds, 3): power, δs, δt.
@@ -523,20 +541,22 @@ def add_tile(  # type: ignore[no-untyped-def]
     """
     x, y, s, t, share = np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET)
     sums = np.zeros((2, max(channels, LANES)), dtype=np.float32)
-    offsets, weights = np.empty(8, dtype=np.int64), np.empty(16, dtype=np.float32)
+    totals = np.zeros(sums.shape)
     rows_there, columns_there = picture.shape[0], picture.shape[1]
     by_cell = cells.shape[0] > 0
     blocks = points.shape[1] // samples
     near = np.empty((256, 2), dtype=np.int64)
     turn = cells[0:3].ravel()
-    boxes = np.empty((2, 5))
+    boxes, moved = np.empty((2, 5)), np.empty(4)
     for row in range(tile[0], min(tile[1], rows_there)):
         for column in range(tile[2], min(tile[3], columns_there)):
             middle_x = pixels[0, 0] + column * pixels[0, 1]
             middle_y = pixels[1, 0] + row * pixels[1, 1]
             block = (np.int64(hashed(row * columns_there + column, seed)) * blocks) >> 32
             first = (block ^ block_shift) * samples
-            sums[:] = 0
+            for n in range(4):
+                moved[n] = hashed(row * columns_there + column, seed + 1 + n) * 2.0**-32
+            totals[:] = 0
             cells_near = 1
             if by_cell:
                 cells_near = cells_seen(cells, cell_kinds, cell_whole, middle_x, middle_y, pixels, near)
@@ -549,13 +569,13 @@ def add_tile(  # type: ignore[no-untyped-def]
                 for done in range(0, samples, PACKET):
                     n = min(PACKET, samples - done)
                     start = first + done
-                    at_pixel(points, start, n, middle_x, middle_y, pixels[0, 2], pixels[1, 2], x, y)
+                    at_pixel(points, start, n, moved, middle_x, middle_y, pixels[0, 2], pixels[1, 2], x, y)
                     if by_cell:
-                        through_cell(points, start, n, boxes, cells, x, y, s, t, share)
+                        through_cell(points, start, n, moved, boxes, cells, x, y, s, t, share)
                         if cell_whole[0] == 1 or turn[1] != 0.0:  # a cell is not the rectangle around it
                             keep_own(cells, cell_whole, near[q, 0], near[q, 1], n, x, y, s, t, share)
                     else:
-                        through_window(points, start, n, window, scatter, x, y, s, t, share)
+                        through_window(points, start, n, moved, window, scatter, x, y, s, t, share)
                     traced = 0
                     for p in range(n):
                         traced += share[p] > 0.0
@@ -565,10 +585,14 @@ def add_tile(  # type: ignore[no-untyped-def]
                     take_steps(codes, whole, real, shares, slopes, points, start, n, x, y, s, t, share)
                     add_rays(
                         values, views, channels, index, motion, between, ends, n, samples // 2 - done,
-                        x, y, s, t, share, sums, offsets, weights, tally,
+                        x, y, s, t, share, sums, tally,
                     )  # fmt: skip
-            fold_lanes(sums, channels)
+                    for half in range(2):  # a packet in single precision, the packets in double
+                        for lane in range(sums.shape[1]):
+                            totals[half, lane] += sums[half, lane]
+                            sums[half, lane] = 0
+            fold_lanes(totals, channels)
             for channel in range(channels):
-                one, two = sums[0, channel] * scale / samples, sums[1, channel] * scale / samples
+                one, two = totals[0, channel] * scale / samples, totals[1, channel] * scale / samples
                 picture[row, column, channel] = one + two
                 tally[2] += (one - two) ** 2

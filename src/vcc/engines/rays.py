@@ -142,18 +142,18 @@ def _tile_adder(
     cells, kinds, whole = np.zeros((0, 2)), np.zeros((0, 3)), np.zeros(5, dtype=np.int64)
     if isinstance(plan.aim, Window):
         window[:2, :2], window[:2, 2:4] = plan.aim.slope_from_point, plan.aim.slope_from_sensor
-        window[:2, 4], window[2, 0] = plan.aim.offset, plan.aim.solid_angle
+        window[:2, 4], window[2, :2] = plan.aim.offset, (plan.aim.solid_angle, plan.aim.disc)
         terms = [[column, *matrix.reshape(-1)] for column, matrix in plan.aim.slope_from_scatter]
         scatter = np.array(terms).reshape(-1, 5)
     else:
         cells, kinds, whole = _cell_tables(plan.aim)
     steps = plan.packed().arrays()
-    points = np.ascontiguousarray(plan.points.T)
+    points, seed = np.ascontiguousarray(plan.points.T), plan.seed & 0xFFFFFFFF  # the hash takes no more of it
 
     def add(picture: NDArray[np.float32], tile: tuple[int, int, int, int]) -> Array:
         tally = np.zeros(4)
         kernels.add_tile(
-            flat, plan.views, channels, plan.scale, pixels, tile, plan.samples, beside, plan.seed, points,
+            flat, plan.views, channels, plan.scale, pixels, tile, plan.samples, beside, seed, points,
             window, scatter, cells, kinds, whole, *steps, plan.index_from_ray.matrix[:4].copy(), plan.motion,
             plan.between_views, plan.views_may_end, picture, tally,
         )  # fmt: skip

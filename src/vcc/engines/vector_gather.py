@@ -1,4 +1,4 @@
-"""Adding up what a ray finds, eight memory rows at a time, as vector instructions.
+"""Adding up what a ray finds in four views as vector instructions.
 
 A ray interpolates between two by two views, and in each between two by two pixels. In memory the two pixels of
 a row are neighbours, channels and all, so that one vector load brings both. Numba does not vectorise such short
@@ -14,71 +14,97 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-ROWS = 8
-"""Rows of two pixels that one ray reads: two in each of four views."""
 LANES = 8
 """Numbers that a sum holds; the channels of the left pixel come first, then those of the right."""
 
 
-def _add_rows(channels: int) -> Any:
-    """The intrinsic for a number of channels: sums[at : at + 8] += Σ over rows of weights × samples."""
+def _add_views(channels: int) -> Any:
+    """The intrinsic for a number of channels: sums[at : at + 8] += what four views hold, interpolated."""
     lanes = 2 if channels == 1 else LANES
 
     @intrinsic
-    def add_rows(typing_context, values, offsets, weights, sums, at):  # type: ignore[no-untyped-def]
-        """Sums of eight rows of two neighbouring pixels.
+    def add_views(  # type: ignore[no-untyped-def]
+        typing_context, values, upper_left, upper_right, lower_left, lower_right, line,
+        above_0, above_1, below_0, below_1, left_0, left_1, right_0, right_1, sums, at,
+    ):  # fmt: skip
+        """What a ray finds in two by two views, two by two pixels in each.
+
+        The views of one row are looked at in the same rows of pixels, those of one column in the same columns: so
+        a sample's weight is that of its row times that of its column.
 
         Args:
             typing_context: Numba's.
-            values: flat samples; ``LANES`` of them can be read from every offset.
-            offsets: (8,) int64, where each row's left pixel begins.
-            weights: (16,) float32, of the left and the right pixel of each row.
+            values: flat samples; ``LANES`` of them can be read from every place that is looked at.
+            upper_left: where the upper left pixel of the upper left view begins.
+            upper_right: of the upper right view.
+            lower_left: of the lower left view.
+            lower_right: of the lower right view.
+            line: samples in a row of pixels.
+            above_0: float32, weight of the upper row of pixels in the upper views.
+            above_1: of the lower row.
+            below_0: of the upper row of pixels in the lower views.
+            below_1: of the lower row.
+            left_0: of the left column of pixels in the left views.
+            left_1: of the right column.
+            right_0: of the left column of pixels in the right views.
+            right_1: of the right column.
             sums: flat float32.
             at: where in ``sums`` the eight numbers stand.
         """
-        signature = types.void(values, offsets, weights, sums, types.int64)
+        place, share = types.int64, types.float32
+        signature = types.void(values, *(place,) * 5, *(share,) * 8, sums, place)
 
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            data = [
-                context.make_array(kind)(context, builder, argument).data
-                for kind, argument in zip(signature.args[:4], arguments[:4], strict=True)
-            ]
+            data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+            kept = context.make_array(signature.args[14])(context, builder, arguments[14]).data
+            corners, line, rows, columns = arguments[1:5], arguments[5], arguments[6:10], arguments[10:14]
             number = ir.IntType(32)
             wide = ir.VectorType(ir.FloatType(), lanes)
             sample = context.get_value_type(values.dtype)
-            place = builder.gep(data[3], [arguments[4]])
-            place = builder.bitcast(place, wide.as_pointer())
-            total = builder.load(place, align=4)
-            left_right = ir.Constant(
-                ir.VectorType(number, lanes), [min(lane // channels, 1) for lane in range(lanes)]
-            )
-            pair = ir.VectorType(ir.FloatType(), 2)
-            for row in range(ROWS):
-                offset = builder.load(builder.gep(data[1], [ir.Constant(ir.IntType(64), row)]))
-                run = builder.bitcast(builder.gep(data[0], [offset]), ir.VectorType(sample, lanes).as_pointer())
+
+            def everywhere(scalar):  # type: ignore[no-untyped-def]
+                first = builder.insert_element(ir.Constant(wide, ir.Undefined), scalar, ir.Constant(number, 0))
+                return builder.shuffle_vector(
+                    first, ir.Constant(wide, ir.Undefined), ir.Constant(ir.VectorType(number, lanes), [0] * lanes)
+                )
+
+            def run_at(offset):  # type: ignore[no-untyped-def]
+                run = builder.bitcast(builder.gep(data, [offset]), ir.VectorType(sample, lanes).as_pointer())
                 run = builder.load(run, align=values.dtype.bitwidth // 8)
                 if isinstance(values.dtype, types.Integer):
                     if values.dtype.bitwidth < 32:
                         run = builder.zext(run, ir.VectorType(number, lanes))
-                        run = builder.sitofp(run, wide)  # 32 bits with the sign bit clear: the cheap conversion
-                    else:
-                        run = builder.uitofp(run, wide)
-                elif values.dtype.bitwidth == 64:
-                    run = builder.fptrunc(run, wide)
-                weight = builder.bitcast(
-                    builder.gep(data[2], [ir.Constant(ir.IntType(64), 2 * row)]), pair.as_pointer()
-                )
-                weight = builder.load(weight, align=4)
-                weight = builder.shuffle_vector(weight, ir.Constant(pair, ir.Undefined), left_right)
-                total = builder.fadd(total, builder.fmul(weight, run, flags=["contract"]), flags=["contract"])
+                        return builder.sitofp(run, wide)  # 32 bits with the sign bit clear: the cheap conversion
+                    return builder.uitofp(run, wide)
+                return builder.fptrunc(run, wide) if values.dtype.bitwidth == 64 else run
+
+            def plus(total, weight, run):  # type: ignore[no-untyped-def]
+                product = builder.fmul(weight, run, flags=["contract"])
+                return product if total is None else builder.fadd(total, product, flags=["contract"])
+
+            rows = [everywhere(weight) for weight in rows]
+            left_or_right = ir.Constant(
+                ir.VectorType(number, lanes),
+                [lane if lane < channels else lanes + lane for lane in range(lanes)],
+            )
+            place = builder.bitcast(builder.gep(kept, [arguments[15]]), wide.as_pointer())
+            total = builder.load(place, align=4)
+            for column in range(2):
+                found = None
+                for row in range(2):
+                    offset = corners[2 * row + column]
+                    found = plus(found, rows[2 * row], run_at(offset))
+                    found = plus(found, rows[2 * row + 1], run_at(builder.add(offset, line)))
+                first, second = (everywhere(weight) for weight in columns[2 * column : 2 * column + 2])
+                total = plus(total, builder.shuffle_vector(first, second, left_or_right), found)
             builder.store(total, place, align=4)
             return context.get_dummy_value()
 
         return signature, generate
 
-    return add_rows
+    return add_views
 
 
-add_rows_of_1 = _add_rows(1)
-add_rows_of_3 = _add_rows(3)
-add_rows_of_4 = _add_rows(4)
+add_views_of_1 = _add_views(1)
+add_views_of_3 = _add_views(3)
+add_views_of_4 = _add_views(4)

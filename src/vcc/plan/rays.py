@@ -60,14 +60,14 @@ class Window:
         """∫∫ ds dt over the window, the same seen from any place on the sensor."""
         return (np.pi if self.disc else 4.0) * abs(float(np.linalg.det(self.slope_from_point)))
 
-    def slopes(self, x: Array, y: Array, points: NDArray[np.float32]) -> tuple[Array, Array, Array]:
+    def slopes(self, x: Array, y: Array, points: Array) -> tuple[Array, Array, Array]:
         """Slopes s, t of rays from places x, y towards the window, and the solid angle that they stand for."""
-        a, b = points[..., 2].astype(np.float64), points[..., 3].astype(np.float64)
+        a, b = points[..., 2], points[..., 3]
         p, q = self.slope_from_point, self.slope_from_sensor
         s = p[0, 0] * a + p[0, 1] * b + q[0, 0] * x + q[0, 1] * y + self.offset[0]
         t = p[1, 0] * a + p[1, 1] * b + q[1, 0] * x + q[1, 1] * y + self.offset[1]
         for column, matrix in self.slope_from_scatter:
-            ds, dt = points[..., column].astype(np.float64), points[..., column + 1].astype(np.float64)
+            ds, dt = points[..., column], points[..., column + 1]
             s, t = s + matrix[0, 0] * ds + matrix[0, 1] * dt, t + matrix[1, 0] * ds + matrix[1, 1] * dt
         return s, t, np.full(s.shape, self.solid_angle)
 
@@ -227,7 +227,7 @@ class RayPlan:
             radiance 1. The first half of the samples is as good a set as the second.
         """
         number = block[:, None] * self.samples + np.arange(self.samples)
-        points = self.points[number][:, None]  # (pixels, 1, samples, columns)
+        points = self._moved(self.points[number], pixel)[:, None]  # (pixels, 1, samples, columns)
         row, column = np.divmod(pixel, self.sensor_shape[1])
         shape = (-1, 1, 1)
         x = self.first_pixel[0] + column.reshape(shape) * self.pitch[0] + points[..., 0] * self.sensitive[0]
@@ -243,8 +243,28 @@ class RayPlan:
         index = self.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
         return index, rays.share
 
+    def _moved(self, points: NDArray[np.float32], pixel: NDArray[np.int64]) -> Array:
+        """Points (pixels, samples, columns) with each pixel's places in it and in the window shifted as one.
+
+        There are fewer blocks than pixels: without the shift, pixels with one block would err alike, and an even
+        surface would show it. What leaves on one side comes back on the other; a disc is turned.
+        """
+        moved = points.astype(np.float64)
+        shift = np.stack([hashed(pixel, self.seed + 1 + n) * 2.0**-32 for n in range(4)], axis=-1)
+        place = moved[..., :2] + shift[:, None, :2]
+        moved[..., :2] = place - np.floor(place + 0.5)
+        a, b = moved[..., 2], moved[..., 3]
+        if isinstance(self.aim, Window) and self.aim.disc:
+            turn = 2 * np.pi * shift[:, 2:3]
+            cosine, sine = np.cos(turn), np.sin(turn)
+            moved[..., 2], moved[..., 3] = cosine * a - sine * b, sine * a + cosine * b
+        else:
+            aimed = moved[..., 2:4] + 2 * shift[:, None, 2:]
+            moved[..., 2:4] = aimed - 2 * np.floor(0.5 * aimed + 0.5)
+        return moved
+
     def _through_cells(
-        self, pixel: NDArray[np.int64], x: Array, y: Array, points: NDArray[np.float32]
+        self, pixel: NDArray[np.int64], x: Array, y: Array, points: Array
     ) -> tuple[Array, Array, Array, Array, Array]:
         """Rays from places on the sensor through all cells that the stop beyond can be seen through."""
         aim = self.aim
