@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, Texture, ThinLensCamera, cosines, psnr, round_stop, views
+from brute_force import Layer, Scene, Texture, ThinLensCamera, psnr, round_stop, views
 from ray_oracle import (
     Bench,
     Thin,
@@ -32,6 +32,7 @@ from ray_oracle import (
 )
 from scipy.integrate import quad
 from scipy.signal import convolve2d
+from two_planes import TwoPlanes
 
 import vcc
 from vcc.kernels import Gaussian, Samples, TopHat
@@ -49,25 +50,8 @@ LIGHT_FIELD_ERROR = 10 ** (-60 / 20)
 """Of the light field, as a share of the picture's largest value."""
 
 
-def two_planes() -> Scene:
-    """A textured plane before another, with an edge that is soft over six samples."""
-    near, far = (1 / (disparity * SLOPE / SPACING + 1 / FOCUS) for disparity in (DISPARITY, -DISPARITY))
-    periods = np.array([26.0, 40.0]) * SLOPE
-    width = 6 * SLOPE * near
-
-    def edge(x, y):
-        return 0.5 * (1 + np.tanh((0.8 * x + 0.6 * y) / width))
-
-    return Scene([Layer(near, cosines(1, periods * near), edge), Layer(far, cosines(2, periods * far))])
-
-
-SCENE = two_planes()
-
-
-@cache
-def light_field() -> vcc.LightField:
-    samples = views(SCENE, (VIEWS, VIEWS, PIXELS, PIXELS), SPACING, SLOPE, FOCUS).astype(np.float32)
-    return vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(-DISPARITY, DISPARITY))
+PLANES = TwoPlanes(VIEWS, SPACING, SLOPE, PIXELS, DISPARITY, FOCUS)
+SCENE = PLANES.scene
 
 
 @cache
@@ -156,10 +140,12 @@ def test_a_coded_diffuser_conserves_light():
 @pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 def test_a_diffuser_at_the_sensor_changes_nothing(kernel):
     diffuser = vcc.Diffuser(kernel=kernel, z=D)
-    without = capture([LENS], light_field(), PICTURE)
-    np.testing.assert_allclose(capture([LENS, diffuser], light_field(), PICTURE).values, without.values, rtol=1e-6)
-    rays = capture([LENS, diffuser], light_field(), PICTURE, method="rays", samples=1024)
-    plain = capture([LENS], light_field(), PICTURE, method="rays", samples=1024)
+    without = capture([LENS], PLANES.light_field, PICTURE)
+    np.testing.assert_allclose(
+        capture([LENS, diffuser], PLANES.light_field, PICTURE).values, without.values, rtol=1e-6
+    )
+    rays = capture([LENS, diffuser], PLANES.light_field, PICTURE, method="rays", samples=1024)
+    plain = capture([LENS], PLANES.light_field, PICTURE, method="rays", samples=1024)
     # Two independent errors; the estimate from halves is known to 1/√(2·224) = 5 %.
     error = np.sqrt(np.mean((rays.values - plain.values) ** 2))
     assert error <= 1.2 * np.hypot(rays.sampling_error, plain.sampling_error)
@@ -273,7 +259,7 @@ def test_moments_of_a_blurred_spot_are_those_of_the_kernel(name, method):
 def test_the_light_field_holds_the_scene():
     """How far interpolating its samples is from the scene: exact quadrature against rays without noise."""
     truth = ThinLensCamera(F, round_stop(DIAMETER, 16, 32), D, PICTURE.shape, PICTURE.pitch).picture(SCENE)
-    image = capture([LENS], light_field(), PICTURE, method="rays", samples=8192)
+    image = capture([LENS], PLANES.light_field, PICTURE, method="rays", samples=8192)
     assert image.sampling_error < 1e-4 * truth.max()
     reached = psnr(image.values, truth)
     print(f"light field {reached:.1f} dB")
@@ -358,7 +344,7 @@ def compare(image: vcc.Image, truth: np.ndarray, noise: float, floor: float = LI
 def test_diffusers_and_masks_match_brute_force(case):
     pairs, spread = CASES[case]
     camera = vcc.Camera([LENS, *(one for one, _ in pairs)], PICTURE)
-    image = camera.capture(light_field(), method="rays", samples=8192)
+    image = camera.capture(PLANES.light_field, method="rays", samples=8192)
     half = DIAMETER / 2 + spread * D
     bench = Bench([ROUND, *(thin for _, thin in pairs)], D, PICTURE.shape, PICTURE.pitch, (0.0, half, half))
     compare(image, *bench.measured(SCENE, 64))
@@ -376,7 +362,7 @@ def test_rules_match_brute_force(rule):
     """The stop is square, on borders of views' cells: footprints take cut cells as lit from their middle."""
     pairs, spread = AS_BLURS[rule]
     camera = vcc.Camera([vcc.Lens(focal_length=F), STOP, *(one for one, _ in pairs)], PICTURE)
-    assert any(rule in note for note in camera.compile(light_field()).notes)
+    assert any(rule in note for note in camera.compile(PLANES.light_field).notes)
     half = DIAMETER / 2 + spread * D
     bench = Bench([SQUARE_STOP, *(thin for _, thin in pairs)], D, PICTURE.shape, PICTURE.pitch, (0.0, half, half))
     truth, noise = bench.measured(SCENE, 64)
@@ -386,14 +372,14 @@ def test_rules_match_brute_force(rule):
         # The kernel on the lattice of pixels, each point shared linearly by its neighbours, takes a tent's part of
         # the finest cosine besides: amplitude 0.1 of the scene's 0.7 at most, a period of 26 samples, 2.4 a pixel.
         floor = np.hypot(floor, (1 - np.sinc(2.4 / 26) ** 2) * 0.1 / np.sqrt(2) / 0.7)
-    compare(camera.capture(light_field(), interpolation="cubic"), truth, noise, floor)
+    compare(camera.capture(PLANES.light_field, interpolation="cubic"), truth, noise, floor)
 
 
 def test_a_stop_behind_a_diffuser_forbids_a_blur_of_the_picture():
     diffuser, scattering = hat(0.25, 60e-3)
     stop, hole = vcc.Mask(pattern=Circle(4 * mm), z=0.6 * D), Thin(0.6 * D, share=disc(4 * mm))
     sensor = replace(PICTURE, shape=(20, 20))  # what is left of the scene is coarse
-    image = capture([LENS, diffuser, stop], light_field(), sensor, samples=4096)
+    image = capture([LENS, diffuser, stop], PLANES.light_field, sensor, samples=4096)
     bench = Bench([scattering, hole, ROUND], D, sensor.shape, sensor.pitch, (0.6 * D, 2 * mm, 2 * mm))
     truth, noise = bench.measured(SCENE, 64)
     reached = compare(image, truth, noise)
@@ -420,7 +406,7 @@ def test_rays_sent_forwards_tell_the_same():
     pairs = [gaussian(0.3, 6e-3), coded_mask(0.5), (vcc.Diffuser(ARRAY, slope_pitch=12e-3, z=0.7 * D), None)]
     pairs[2] = (pairs[2][0], Thin(0.7 * D, scatter=histogram(ARRAY, 12e-3)))
     sensor = replace(PICTURE, shape=(10, 12), pitch=4 * D * SLOPE, decentre=(0.2 * mm, -0.3 * mm))
-    image = capture([LENS, *(one for one, _ in pairs)], light_field(), sensor, samples=4096)
+    image = capture([LENS, *(one for one, _ in pairs)], PLANES.light_field, sensor, samples=4096)
     half = DIAMETER / 2 + (24e-3 * 0.3 + 18e-3 * 0.7) * D
     bench = Bench(
         [ROUND, *(thin for _, thin in pairs)], D, sensor.shape, sensor.pitch, (0, half, half),
@@ -450,7 +436,7 @@ def test_a_diffuser_before_the_lens_and_behind_its_own_stop_matches_brute_force(
     ]
     # Scattered rays come from slopes up to 16e-3 beyond what the sensor sees: inside the views' 48e-3.
     sensor = replace(PICTURE, z=z + 50 * mm, shape=(20, 20), pitch=D * SLOPE)
-    image = capture(elements, light_field(), sensor, method="rays", samples=4096)
+    image = capture(elements, PLANES.light_field, sensor, method="rays", samples=4096)
     thins = [
         Thin(0.0, share=disc(11 * mm, *middle), scatter=normal(4e-3)),
         Thin(z, bend=lens(F), share=disc(9 * mm)),

@@ -17,8 +17,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
+from brute_force import Layer, Scene, ThinLensCamera, psnr, round_stop, views
 from ray_oracle import Bench, Thin, agree, cells, disc, grown, lens, nearest_centre, normal, round_hat, square
+from two_planes import TwoPlanes
 
 import vcc
 from vcc.kernels import Gaussian, TopHat
@@ -38,24 +39,8 @@ SHARP = 1 / (1 / B + 1 / D)
 GROWTH = 1 + B / D
 
 
-def two_planes() -> Scene:
-    near, far = (1 / (disparity * SLOPE / SPACING + 1 / FOCUS) for disparity in (DISPARITY, -DISPARITY))
-    periods = np.array([26.0, 40.0]) * SLOPE
-    width = 6 * SLOPE * near
-
-    def edge(x, y):
-        return 0.5 * (1 + np.tanh((0.8 * x + 0.6 * y) / width))
-
-    return Scene([Layer(near, cosines(1, periods * near), edge), Layer(far, cosines(2, periods * far))])
-
-
-SCENE = two_planes()
-
-
-@cache
-def light_field() -> vcc.LightField:
-    samples = views(SCENE, (VIEWS, VIEWS, PIXELS, PIXELS), SPACING, SLOPE, FOCUS).astype(np.float32)
-    return vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(-DISPARITY, DISPARITY))
+PLANES = TwoPlanes(VIEWS, SPACING, SLOPE, PIXELS, DISPARITY, FOCUS)
+SCENE = PLANES.scene
 
 
 @cache
@@ -191,7 +176,7 @@ def test_the_light_field_holds_the_scene():
     """How far interpolating its samples is from the scene, without an array: exact quadrature."""
     sensor = vcc.Sensor(z=D + B, shape=(24, 24), pitch=75 * um)
     truth = ThinLensCamera(F, round_stop(DIAMETER, 16, 32), D + B, sensor.shape, sensor.pitch).picture(SCENE)
-    image = vcc.Camera([LENS], sensor).capture(light_field(), method="rays", samples=8192)
+    image = vcc.Camera([LENS], sensor).capture(PLANES.light_field, method="rays", samples=8192)
     reached = psnr(image.values, truth)
     print(f"light field {reached:.1f} dB")
     assert 10 ** (-reached / 20) <= LIGHT_FIELD_ERROR
@@ -282,7 +267,7 @@ def compare(image: vcc.Image, truth: np.ndarray, noise: float, floor: float = LI
 def test_pictures_through_arrays_match_brute_force(case):
     array, thin, gap, reach = CASES[case]
     sensor = vcc.Sensor(z=array.z + gap, shape=(10, 12), pitch=67 * um, decentre=(0.13 * mm, -0.08 * mm))
-    image = vcc.Camera([LENS, array], sensor).capture(light_field(), samples=16384)
+    image = vcc.Camera([LENS, array], sensor).capture(PLANES.light_field, samples=16384)
     # A sensor point sees the main lens by rays of slope (x_lens − x)/z plus what a lenslet adds, at most
     # how far it is clear from its centre over the shortest focal length.
     steepest = DIAMETER / 2 / array.z + reach / min(np.abs(array.focal_lengths))
@@ -435,7 +420,7 @@ AWKWARD = {
 def test_awkward_cameras_match_brute_force(case):
     elements, thins, z, (aim, follow) = AWKWARD[case]()
     sensor = vcc.Sensor(z=z, shape=(10, 12), pitch=67 * um, decentre=(0.21 * mm, -0.13 * mm))
-    image = vcc.Camera(elements, sensor).capture(light_field(), samples=16384)
+    image = vcc.Camera(elements, sensor).capture(PLANES.light_field, samples=16384)
     bench = Bench(thins, z, sensor.shape, sensor.pitch, aim, follow, sensor.decentre)
     compare(image, *bench.measured(SCENE, 128))
 
@@ -444,8 +429,8 @@ def test_an_array_at_the_sensor_only_shades_it():
     """Rays end where the lenslets would bend them; gaps are dark."""
     sensor = vcc.Sensor(z=D, shape=(24, 24), pitch=P / 4)
     array = vcc.LensArray(pitch=P, focal_length=B, z=D, offset=(P / 2, P / 2), fill_factor=0.25)
-    plain = vcc.Camera([LENS], sensor).capture(light_field(), method="rays", samples=2048)
-    image = vcc.Camera([LENS, array], sensor).capture(light_field(), samples=16384)
+    plain = vcc.Camera([LENS], sensor).capture(PLANES.light_field, method="rays", samples=2048)
+    image = vcc.Camera([LENS, array], sensor).capture(PLANES.light_field, samples=16384)
     # Openings of half a pitch are the middle two by two of a lenslet's four by four pixels.
     middle = np.tile([0.0, 1.0, 1.0, 0.0], 6)
     expected = plain.values * middle[:, None] * middle[None, :]

@@ -15,6 +15,7 @@ import pytest
 from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 from ray_oracle import Bench, Thin, agree, cells, cosine_sheet, disc, lens, normal, square
 from scipy.integrate import quad
+from two_planes import TwoPlanes
 
 import vcc
 from vcc.errors import ResultWarning
@@ -34,24 +35,8 @@ LIGHT_FIELD_ERROR = 10 ** (-60 / 20)
 ENGINES = ["numba", "reference", "array_api"]
 
 
-def two_planes() -> Scene:
-    near, far = (1 / (disparity * SLOPE / SPACING + 1 / FOCUS) for disparity in (DISPARITY, -DISPARITY))
-    periods = np.array([26.0, 40.0]) * SLOPE
-    width = 6 * SLOPE * near
-
-    def edge(x, y):
-        return 0.5 * (1 + np.tanh((0.8 * x + 0.6 * y) / width))
-
-    return Scene([Layer(near, cosines(1, periods * near), edge), Layer(far, cosines(2, periods * far))])
-
-
-SCENE = two_planes()
-
-
-@cache
-def light_field() -> vcc.LightField:
-    samples = views(SCENE, (VIEWS, VIEWS, PIXELS, PIXELS), SPACING, SLOPE, FOCUS).astype(np.float32)
-    return vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(-DISPARITY, DISPARITY))
+PLANES = TwoPlanes(VIEWS, SPACING, SLOPE, PIXELS, DISPARITY, FOCUS)
+SCENE = PLANES.scene
 
 
 @cache
@@ -61,7 +46,7 @@ def white() -> vcc.LightField:
 
 
 def rays(elements, lf=None, sensor=PICTURE, **options) -> vcc.Image:
-    lf = light_field() if lf is None else lf
+    lf = PLANES.light_field if lf is None else lf
     return vcc.Camera(elements, sensor).capture(lf, method="rays", **options)
 
 
@@ -123,7 +108,7 @@ def test_a_plate_through_rays_is_the_lens_through_footprints():
     bare = [vcc.Lens(focal_length=F), stop]
     image = rays([*bare, replace(ROUNDED["path map"], z=0.3 * D)], samples=8192)
     exact = vcc.Camera([*bare, vcc.Lens(focal_length=0.4, z=0.3 * D)], PICTURE).capture(
-        light_field(), interpolation="cubic"
+        PLANES.light_field, interpolation="cubic"
     )
     reached = psnr(image.values, exact.values)
     print(f"{reached:.1f} dB")
@@ -491,7 +476,7 @@ SMALL = replace(PICTURE, shape=(9, 10))
 @pytest.mark.parametrize("channels", [None, 1, 2, 3, 4, 5])
 @pytest.mark.parametrize("kind", ["uint8", "uint16", "float16", "float32", "float64"])
 def test_every_type_and_number_of_channels_gives_the_plain_picture(kind, channels):
-    whole = light_field()[4:12, 4:12, 20:76, 20:76]
+    whole = PLANES.light_field[4:12, 4:12, 20:76, 20:76]
     factors = np.linspace(0.3, 1.0, channels or 1)
     values = np.asarray(whole.values)[..., None] * factors
     if kind.startswith("uint"):
@@ -517,7 +502,7 @@ def test_every_type_and_number_of_channels_gives_the_plain_picture(kind, channel
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_samples_in_any_order_in_memory_give_the_same_picture(engine):
-    whole = light_field()[4:12, 4:12, 20:76, 20:76]
+    whole = PLANES.light_field[4:12, 4:12, 20:76, 20:76]
     values = np.stack(
         [np.asarray(whole.values), np.asarray(whole.values) ** 2, np.asarray(whole.values) / 3], axis=-1
     )
@@ -541,7 +526,7 @@ def test_samples_in_any_order_in_memory_give_the_same_picture(engine):
 
 def test_a_light_field_turned_about_the_axis_gives_the_picture_turned():
     """Views and pixels exchanged along both axes, in a frame that says so: x and y mix everywhere."""
-    whole = light_field()
+    whole = PLANES.light_field
     swap = vcc.Affine(
         np.array([[0, 1, 0, 0, 0], [1, 0, 0, 0, 0], [0, 0, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 1.0]])
     )

@@ -7,13 +7,13 @@ plate makes of a point; elements of the package that a user's element can be wri
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cache
 
 import numpy as np
 import pytest
 import torch
-from brute_force import Layer, Scene, cosines, views
+from brute_force import Layer, Scene, views
 from ray_oracle import Bench, Thin, agree, disc, lens
+from two_planes import TwoPlanes
 
 import vcc
 from vcc.engines import record
@@ -74,28 +74,12 @@ def spiral(z: float, x0: float = 0.0, y0: float = 0.0) -> Thin:
     return Thin(z, bend=bend, share=share)
 
 
-def two_planes() -> Scene:
-    near, far = (1 / (disparity * SLOPE / SPACING + 1 / FOCUS) for disparity in (DISPARITY, -DISPARITY))
-    periods = np.array([26.0, 40.0]) * SLOPE
-    width = 6 * SLOPE * near
-
-    def edge(x, y):
-        return 0.5 * (1 + np.tanh((0.8 * x + 0.6 * y) / width))
-
-    return Scene([Layer(near, cosines(1, periods * near), edge), Layer(far, cosines(2, periods * far))])
-
-
-SCENE = two_planes()
-
-
-@cache
-def light_field() -> vcc.LightField:
-    samples = views(SCENE, (VIEWS, VIEWS, PIXELS, PIXELS), SPACING, SLOPE, FOCUS).astype(np.float32)
-    return vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(-DISPARITY, DISPARITY))
+PLANES = TwoPlanes(VIEWS, SPACING, SLOPE, PIXELS, DISPARITY, FOCUS)
+SCENE = PLANES.scene
 
 
 def capture(elements, lf=None, sensor=PICTURE, **options) -> vcc.Image:
-    return vcc.Camera(elements, sensor).capture(light_field() if lf is None else lf, **options)
+    return vcc.Camera(elements, sensor).capture(PLANES.light_field if lf is None else lf, **options)
 
 
 # -- the picture
@@ -169,8 +153,8 @@ CAMERAS = {
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_every_engine_makes_the_same_picture(camera):
     sensor = replace(PICTURE, shape=(8, 9))
-    values = np.asarray(light_field().values)[..., None] * np.array([1.0, 0.5, 0.2], dtype=np.float32)
-    lf = light_field().replaced(values)
+    values = np.asarray(PLANES.light_field.values)[..., None] * np.array([1.0, 0.5, 0.2], dtype=np.float32)
+    lf = PLANES.light_field.replaced(values)
     plan = vcc.Camera(CAMERAS[camera], sensor).compile(lf, samples=64)
     pictures = {name: record(plan, values, engine=name).values for name in ENGINES}
     expected = pictures["reference"]
@@ -184,8 +168,10 @@ def test_every_engine_makes_the_same_picture(camera):
 
 
 def test_gradients_reach_the_samples_through_it():
-    values = torch.asarray(np.array(light_field().values)).requires_grad_(True)
-    image = capture([LENS, SPIRAL], light_field().replaced(values), replace(PICTURE, shape=(3, 3)), samples=16)
+    values = torch.asarray(np.array(PLANES.light_field.values)).requires_grad_(True)
+    image = capture(
+        [LENS, SPIRAL], PLANES.light_field.replaced(values), replace(PICTURE, shape=(3, 3)), samples=16
+    )
     image.values.sum().backward()
     # The picture is linear in the samples: gradient times samples is the picture.
     assert float((values.grad * values.detach()).sum()) == pytest.approx(
@@ -194,7 +180,7 @@ def test_gradients_reach_the_samples_through_it():
 
 
 def test_explain_tells_of_it():
-    text = str(vcc.Camera([LENS, replace(SPIRAL, z=20 * mm)], PICTURE).explain(light_field(), samples=16))
+    text = str(vcc.Camera([LENS, replace(SPIRAL, z=20 * mm)], PICTURE).explain(PLANES.light_field, samples=16))
     text = " ".join(text.split())  # lines are broken anywhere
     assert 'spiral plate "spiral" bends rays by a function of position that is not affine' in text
     assert "charge 200" in text
@@ -206,7 +192,7 @@ def test_explain_tells_of_it():
 def test_it_is_named_where_the_light_field_has_no_frame():
     camera = vcc.Camera([LENS, SPIRAL], PICTURE)
     with pytest.raises(vcc.InputError, match='spiral plate "spiral" is not affine'):
-        camera.light_field_at(light_field(), 10 * mm)
+        camera.light_field_at(PLANES.light_field, 10 * mm)
 
 
 # -- what the package has, written by a user
@@ -286,8 +272,8 @@ def test_nonsense_is_refused_by_the_name_of_its_element(case, method):
         (Own(made=faces, z=2 * mm), "own at z = 2 mm"),
     ):
         with pytest.raises(vcc.InputError, match=words) as caught:
-            vcc.Camera([LENS, bad], PICTURE).capture(light_field(), method=method)
+            vcc.Camera([LENS, bad], PICTURE).capture(PLANES.light_field, method=method)
         assert name in str(caught.value)
         with pytest.raises(vcc.InputError, match=words) as caught:
-            vcc.Camera([LENS, bad], PICTURE).explain(light_field(), method=method)
+            vcc.Camera([LENS, bad], PICTURE).explain(PLANES.light_field, method=method)
         assert name in str(caught.value)
