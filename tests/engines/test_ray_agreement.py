@@ -1,7 +1,7 @@
 """Every engine traces the same rays: pictures agree to 1e-5 of the brightest pixel, for every kind of step.
 
-The oracle for what a picture *should* be is elsewhere (tests/physics). Places are float64 everywhere, so a ray falls
-on the same side of an edge; samples are added up in float32 by two engines and in float64 by ``reference``.
+The oracle for what a picture *should* be is elsewhere (tests/physics). Places are float64 everywhere, so that rays
+fall on the same side of an edge; samples are added up in float32 by two engines and in float64 by ``reference``.
 """
 
 from __future__ import annotations
