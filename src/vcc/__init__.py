@@ -68,7 +68,7 @@ _HOMES = {
     "open_light_field": "vcc.formats",
     "photon_transfer": "vcc.recording",
 }
-_MODULES = {"kernels", "patterns", "plot", "prescriptions", "sources", "surfaces", "units"}
+_MODULES = {"kernels", "patterns", "plot", "prescriptions", "sources", "store", "surfaces", "units"}
 
 __all__ = [*sorted(_HOMES), *sorted(_MODULES)]
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from vcc.plan.model import Plan
     from vcc.plan.rays import RayPlan
     from vcc.recording import Recording
+    from vcc.store import StoredLightField
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,14 @@ class Stage:
             yield
         except InputError as error:
             raise InputError(f"{self.element.label}: {error}") from None
+
+
+def _outline(light_field: LightField | StoredLightField) -> LightField:
+    """What a plan is made from: of a light field on disk nothing is read, and nothing may be missing."""
+    if isinstance(light_field, LightField):
+        return light_field
+    light_field.check_complete()
+    return light_field.outline
 
 
 def about(middle: tuple[float, float], ray_map: Affine) -> Affine:
@@ -190,7 +199,7 @@ class Camera:
 
     def compile(
         self,
-        light_field: LightField,
+        light_field: LightField | StoredLightField,
         *,
         method: str = "auto",
         interpolation: str = "linear",
@@ -208,7 +217,7 @@ class Camera:
 
         return compile_best(
             self,
-            light_field,
+            _outline(light_field),
             method=method,
             interpolation=interpolation,
             between_views=between_views,
@@ -220,7 +229,7 @@ class Camera:
 
     def capture(
         self,
-        light_field: LightField,
+        light_field: LightField | StoredLightField,
         *,
         method: str = "auto",
         interpolation: str = "linear",
@@ -231,12 +240,14 @@ class Camera:
         tolerance: float | None = None,
         seed: int = 0,
         engine: EngineName | None = None,
+        memory_limit: int | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> Image:
         """The picture that the sensor records of a light field.
 
         Args:
-            light_field: given at the entrance plane z = 0.
+            light_field: given at the entrance plane z = 0; in memory, or on disk (`vcc.store.open_store`) and then
+                read in pieces whose pictures are summed.
             method: ``"footprints"`` spreads each sample of the light field over the sensor, exactly, where the
                 optics fold into one matrix; ``"rays"`` traces rays back from the sensor through anything;
                 ``"auto"`` takes footprints where they can be had.
@@ -255,6 +266,9 @@ class Camera:
             seed: of the rays' choice of points. The same seed gives the same picture, on any number of threads.
             engine: ``"numba"`` (default for NumPy arrays), ``"array_api"`` (default for PyTorch, JAX and
                 other arrays: carries gradients) or ``"reference"`` (slow; defines what is correct).
+            memory_limit: for a light field on disk, bytes that its pieces, the picture and the engine may take
+                together; None takes `vcc.engines.pieces.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time by
+                rays, all of which are traced for each piece.
             progress: called with (done, total) as the work advances.
 
         Returns:
@@ -265,8 +279,9 @@ class Camera:
                 tolerance was not reached, or the cells of an array are smaller than a pixel.
 
         Raises:
-            InputError: an option that does not exist or does not go with the method, or an element that returns
-                what it must not.
+            InputError: an option that does not exist or does not go with the method, an element that returns
+                what it must not; of a light field on disk, views that are missing or damaged, or a memory limit
+                that is too small.
         """
         import warnings
 
@@ -286,7 +301,14 @@ class Camera:
         )
         for caution in plan.cautions:
             warnings.warn(caution, ResultWarning, stacklevel=2)
-        recorded = record(plan, light_field.values, engine=engine, tolerance=tolerance, progress=progress)
+        if isinstance(light_field, LightField):
+            recorded = record(plan, light_field.values, engine=engine, tolerance=tolerance, progress=progress)
+        else:
+            from vcc.engines.pieces import record_pieces
+
+            recorded = record_pieces(
+                plan, light_field, engine=engine, tolerance=tolerance, memory_limit=memory_limit, progress=progress
+            )
         if recorded.missing_rays > 0.01:
             warnings.warn(
                 f"{recorded.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
@@ -303,7 +325,7 @@ class Camera:
 
     def expose(
         self,
-        light_field: LightField,
+        light_field: LightField | StoredLightField,
         exposure: float | Literal["auto"],
         *,
         seed: int = 0,
@@ -334,13 +356,18 @@ class Camera:
 
         return expose(self, light_field, exposure, seed=seed, radiance=radiance, ray_seed=ray_seed, **options)
 
-    def explain(self, light_field: LightField, **options: Any) -> Explanation:
+    def explain(self, light_field: LightField | StoredLightField, **options: Any) -> Explanation:
         """The plan for a light field in words: what was folded, pulled to the sensor, chosen, and its cost.
 
         Args:
-            light_field: given at the entrance plane.
+            light_field: given at the entrance plane; in memory or on disk.
             options: as in `capture`.
         """
+        if not isinstance(light_field, LightField):
+            from vcc.engines.pieces import explain_pieces
+
+            return explain_pieces(self, light_field, **options)
+        options.pop("memory_limit", None)
         from vcc.plan.explain import explain
 
         return explain(self, light_field, **options)
@@ -363,9 +390,14 @@ class Camera:
                 Without a mask or a diffuser on the way nothing is allocated.
 
         Raises:
-            InputError: z outside the camera, an element on the way that bends rays otherwise than a lens or a
-                prism, or more memory needed than allowed.
+            InputError: a light field on disk, z outside the camera, an element on the way that bends rays not as a
+                lens or a prism does, or more memory needed than allowed.
         """
+        if not isinstance(light_field, LightField):
+            raise InputError(
+                "the light field inside a camera is made from samples in memory: pass stored.read(), or a part of "
+                "it, stored[a:b, c:d]"
+            )
         if z > self.sensor.z:
             raise InputError(f"z = {z * 1e3:g} mm lies behind the sensor at {self.sensor.z * 1e3:g} mm")
         for stage in self.stages:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from vcc.camera import Camera
     from vcc.formats.pictures import SavedPicture
     from vcc.light_field import LightField
+    from vcc.store import StoredLightField
 
 Demosaicing = Literal["menon", "malvar", "bilinear"]
 """Ways to fill in the channels that a pixel's filter keeps out; see `Recording.demosaiced`."""
@@ -239,7 +240,7 @@ class Recording:
 
 def expose(
     camera: Camera,
-    light_field: LightField,
+    light_field: LightField | StoredLightField,
     exposure: float | Literal["auto"],
     *,
     seed: int = 0,

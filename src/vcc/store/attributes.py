@@ -1,0 +1,170 @@
+"""What a store states beside its samples: frame, units, transfer, names, provenance; see docs/store.md."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+
+FORMAT_VERSION = 1
+"""Of the attributes and the layout below; a reader refuses what is newer than it knows."""
+KEY = "light_field"
+"""The attribute of the group under which all others stand."""
+ARRAY = "samples"
+"""The name of the array in the group."""
+AXES = ("v", "u", "t", "s", "channel")
+UNITS = {"u": "m", "v": "m", "s": "1", "t": "1"}
+DTYPES = ("uint8", "uint16", "float16", "float32")
+
+Transfer = Literal["linear", "srgb"]
+
+
+@dataclass(frozen=True, eq=False)
+class Attributes:
+    """The attributes of a store.
+
+    Args:
+        frame: 5×5, from indices (i, j, k, l, 1) to rays (u, v, s, t, 1), metres and slopes.
+        transfer: ``"linear"``: samples are proportional to light; ``"srgb"``: they are codes of IEC 61966-2-1.
+        channel_names: one for each channel, or None.
+        disparity_range: (lowest, highest), pixels per view along u, or None where not known.
+        provenance: where the light field comes from, as JSON can hold it.
+        description: all that the samples depend on, as JSON can hold it, so that views are never mixed; or None.
+        lossy: codec, quality and measured PSNR, or None where samples are kept exactly.
+        complete: whether all views are there.
+    """
+
+    frame: Affine
+    transfer: Transfer = "linear"
+    channel_names: tuple[str, ...] | None = None
+    disparity_range: tuple[float, float] | None = None
+    provenance: dict[str, Any] = field(default_factory=dict)
+    description: dict[str, Any] | None = None
+    lossy: dict[str, Any] | None = None
+    complete: bool = False
+
+    def as_json(self) -> dict[str, Any]:
+        """The attributes as they are written."""
+        return {
+            "format_version": FORMAT_VERSION,
+            "axes": list(AXES),
+            "units": UNITS,
+            "frame": self.frame.matrix.tolist(),
+            "transfer": self.transfer,
+            "channel_names": None if self.channel_names is None else list(self.channel_names),
+            "disparity_range": None if self.disparity_range is None else list(self.disparity_range),
+            "provenance": plain(self.provenance, "provenance"),
+            "description": None if self.description is None else plain(self.description, "description"),
+            "lossy": None if self.lossy is None else plain(self.lossy, "lossy"),
+            "complete": self.complete,
+        }
+
+    @classmethod
+    def from_json(cls, stated: Any, path: Path) -> Attributes:
+        """The attributes of the store at ``path``.
+
+        Raises:
+            InputError: not ours, a newer version, or something missing or impossible (named).
+        """
+        if not isinstance(stated, dict):
+            raise InputError(
+                f'{path} is a Zarr group, and no light field: its attributes have no "{KEY}". How a store is '
+                "written says docs/store.md"
+            )
+        version = stated.get("format_version")
+        if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+            raise InputError(f"{path}: format_version is {version!r}; it is a whole number from 1 on")
+        if version > FORMAT_VERSION:
+            raise InputError(
+                f"{path} has format_version {version}, and this vcc reads up to {FORMAT_VERSION}: use a newer vcc"
+            )
+        missing = [name for name in ("frame", "transfer", "complete") if name not in stated]
+        if missing:
+            raise InputError(f"{path}: its attributes do not state {', '.join(missing)} (see docs/store.md)")
+        if tuple(stated.get("axes", AXES)) != AXES or stated.get("units", UNITS) != UNITS:
+            raise InputError(
+                f"{path}: axes are {list(AXES)} and units {UNITS}, not {stated.get('axes')} and "
+                f"{stated.get('units')}"
+            )
+        try:
+            made = cls(
+                frame=Affine(np.array(stated["frame"], dtype=np.float64)),
+                transfer=stated["transfer"],
+                channel_names=_tuple(stated.get("channel_names")),
+                disparity_range=_tuple(stated.get("disparity_range")),
+                provenance=stated.get("provenance") or {},
+                description=stated.get("description"),
+                lossy=stated.get("lossy"),
+                complete=stated["complete"],
+            )
+        except (TypeError, ValueError, InputError) as error:
+            raise InputError(f"{path}: its attributes cannot be used: {error}") from None
+        made.check(str(path))
+        return made
+
+    def check(self, owner: str, channels: int | Literal["unknown"] | None = "unknown") -> None:
+        """Refuse what no light field has.
+
+        Raises:
+            InputError: said of ``owner``.
+        """
+        if self.frame.dimensions != 4 or not self.frame.is_invertible():
+            raise InputError(f"{owner}: frame is an invertible 5×5 map of indices to rays, not\n{self.frame!r}")
+        if self.transfer not in get_args(Transfer):
+            raise InputError(f'{owner}: transfer is "linear" or "srgb", not {self.transfer!r}')
+        if not isinstance(self.complete, bool):
+            raise InputError(f"{owner}: complete is true or false, not {self.complete!r}")
+        if self.disparity_range is not None:
+            given = self.disparity_range
+            numbers = len(given) == 2 and all(isinstance(n, int | float) and math.isfinite(n) for n in given)
+            if not (numbers and given[0] <= given[1]):
+                raise InputError(f"{owner}: disparity_range is (lowest, highest), not {given}")
+        if self.channel_names is not None and channels != "unknown" and len(self.channel_names) != (channels or 0):
+            raise InputError(
+                f"{owner}: {len(self.channel_names)} channel_names for {channels or 'no'} channels: give one each"
+            )
+
+    def finished(self, lossy: dict[str, Any] | None) -> Attributes:
+        """The same of a store with all its views."""
+        return replace(self, complete=True, lossy=lossy)
+
+
+def plain(value: Any, name: str) -> Any:
+    """A value as JSON holds it: tuples are lists, and numbers that are not finite are the words of Zarr for them.
+
+    Raises:
+        InputError: it holds what JSON cannot.
+    """
+    if isinstance(value, dict):
+        return {str(key): plain(item, f"{name}.{key}") for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item, name) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist(), name)
+    if isinstance(value, np.generic):
+        return plain(value.item(), name)
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else ("Infinity" if value > 0 else "-Infinity")
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Path):
+        return str(value)
+    raise InputError(
+        f"{name} of a store is kept as JSON: words, numbers, lists and dictionaries, not {type(value).__name__}"
+    )
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two plain values are the same, whatever the order of keys."""
+    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
+
+
+def _tuple(value: Any) -> Any:
+    return None if value is None else tuple(value)

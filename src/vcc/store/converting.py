@@ -1,0 +1,130 @@
+"""A light field written to a store with samples of another type, packed otherwise, or just packed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from vcc.errors import InputError
+from vcc.formats.transfer import decode, encode
+from vcc.light_field import LightField
+from vcc.sampled import to_numpy
+from vcc.store.attributes import DTYPES, Transfer
+from vcc.store.compression import Compression
+from vcc.store.reading import StoredLightField
+from vcc.store.writing import disparities_of, write_views
+
+Progress = Callable[[int, int], None]
+View = Callable[[int, int], NDArray[Any]]
+
+
+def convert(
+    source: LightField | StoredLightField,
+    path: str | PathLike[str],
+    *,
+    transfer: Transfer = "linear",
+    dtype: DTypeLike | None = None,
+    provenance: dict[str, Any] | None = None,
+    chunks: int | None = None,
+    compression: Compression | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> StoredLightField:
+    """Write a light field to a store, view by view: a source on disk is never in memory as a whole.
+
+    Args:
+        source: in memory or on disk.
+        path: folder of the store.
+        transfer: of a source in memory: ``"srgb"`` if its integers are sRGB codes. One on disk says it itself.
+        dtype: of the stored samples; None keeps them bit for bit. Floating point holds linear light, and integers
+            made of it are sRGB codes; from 8 to 16 bits and back they stay what they were.
+        provenance: where it comes from; None takes that of a source on disk.
+        chunks: see `vcc.store.create_store`.
+        compression: see there.
+        overwrite: see `vcc.store.save_store`.
+        progress: called with (done, total) in views.
+
+    Raises:
+        InputError: another type; samples that it cannot hold, brighter than 1 as integers (named by view); a store
+            that is not complete; what `vcc.store.save_store` refuses.
+    """
+    from vcc import __version__
+
+    view: View
+    if isinstance(source, StoredLightField):
+        source.check_complete()
+        stored, rows = source, source.shape[2]
+        shape, kind, transfer, frame = source.shape, source.dtype, source.transfer, source.frame
+        names, disparity_range = source.channel_names, source.disparity_range
+        made = source.provenance if provenance is None else provenance
+
+        def view(row: int, column: int) -> NDArray[Any]:
+            return stored.stored_view(row, column, 0, rows)
+    else:
+        values = to_numpy(source.values)
+        shape, kind, frame, names = tuple(values.shape), values.dtype, source.frame, None
+        disparity_range = disparities_of(source)
+        made = {"written_by": f"vcc {__version__}"} if provenance is None else provenance
+
+        def view(row: int, column: int) -> NDArray[Any]:
+            return cast("NDArray[Any]", values[row, column])
+
+    wanted = kind if dtype is None else np.dtype(dtype)
+    if wanted.name not in DTYPES:
+        raise InputError(f"samples are stored as {', '.join(DTYPES)}, not {wanted}")
+    recoded, now = _recoding(kind, transfer, wanted)
+    return write_views(
+        Path(path).expanduser(),
+        frame,
+        shape,
+        wanted,
+        lambda row, column: recoded(view(row, column), f"view ({row}, {column})"),
+        overwrite=overwrite,
+        progress=progress,
+        provenance=made,
+        transfer=now,
+        channel_names=names,
+        disparity_range=disparity_range,
+        chunks=chunks,
+        compression=compression,
+    )
+
+
+def _recoding(
+    kind: np.dtype[Any], transfer: Transfer, wanted: np.dtype[Any]
+) -> tuple[Callable[[NDArray[Any], str], NDArray[Any]], Transfer]:
+    """How samples become samples of another type, and how these then stand for light."""
+    if wanted == kind:
+        return lambda view, name: view, transfer
+    if kind.kind == "u" and wanted.kind == "u":
+        # 65535 = 255 · 257: 8 bits come back as they were.
+        if wanted.itemsize > kind.itemsize:
+            return lambda view, name: view.astype(wanted) * wanted.type(257), transfer
+        return lambda view, name: np.rint(view / 257.0).astype(wanted), transfer
+    if kind.kind == "u":
+        return lambda view, name: _light(view, transfer).astype(wanted), "linear"
+    if wanted.kind == "f":
+        return lambda view, name: view, "linear"  # the writer brings it to its precision, and checks that it fits
+
+    def coded(view: NDArray[Any], name: str) -> NDArray[Any]:
+        brightest = float(view.max())
+        if brightest > 1:
+            raise InputError(
+                f"{name} has radiance up to {brightest:.4g}, and {wanted} ends at 1: nothing is cut off. Keep "
+                'dtype="float16", or scale the samples before'
+            )
+        return encode(view.astype(np.float32), wanted.itemsize * 8)
+
+    return coded, "srgb"
+
+
+def _light(view: NDArray[Any], transfer: Transfer) -> NDArray[np.float32]:
+    """Linear light of integer samples."""
+    if transfer == "srgb":
+        return decode(view)
+    return np.asarray(view / np.float32(np.iinfo(view.dtype).max), dtype=np.float32)

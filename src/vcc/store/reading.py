@@ -1,0 +1,477 @@
+"""Opening a store: what it states at once, its samples when they are asked for."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.formats.transfer import decode
+from vcc.light_field import DisparityRange, LightField, describe_geometry
+from vcc.sampled import Index
+from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
+
+if TYPE_CHECKING:
+    from vcc.image import Image
+
+Progress = Callable[[int, int], None]
+
+MEASURED_BYTES = 2**26
+"""Views from which disparities are measured are cut to a band of rows if they take more than this as stored."""
+MEASURED_REACH = 3
+"""How many views on either side of the middle one disparities are measured from; see `vcc.parallax`."""
+NOT_THERE = 2**64 - 1
+"""How the index of a Zarr shard says that a chunk was never written."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OnDisk:
+    """Stands where the array of a light field stands, and holds no samples: a part of a store, not yet read.
+
+    Args:
+        store: whose samples.
+        ranges: which indices along each axis.
+    """
+
+    store: StoredLightField
+    ranges: tuple[range, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """How many indices there are along each axis."""
+        return tuple(len(part) for part in self.ranges)
+
+    @property
+    def ndim(self) -> int:
+        """How many axes there are."""
+        return len(self.ranges)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the samples once they are read."""
+        return self.store.read_dtype
+
+    def __getitem__(self, index: Any) -> OnDisk:
+        parts = list(index) if isinstance(index, tuple) else [index]
+        if Ellipsis in parts:
+            place = parts.index(Ellipsis)
+            parts[place : place + 1] = [slice(None)] * (self.ndim - len(parts) + 1)
+        if not all(isinstance(part, slice) for part in parts):
+            raise TypeError("samples on disk are indexed by slices")
+        parts += [slice(None)] * (self.ndim - len(parts))
+        return OnDisk(self.store, tuple(held[part] for held, part in zip(self.ranges, parts, strict=True)))
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise TypeError(
+            f"the samples of {self.store.path} are on disk: read them with .read(), or a part by slicing"
+        )
+
+    def read(self, progress: Progress | None = None) -> NDArray[Any]:
+        """The samples, read now.
+
+        Raises:
+            InputError: what `StoredLightField` says of views, or more memory needed than there is.
+        """
+        rows, columns, pixel_rows, *rest = self.ranges
+        low, high = min(pixel_rows[0], pixel_rows[-1]), max(pixel_rows[0], pixel_rows[-1]) + 1
+        within = (
+            _slice(range(pixel_rows.start - low, pixel_rows.stop - low, pixel_rows.step)),
+            *map(_slice, rest),
+        )
+        try:
+            values: NDArray[Any] = np.empty(self.shape, self.dtype)
+        except MemoryError:
+            size = math.prod(self.shape) * self.dtype.itemsize / 1e9
+            raise InputError(
+                f"this part of {self.store.path} takes {size:.1f} GB of memory, more than there is: read less at "
+                "a time, or let camera.capture(stored, memory_limit=…) read it in pieces"
+            ) from None
+        total = len(rows) * len(columns)
+        for done, (j, i) in enumerate(np.ndindex(len(rows), len(columns)), start=1):
+            values[j, i] = self.store.linear_view(rows[j], columns[i], low, high)[within]
+            if progress is not None:
+                progress(done, total)
+        return values
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StoredLightField:
+    """A light field on disk: a part of it is read when it is asked for, and no other.
+
+    ``stored[2:4, :, 100:200]`` reads a part and gives a `vcc.LightField` in its place. Cameras take a stored light
+    field as they take one in memory; `vcc.Camera.capture` reads it in pieces within its ``memory_limit``.
+
+    Args:
+        path: folder of the store.
+        attributes: what it states; see `vcc.store.attributes.Attributes`.
+        array: the Zarr array of samples.
+    """
+
+    path: Path
+    attributes: Attributes
+    array: Any
+    _disparity: DisparityRange | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if self._disparity is None:
+            object.__setattr__(self, "_disparity", DisparityRange(self._measured))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(v, u, t, s) or (v, u, t, s, channels)."""
+        return tuple(self.array.shape)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the samples as stored; see ``transfer``."""
+        kind: np.dtype[Any] = np.dtype(self.array.dtype)
+        return kind
+
+    @property
+    def read_dtype(self) -> np.dtype[Any]:
+        """Of the samples as they are read: linear, so that sRGB codes become float32."""
+        return np.dtype(np.float32) if self.transfer == "srgb" else self.dtype
+
+    @property
+    def frame(self) -> Affine:
+        """See `vcc.LightField`."""
+        return self.attributes.frame
+
+    @property
+    def transfer(self) -> Transfer:
+        """``"linear"`` or ``"srgb"``: how stored numbers stand for light. What is read is linear always."""
+        return self.attributes.transfer
+
+    @property
+    def channels(self) -> int | None:
+        """How many colour channels there are; None for a light field without a channel axis."""
+        return self.shape[4] if len(self.shape) == 5 else None
+
+    @property
+    def channel_names(self) -> tuple[str, ...] | None:
+        """One for each channel, where stated."""
+        return self.attributes.channel_names
+
+    @property
+    def disparity_range(self) -> tuple[float, float] | None:
+        """(lowest, highest) in pixels per view along u, where stated."""
+        return self.attributes.disparity_range
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the light field comes from."""
+        return self.attributes.provenance
+
+    @property
+    def description(self) -> dict[str, Any] | None:
+        """All that the samples depend on, where stated."""
+        return self.attributes.description
+
+    @property
+    def lossy(self) -> dict[str, Any] | None:
+        """Codec, quality and measured PSNR of samples that were not kept exactly; else None."""
+        return self.attributes.lossy
+
+    @property
+    def complete(self) -> bool:
+        """Whether the store was finished: all views were written."""
+        return self.attributes.complete
+
+    @property
+    def view_bytes(self) -> int:
+        """Memory that one view takes once it is read."""
+        return math.prod(self.shape[2:]) * self.read_dtype.itemsize
+
+    @property
+    def stored_bytes(self) -> int:
+        """Bytes of all views on disk."""
+        files = (self.view_file(*view) for view in np.ndindex(*self.shape[:2]))
+        return sum(file.stat().st_size for file in files if file.is_file())
+
+    @property
+    def outline(self) -> LightField:
+        """The light field with nothing read: cameras compile it, and slicing it costs nothing."""
+        return LightField(
+            OnDisk(self, tuple(map(range, self.shape))),
+            self.frame,
+            self.disparity_range,
+            _shared_disparity=self._disparity,
+            _checked=True,
+        )
+
+    def __getitem__(self, index: Index | tuple[Index, ...]) -> LightField:
+        """A part of the light field, read now, in its place: slices along (v, u, t, s[, channel]).
+
+        Raises:
+            InputError: no such part; a view that is missing, damaged or cut off, or that holds what is no
+                radiance, named with its file; more memory needed than there is.
+        """
+        return self._read(self.outline[index])
+
+    def read(self, progress: Progress | None = None) -> LightField:
+        """All of it, in memory.
+
+        Args:
+            progress: called with (done, total) in views.
+
+        Raises:
+            InputError: as for a part.
+        """
+        return self._read(self.outline, progress)
+
+    def view(self, row: int, column: int) -> Image:
+        """One view as a picture; only its file is read. See `vcc.LightField.view`.
+
+        Raises:
+            InputError: there is no such view, or it cannot be read.
+        """
+        nv, nu = self.shape[:2]
+        if not (-nv <= row < nv and -nu <= column < nu):
+            raise InputError(f"there is no view ({row}, {column}) in a grid of {nv}×{nu} views")
+        j, i = row % nv, column % nu
+        return self[j : j + 1, i : i + 1].view(0, 0)
+
+    def scaled(self, factor: float) -> StoredLightField:
+        """The light field of the same scene in a larger world; nothing is read. See `vcc.LightField.scaled`."""
+        return replace(self, attributes=replace(self.attributes, frame=self.outline.scaled(factor).frame))
+
+    def measured_disparity_range(self) -> tuple[float, float] | None:
+        """As stated, or else measured from up to seven views in the middle. See `vcc.LightField`."""
+        return self.outline.measured_disparity_range()
+
+    def disparity_of(self, distance: float) -> float:
+        """See `vcc.LightField.disparity_of`."""
+        return self.outline.disparity_of(distance)
+
+    def distance_of(self, disparity: float) -> float:
+        """See `vcc.LightField.distance_of`."""
+        return self.outline.distance_of(disparity)
+
+    def missing(self) -> list[tuple[int, int]]:
+        """(row, column) of the views that are not there."""
+        return [(j, i) for j, i in np.ndindex(*self.shape[:2]) if not self.view_file(j, i).is_file()]
+
+    def check_complete(self) -> None:
+        """Refuse a light field of which views are missing, before long work on it.
+
+        Raises:
+            InputError: views are missing (named).
+        """
+        missing = self.missing()
+        if missing or not self.complete:
+            raise InputError(f"{self.path} is not complete: {self._count_words(missing)}")
+
+    def view_file(self, row: int, column: int) -> Path:
+        """The file that holds a view."""
+        place = (row, column) + (0,) * (len(self.shape) - 2)
+        return self.path / ARRAY / str(self.array.metadata.encode_chunk_key(place))
+
+    def linear_view(self, row: int, column: int, first: int, stop: int) -> NDArray[Any]:
+        """Rows of pixels of one view as they are stored, or linear float32 of sRGB codes.
+
+        Args:
+            row: of views.
+            column: of views.
+            first: row of pixels.
+            stop: the row of pixels after the last.
+
+        Returns:
+            Shape (rows, columns[, channels]).
+
+        Raises:
+            InputError: the view is missing, its file is damaged or cut off, or it holds what is no radiance.
+        """
+        samples = self.stored_view(row, column, first, stop)
+        return decode(samples) if self.transfer == "srgb" else samples
+
+    def stored_view(self, row: int, column: int, first: int, stop: int) -> NDArray[Any]:
+        """As `linear_view`, always as stored."""
+        file = self.view_file(row, column)
+        if not file.is_file():
+            raise InputError(
+                f"view ({row}, {column}) is missing in {self.path}: there is no file {file}. "
+                + ("Copy or make the store again" if self.complete else self._count_words(self.missing()))
+            )
+        try:
+            samples = np.asarray(self.array[row, column, first:stop])
+            self._check_index(file)
+        except MemoryError:
+            raise
+        except Exception as error:
+            raise InputError(
+                f"view ({row}, {column}) of {self.path} cannot be read: {file} is damaged or cut off ({error}). "
+                "Copy the file again; or delete it and make this view again"
+            ) from None
+        if samples.dtype.kind == "f" and not (samples.min() >= 0 and np.isfinite(samples.max())):
+            raise InputError(
+                f"view ({row}, {column}) of {self.path} holds samples that are NaN, infinite or negative, which "
+                f"no radiance is: {file}. Make this view again"
+            )
+        return samples
+
+    def _check_index(self, file: Path) -> None:
+        """Refuse a file of which a chunk was never written: Zarr reads zeros there.
+
+        Raises:
+            ValueError: what is wrong.
+        """
+        if self.array.shards is None:
+            return
+        chunks = math.prod(math.ceil(s / c) for s, c in zip(self.array.shards, self.array.chunks, strict=True))
+        size, index_size = file.stat().st_size, 16 * chunks + 4
+        at_end = _sharding(self.array).get("index_location", "end") == "end"
+        with file.open("rb") as stream:
+            stream.seek(size - index_size if at_end else 0)
+            index = np.frombuffer(stream.read(index_size)[: 16 * chunks], dtype="<u8").reshape(chunks, 2)
+        absent = int((index[:, 0] == NOT_THERE).sum())
+        if absent:
+            raise ValueError(f"{absent} of its {chunks} chunks were never written")
+
+    def _count_words(self, missing: list[tuple[int, int]]) -> str:
+        """What is missing, in words."""
+        total = self.shape[0] * self.shape[1]
+        if not missing:
+            return f"all {total} views are there, but the store was not finished: go on with what makes it"
+        named = ", ".join(map(str, missing[:8])) + (", …" if len(missing) > 8 else "")
+        way_out = "Copy or make the store again" if self.complete else "Go on with what makes it"
+        return (
+            f"{len(missing)} of its {total} views are missing, by (row, column): {named}. {way_out}; or take a "
+            "part that is complete, stored[a:b, c:d]"
+        )
+
+    def _read(self, outline: LightField, progress: Progress | None = None) -> LightField:
+        return replace(outline, values=outline.values.read(progress), _checked=True)
+
+    def _measured(self) -> tuple[float, float] | None:
+        from vcc.parallax import disparity_range
+
+        nv, nu, nt = self.shape[:3]
+        middle = [slice(n // 2, n // 2 + 1) for n in (nv, nu)]
+        along = 1 if nu > 1 else 0
+        n = self.shape[along]
+        middle[along] = slice(max(n // 2 - MEASURED_REACH, 0), n // 2 + MEASURED_REACH + 1)
+        views = min(n, 2 * MEASURED_REACH + 1)
+        rows = min(nt, max(MEASURED_BYTES * nt // (views * self.view_bytes), 64))
+        first = (nt - rows) // 2
+        return disparity_range(self.outline[middle[0], middle[1], first : first + rows].values.read())
+
+    def __repr__(self) -> str:
+        sizes = "×".join(map(str, self.shape))
+        state = "" if self.complete else ", not complete"
+        return (
+            f"StoredLightField({self.path}: {sizes} {self.dtype}, {self.transfer}, "
+            f"{describe_geometry(self.outline)}{state})"
+        )
+
+
+def open_store(path: str | PathLike[str]) -> StoredLightField:
+    """A light field on disk, opened without reading its samples.
+
+    Args:
+        path: folder of the store.
+
+    Raises:
+        InputError: no such folder, no Zarr v3 group, not one of a light field, a newer version, or attributes or
+            an array that cannot be used (named).
+    """
+    folder = Path(path).expanduser()
+    array, attributes = read_metadata(folder)
+    shape, kind = tuple(array.shape), np.dtype(array.dtype)
+    where = folder / ARRAY
+    if len(shape) not in (4, 5) or 0 in shape:
+        raise InputError(f"{where}: samples have the axes (v, u, t, s[, channel]), not the shape {shape}")
+    if kind.name not in DTYPES:
+        raise InputError(f"{where}: samples are {', '.join(DTYPES)}, not {kind}")
+    if attributes.transfer == "srgb" and kind.kind != "u":
+        raise InputError(f'{folder}: transfer is "srgb", and the samples are {kind}: only integers are sRGB codes')
+    attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
+    file = tuple(array.shards or array.chunks)
+    if file[:2] != (1, 1) or any(part < size for part, size in zip(file[2:], shape[2:], strict=True)):
+        raise InputError(
+            f"{where}: each view is a file of its own (a shard of 1, 1 and the size of a view), not "
+            f"shards of {file}"
+        )
+    if array.shards is not None:
+        index = [codec.get("name") for codec in _sharding(array).get("index_codecs", [])]
+        if index != ["bytes", "crc32c"]:
+            raise InputError(f"{where}: index_codecs of the shards are bytes and crc32c, not {index}")
+    return StoredLightField(folder, attributes, array)
+
+
+def is_store(path: str | PathLike[str]) -> bool:
+    """Whether a path is a Zarr group, of version 3 or older: what `open_store` has something to say about."""
+    folder = Path(path).expanduser()
+    return any((folder / name).is_file() for name in ("zarr.json", ".zgroup", ".zarray"))
+
+
+def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
+    """The Zarr array of samples and the attributes.
+
+    Raises:
+        InputError: as `open_store`.
+    """
+    if not folder.exists():
+        raise InputError(f"there is no store {folder}")
+    if not is_store(folder):
+        raise InputError(
+            f"{folder} is no light field in a Zarr store: {'it is a file' if folder.is_file() else 'it'} "
+            f"{'' if folder.is_file() else 'holds no zarr.json'}"
+        )
+    if not (folder / "zarr.json").is_file():
+        raise InputError(f"{folder} is Zarr version 2; a light field is kept in version 3. Convert it with zarr")
+    stated = _json(folder / "zarr.json")
+    if stated.get("zarr_format") != 3 or stated.get("node_type") != "group":
+        raise InputError(
+            f"{folder / 'zarr.json'}: zarr_format {stated.get('zarr_format')!r}, node_type "
+            f"{stated.get('node_type')!r}; a light field is a group of version 3"
+        )
+    attributes = Attributes.from_json((stated.get("attributes") or {}).get(KEY), folder)
+    where = folder / ARRAY / "zarr.json"
+    if not where.is_file():
+        raise InputError(f'{folder} has no array "{ARRAY}": {where} is missing')
+    if attributes.lossy is not None or "vcc.picture" in where.read_text(encoding="utf-8"):
+        from vcc.store import picture_codec  # noqa: F401  # Zarr then knows the codec
+    import zarr
+
+    try:
+        array = zarr.open_array(
+            store=zarr.storage.LocalStore(folder, read_only=mode == "r"), path=ARRAY, mode=mode
+        )
+        if array.metadata.zarr_format != 3:
+            raise ValueError(f"it has zarr_format {array.metadata.zarr_format}")
+    except Exception as error:
+        raise InputError(f"{where} cannot be used: {error}") from None
+    return array, attributes
+
+
+def _json(file: Path) -> dict[str, Any]:
+    try:
+        stated = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file} cannot be read: {error}") from None
+    if not isinstance(stated, dict):
+        raise InputError(f"{file} holds no JSON object")
+    return stated
+
+
+def _sharding(array: Any) -> dict[str, Any]:
+    """The configuration of an array's sharding codec; empty for none."""
+    for codec in array.metadata.to_dict()["codecs"]:
+        if codec["name"] == "sharding_indexed":
+            return dict(codec["configuration"])
+    return {}
+
+
+def _slice(part: range) -> slice:
+    """The slice that takes a range of indices from an axis that begins at 0."""
+    stop = None if part.stop < 0 else part.stop
+    return slice(part.start, stop, part.step)

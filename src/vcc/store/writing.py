@@ -1,0 +1,456 @@
+"""Making a store: view by view, each there as a whole or not at all, so that work can go on where it stopped."""
+
+from __future__ import annotations
+
+import math
+import os
+import secrets
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.light_field import LightField
+from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
+from vcc.store.compression import Compression, Lossless, Lossy, layout
+from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata
+
+if TYPE_CHECKING:
+    from typing import Self
+
+Progress = Callable[[int, int], None]
+SETTINGS = "settings"
+"""Under which the description of a store keeps how it was made, beside what the maker said."""
+
+
+class Framed(Protocol):
+    """What says where views are, such as `vcc.sources.CameraArray`."""
+
+    @property
+    def frame(self) -> Affine:
+        """From indices to rays."""
+        ...
+
+
+@dataclass
+class StoreWriter:
+    """Writes the views of a store, in any order; use it in a ``with`` block or plainly.
+
+    A view is written under a temporary name and renamed, so that after a kill a view is there as a whole or not at
+    all. Made by `create_store`.
+    """
+
+    path: Path
+    attributes: Attributes
+    array: Any
+    compression: Compression
+    _errors: dict[tuple[int, int], float] = field(default_factory=dict)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(v, u, t, s) or (v, u, t, s, channels)."""
+        return tuple(self.array.shape)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the samples as stored."""
+        kind: np.dtype[Any] = np.dtype(self.array.dtype)
+        return kind
+
+    def has_view(self, row: int, column: int) -> bool:
+        """Whether a view is there."""
+        return self._reader.view_file(row, column).is_file()
+
+    def missing(self) -> list[tuple[int, int]]:
+        """(row, column) of the views that are not there yet, row by row."""
+        return self._reader.missing()
+
+    def write_view(self, row: int, column: int, samples: NDArray[Any]) -> None:
+        """Write one view; it is there when this returns.
+
+        Args:
+            row: of views, 0 at the top.
+            column: of views, 0 at the left.
+            samples: shape (rows, columns[, channels]), of the store's type. Floating-point samples are brought to
+                a floating-point store's precision.
+
+        Raises:
+            InputError: the store is finished; there is no such view; another shape or type; samples that are NaN,
+                infinite, negative or too large; the disk refuses (full, no permission). Views written before stay.
+        """
+        nv, nu = self.shape[:2]
+        if not (0 <= row < nv and 0 <= column < nu):
+            raise InputError(f"there is no view ({row}, {column}) in a store of {nv}×{nu} views")
+        if self.attributes.complete:
+            raise InputError(f"{self.path} is finished: its views stay as they are")
+        view = self._fitting(np.asarray(samples), f"view ({row}, {column}) for {self.path}")
+        try:
+            self.array[row, column] = view
+        except OSError as error:
+            kept = nv * nu - len(self.missing())
+            raise InputError(
+                f"view ({row}, {column}) could not be written to {self.path}: {error.strerror or error}. "
+                f"{kept} of {nv * nu} views are kept: make room or get permission, and go on"
+            ) from error
+        if isinstance(self.compression, Lossy):
+            kept_as = self._reader.stored_view(row, column, 0, self.shape[2])
+            difference = kept_as.astype(np.float64) - view
+            self._errors[row, column] = float(np.mean(difference * difference))
+
+    def finish(self) -> StoredLightField:
+        """Say that all views are there, and open the store.
+
+        Raises:
+            InputError: views are missing (named), or the disk refuses.
+        """
+        if self.attributes.complete:
+            return open_store(self.path)
+        missing = self.missing()
+        if missing:
+            named = ", ".join(map(str, missing[:8])) + (", …" if len(missing) > 8 else "")
+            raise InputError(
+                f"{self.path} cannot be finished: {len(missing)} of {self.shape[0] * self.shape[1]} views are "
+                f"missing, by (row, column): {named}"
+            )
+        self.attributes = self.attributes.finished(self._measured_loss())
+        _write_attributes(self.path, self.attributes)
+        return open_store(self.path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Nothing is open, and nothing is finished: an unfinished store is one to go on with."""
+
+    @property
+    def _reader(self) -> StoredLightField:
+        return StoredLightField(self.path, self.attributes, self.array)
+
+    def _fitting(self, samples: NDArray[Any], what: str) -> NDArray[Any]:
+        """Samples of the store's shape and type."""
+        if samples.shape != self.shape[2:]:
+            raise InputError(f"{what} has the shape {samples.shape}, and the store's views have {self.shape[2:]}")
+        if samples.dtype != self.dtype and not (samples.dtype.kind == "f" and self.dtype.kind == "f"):
+            raise InputError(f"{what} is {samples.dtype}, and the store keeps {self.dtype}: convert it before")
+        if self.dtype.kind != "f":
+            return samples
+        lowest, highest = samples.min(), samples.max()  # a NaN anywhere makes both NaN
+        if not (lowest >= 0 and np.isfinite(highest)):
+            raise InputError(f"{what} holds samples that are NaN, infinite or negative, which no radiance is")
+        if highest > np.finfo(self.dtype).max:
+            raise InputError(
+                f"{what} holds radiance of {highest:g}, and {self.dtype} ends at {np.finfo(self.dtype).max:g}: "
+                'pass dtype="float32"'
+            )
+        return samples.astype(self.dtype, copy=False)
+
+    def _measured_loss(self) -> dict[str, Any] | None:
+        """What lossy compression did to the views that this writer wrote: PSNR in dB, peak the full scale."""
+        if not isinstance(self.compression, Lossy):
+            return None
+        stated: dict[str, Any] = {"codec": self.compression.codec, "quality": self.compression.quality}
+        if self._errors:
+            worst = max(self._errors, key=lambda view: self._errors[view])
+            stated |= {
+                "psnr": self._decibels(sum(self._errors.values()) / len(self._errors)),
+                "worst_psnr": self._decibels(self._errors[worst]),
+                "worst_view": list(worst),
+                "measured_views": len(self._errors),
+            }
+        return stated
+
+    def _decibels(self, mean_square: float) -> float:
+        peak = float(np.iinfo(self.dtype).max)
+        return math.inf if mean_square == 0 else 10 * math.log10(peak * peak / mean_square)
+
+
+def create_store(
+    path: str | PathLike[str],
+    cameras_or_frame: Framed | Affine,
+    shape: tuple[int, ...],
+    dtype: DTypeLike,
+    *,
+    provenance: dict[str, Any],
+    description: dict[str, Any] | None = None,
+    transfer: Transfer = "linear",
+    channel_names: tuple[str, ...] | None = None,
+    disparity_range: tuple[float, float] | None = None,
+    chunks: int | None = None,
+    compression: Compression | None = None,
+) -> StoreWriter:
+    """A store to write views to: a new one, or one of the same description that is gone on with.
+
+    Args:
+        path: folder of the store; made, or there and empty, or there and a store of the same description.
+        cameras_or_frame: where the views are: a `vcc.sources.CameraArray`, or a frame (see `vcc.LightField`).
+        shape: (v, u, t, s) or (v, u, t, s, channels).
+        dtype: ``"uint8"``, ``"uint16"``, ``"float16"`` or ``"float32"``, as samples are stored.
+        provenance: where the light field comes from, as JSON can hold it.
+        description: all that the samples depend on, as JSON can hold it. Without one a store is not gone on with.
+        transfer: ``"linear"``, or ``"srgb"`` for integers that are sRGB codes (read as linear float32).
+        channel_names: one for each channel.
+        disparity_range: (lowest, highest), pixels per view along u, where known.
+        chunks: rows of pixels that are packed together; None takes what is about 128 KiB.
+        compression: `Lossless` or `Lossy`; None is ``Lossless()``.
+
+    Returns:
+        The writer. Where all views are there and the store is finished, it has none missing.
+
+    Raises:
+        InputError: a shape, type or attribute that no light field has; a path that is something else; a store of
+            another description (what differs is named); the disk refuses.
+    """
+    folder = Path(path).expanduser()
+    frame = cameras_or_frame if isinstance(cameras_or_frame, Affine) else cameras_or_frame.frame
+    kind, packing = np.dtype(dtype), compression or Lossless()
+    shape = tuple(int(n) for n in shape)
+    _check(folder, shape, kind, transfer, packing)
+    settings = {
+        "frame": frame.matrix.tolist(),
+        "shape": list(shape),
+        "dtype": kind.name,
+        "transfer": transfer,
+        "channel_names": None if channel_names is None else list(channel_names),
+        "disparity_range": None if disparity_range is None else list(disparity_range),
+        "compression": packing.words,
+        "chunks": chunks,
+    }
+    made = None if description is None else {"maker": description, SETTINGS: settings}
+    attributes = Attributes(
+        frame,
+        transfer,
+        None if channel_names is None else tuple(channel_names),
+        None if disparity_range is None else (float(disparity_range[0]), float(disparity_range[1])),
+        provenance,
+        None if made is None else plain(made, "description"),
+    )
+    attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
+    attributes.as_json()  # refuses what JSON cannot hold, before anything is made
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        return _continued(folder, attributes, packing)
+    _make(folder, attributes, shape, kind, packing, chunks)
+    array, _ = read_metadata(folder, "r+")
+    return StoreWriter(folder, attributes, _writable(array), packing)
+
+
+def save_store(
+    light_field: LightField,
+    path: str | PathLike[str],
+    *,
+    provenance: dict[str, Any] | None = None,
+    transfer: Transfer = "linear",
+    channel_names: tuple[str, ...] | None = None,
+    chunks: int | None = None,
+    compression: Compression | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> StoredLightField:
+    """Write a light field to a store. It appears whole or not at all.
+
+    Args:
+        light_field: of uint8, uint16, float16 or float32 samples.
+        path: folder of the store.
+        provenance: where the light field comes from, as JSON can hold it.
+        transfer: ``"srgb"`` if integer samples are not linear but sRGB codes.
+        channel_names: see `create_store`, likewise the next two.
+        chunks: see there.
+        compression: see there.
+        overwrite: replace a store of that name; it stays until the new one is whole.
+        progress: called with (done, total) in views.
+
+    Raises:
+        InputError: the path exists (and is no store, or is not to be replaced), or what `create_store` and
+            `StoreWriter.write_view` refuse.
+    """
+    from vcc import __version__
+    from vcc.sampled import to_numpy
+
+    values = to_numpy(light_field.values)
+    return write_views(
+        Path(path).expanduser(),
+        light_field.frame,
+        tuple(values.shape),
+        values.dtype,
+        lambda j, i: values[j, i],
+        overwrite=overwrite,
+        progress=progress,
+        provenance={"written_by": f"vcc {__version__}"} if provenance is None else provenance,
+        transfer=transfer,
+        channel_names=channel_names,
+        disparity_range=disparities_of(light_field),
+        chunks=chunks,
+        compression=compression,
+    )
+
+
+def write_views(
+    folder: Path,
+    frame: Affine,
+    shape: tuple[int, ...],
+    kind: np.dtype[Any],
+    view: Callable[[int, int], NDArray[Any]],
+    *,
+    overwrite: bool,
+    progress: Progress | None,
+    **stated: Any,
+) -> StoredLightField:
+    """Write a whole store under a temporary name and rename it.
+
+    Args:
+        folder: of the store.
+        frame: see `create_store`, likewise shape and kind.
+        shape: see there.
+        kind: see there.
+        view: gives the samples of view (row, column).
+        overwrite: see `save_store`.
+        progress: see there.
+        stated: further arguments of `create_store`.
+
+    Raises:
+        InputError: see `save_store`.
+    """
+    if os.path.lexists(folder):
+        _check_replaceable(folder, overwrite)
+    part = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
+    try:
+        with create_store(part, frame, shape, kind, **stated) as writer:
+            total = shape[0] * shape[1]
+            for done, (j, i) in enumerate(np.ndindex(*shape[:2]), start=1):
+                writer.write_view(j, i, view(j, i))
+                if progress is not None:
+                    progress(done, total)
+            writer.finish()
+        _put_in_place(part, folder)
+    except InputError as error:
+        raise InputError(str(error).replace(str(part), str(folder))) from error.__cause__
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return open_store(folder)
+
+
+def _check(folder: Path, shape: tuple[int, ...], kind: np.dtype[Any], transfer: str, packing: Compression) -> None:
+    if len(shape) not in (4, 5) or min(shape) < 1:
+        raise InputError(f"{folder}: a store has the shape (v, u, t, s[, channels]), each 1 or more, not {shape}")
+    if kind.name not in DTYPES:
+        raise InputError(f"{folder}: samples are stored as {', '.join(DTYPES)}, not {kind}: convert them before")
+    if transfer == "srgb" and kind.kind != "u":
+        raise InputError(f'{folder}: transfer="srgb" is for integer codes, and the samples are {kind}')
+    if isinstance(packing, Lossy):
+        packing.check(kind, shape[4] if len(shape) == 5 else None)
+
+
+def _make(
+    folder: Path,
+    attributes: Attributes,
+    shape: tuple[int, ...],
+    kind: np.dtype[Any],
+    packing: Compression,
+    chunks: int | None,
+) -> None:
+    """Make the group and its array under a temporary name and rename it: a store is there or it is not."""
+    import zarr
+
+    if not folder.parent.is_dir():
+        raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
+    cut = layout(shape, kind, packing, chunks)
+    part = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.new")
+    try:
+        store = zarr.storage.LocalStore(part)
+        group = zarr.create_group(store, attributes={KEY: attributes.as_json()})
+        group.create_array(
+            ARRAY,
+            shape=shape,
+            dtype=kind,
+            fill_value=0,
+            dimension_names=AXES[: len(shape)],
+            **cut,
+        )
+        part.replace(folder)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be made: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _writable(array: Any) -> Any:
+    """The array, writing chunks that are all dark like others: what is not there is missing."""
+    return array.with_config({"write_empty_chunks": True})
+
+
+def _continued(folder: Path, wanted: Attributes, packing: Compression) -> StoreWriter:
+    """The writer of a store that is there already."""
+    if not folder.is_dir() or not is_store(folder):
+        raise InputError(f"{folder} is there already, and is no store: choose another name")
+    array, found = read_metadata(folder, "r+")
+    if wanted.description is None or found.description is None:
+        raise InputError(
+            f"{folder} is there already{'' if found.complete else ', not finished'}, and without a description of "
+            "what its views depend on it is not gone on with: remove it, or choose another name"
+        )
+    if not same(wanted.description, found.description):
+        raise InputError(
+            f"{folder} was made from another description, and views of two are never mixed. "
+            f"{_difference(found.description, wanted.description)}. Remove it, or choose another name"
+        )
+    for left in (folder / ARRAY).rglob("*.partial"):  # of a run that was killed
+        left.unlink(missing_ok=True)
+    return StoreWriter(folder, found, _writable(array), packing)
+
+
+def _difference(there: Any, wanted: Any, name: str = "") -> str:
+    """Where two descriptions differ first, in words."""
+    if isinstance(there, dict) and isinstance(wanted, dict):
+        for key in [*there, *(key for key in wanted if key not in there)]:
+            if not same(there.get(key), wanted.get(key)):
+                inner = name if not name and key in ("maker", SETTINGS) else f"{name}.{key}".lstrip(".")
+                return _difference(there.get(key), wanted.get(key), inner)
+    one, other = (text if len(text) < 200 else f"{text[:197]}…" for text in (f"{there!r}", f"{wanted!r}"))
+    return f"{name} is {one} there and {other} now"
+
+
+def _write_attributes(folder: Path, attributes: Attributes) -> None:
+    import zarr
+
+    try:
+        group = zarr.open_group(store=zarr.storage.LocalStore(folder), mode="r+")
+        group.attrs[KEY] = attributes.as_json()
+    except OSError as error:
+        raise InputError(
+            f"{folder} could not be finished: {error.strerror or error}. All views are kept"
+        ) from error
+
+
+def _check_replaceable(folder: Path, overwrite: bool) -> None:
+    if not overwrite:
+        raise InputError(f"{folder} is there already: choose another name, or pass overwrite=True")
+    if folder.is_symlink() or not (folder.is_dir() and is_store(folder)):
+        raise InputError(f"{folder} is there already and is no store: it is not overwritten. Choose another name")
+
+
+def _put_in_place(part: Path, folder: Path) -> None:
+    """Rename a finished store to its name; what was there goes once the new one stands."""
+    old = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.old")
+    try:
+        if folder.exists():
+            folder.replace(old)
+        part.replace(folder)
+    except OSError as error:
+        if old.exists() and not folder.exists():
+            old.replace(folder)
+        raise InputError(f"{folder} could not be written: {error.strerror or error}") from error
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def disparities_of(light_field: LightField) -> tuple[float, float] | None:
+    """The disparity range that a light field states, in its own steps."""
+    return None if light_field.disparity_range is None else light_field.measured_disparity_range()

@@ -1,0 +1,234 @@
+"""The picture of a light field on disk is the picture of the same light field in memory, however it is cut.
+
+The oracle is linearity: the picture made of all samples at once. Tolerance 1e-5 of the brightest pixel, as in
+tests/physics/test_chunks.py: float32 sums in another order take about 1e-6 (measured here: 3e-7).
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import vcc
+from vcc.engines import pieces
+from vcc.engines.pieces import Block, Blocks
+from vcc.patterns import CosineSum
+from vcc.store import open_store, save_store
+from vcc.units import mm
+
+pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+
+SHAPE = (4, 5, 14, 16)
+FOCUS = 1 / (1 / 50e-3 - 1)
+LENS = vcc.Lens(focal_length=50 * mm, diameter=7 * mm)
+SENSOR = vcc.Sensor(FOCUS, (12, 14), FOCUS * 3e-3)
+FINE_MASK = vcc.Mask(pattern=CosineSum((0.5 * mm, 0.6 * mm), 1, 0.3), z=0.96 * FOCUS)
+COARSE_MASK = vcc.Mask(pattern=CosineSum((7 * mm, 5 * mm), 1, 0.3), z=FOCUS / 2)
+CAMERAS = {
+    "fine mask near the sensor": (vcc.Camera([LENS, FINE_MASK], SENSOR), {}),
+    "strong defocus": (vcc.Camera([LENS], vcc.Sensor(40 * mm, (60, 60), 40 * mm * 1e-3)), {}),
+    "diffuser at the views": (
+        vcc.Camera([LENS, vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.004)), COARSE_MASK], SENSOR),
+        {"method": "footprints"},
+    ),
+    "rays through an array of lenses": (
+        vcc.Camera([LENS, vcc.LensArray(focal_length=2 * mm, pitch=1 * mm, z=FOCUS - 3 * mm)], SENSOR),
+        {"samples": 8},
+    ),
+    "rays, each view its cell": (
+        vcc.Camera([LENS], SENSOR),
+        {"method": "rays", "between_views": "none", "samples": 8},
+    ),
+}
+CUTS = {"rows of views": (2, 5, 14), "blocks of views": (1, 2, 14), "rows of pixels": (1, 1, 5)}
+FRAMES = {
+    "upright": np.eye(5),
+    "turned by a right angle": np.array(
+        [[0, -1, 0, 0, 0], [1, 0, 0, 0, 0], [0, 0, 0, -1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 1]]
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=list(FRAMES))
+def light_fields(request, tmp_path_factory):
+    """(in memory, on disk)"""
+    samples = np.random.default_rng(0).random((*SHAPE, 3)).astype(np.float32)
+    upright = vcc.LightField.from_views(samples, 2 * mm, 2e-3, 1.0, disparity_range=(-0.3, 0.2))
+    given = upright.transformed(vcc.Affine(FRAMES[request.param]))
+    return given, save_store(given, tmp_path_factory.mktemp("store") / "a.zarr", chunks=4)
+
+
+def cut_as(monkeypatch, each):
+    def cut(plan, light_field, engine, limit):
+        rows, columns = (0, SHAPE[0]), (0, SHAPE[1])
+        if hasattr(plan, "view_rows"):
+            rows, columns = pieces._looked_at(plan.view_rows), pieces._looked_at(plan.view_columns)
+        return Blocks(rows, columns, SHAPE[2], *each)
+
+    monkeypatch.setattr(pieces, "cut", cut)
+
+
+@pytest.mark.parametrize("each", list(CUTS))
+@pytest.mark.parametrize("name", list(CAMERAS))
+def test_pieces_add_up(light_fields, monkeypatch, name, each):
+    in_memory, on_disk = light_fields
+    camera, options = CAMERAS[name]
+    whole = camera.capture(in_memory, **options)
+    cut_as(monkeypatch, CUTS[each])
+    picture = camera.capture(on_disk, **options)
+    assert picture.values.dtype == whole.values.dtype
+    np.testing.assert_allclose(picture.values, whole.values, rtol=0, atol=1e-5 * whole.values.max())
+    # Rays are the same ones, so that what is said of them is the same too.
+    assert picture.missing_rays == pytest.approx(whole.missing_rays, abs=1e-9)
+    assert picture.sampling_error == pytest.approx(whole.sampling_error, rel=1e-4)
+
+
+def test_the_cameras_here_do_what_their_names_say(light_fields):
+    plans = {name: camera.compile(light_fields[1], **options) for name, (camera, options) in CAMERAS.items()}
+    assert plans["fine mask near the sensor"].refine > 1
+    assert plans["diffuser at the views"].view_blur is not None
+    turned = abs(light_fields[0].frame.linear[2, 2]) < 1e-9
+    assert plans["strong defocus"].swap_pixel_axes == turned
+    # Turned, disparities along u say nothing of distances, and no gap is filled.
+    assert turned or max(plans["strong defocus"].smear) > 1
+
+
+def test_a_tolerance_doubles_the_same_rays(light_fields, monkeypatch):
+    in_memory, on_disk = light_fields
+    camera = CAMERAS["rays through an array of lenses"][0]
+    whole = camera.capture(in_memory, samples=8, tolerance=0.05)
+    cut_as(monkeypatch, CUTS["rows of views"])
+    picture = camera.capture(on_disk, samples=8, tolerance=0.05)
+    np.testing.assert_allclose(picture.values, whole.values, rtol=0, atol=1e-5 * whole.values.max())
+    assert picture.sampling_error == pytest.approx(whole.sampling_error, rel=1e-4)
+    assert picture.sampling_error <= 0.05 * picture.values.mean()
+
+
+@pytest.mark.parametrize("kind", ["uint8", "float16"])
+@pytest.mark.parametrize("engine", ["numba", "array_api", "reference"])
+def test_all_engines_and_types(tmp_path, monkeypatch, engine, kind):
+    values = np.random.default_rng(0).random(SHAPE) * (255 if kind == "uint8" else 1)
+    given = vcc.LightField.from_views(values.astype(kind), 2 * mm, 2e-3, 1.0, disparity_range=(-0.3, 0.2))
+    stored = save_store(given, tmp_path / "a.zarr")
+    cut_as(monkeypatch, CUTS["blocks of views"])
+    for name in ("fine mask near the sensor", "rays, each view its cell"):
+        camera, options = CAMERAS[name]
+        whole = camera.capture(given, engine=engine, **options).values
+        picture = camera.capture(stored, engine=engine, **options).values
+        np.testing.assert_allclose(picture, whole, rtol=0, atol=1e-5 * whole.max())
+
+
+def test_views_that_no_light_comes_through_are_not_read(light_fields, monkeypatch):
+    """A lens of 3 mm over views 2 mm apart meets the cells of the middle ones alone."""
+    _, on_disk = light_fields
+    read = set()
+    linear_view = type(on_disk).linear_view
+
+    def noted(self, row, column, *rows):
+        read.add((row, column))
+        return linear_view(self, row, column, *rows)
+
+    monkeypatch.setattr(type(on_disk), "linear_view", noted)
+    vcc.Camera([vcc.Lens(focal_length=50 * mm, diameter=3 * mm)], SENSOR).capture(on_disk)
+    assert 0 < len(read) < 20
+    assert (0, 0) not in read
+
+
+def test_progress_counts_views(light_fields):
+    calls = []
+    camera, options = CAMERAS["rays, each view its cell"]
+    camera.capture(light_fields[1], progress=lambda *call: calls.append(call), **options)
+    assert calls == [(n, 20) for n in range(1, 21)]
+
+
+# --- memory ---
+
+
+def test_blocks_cover_each_sample_once():
+    blocks = Blocks((1, 4), (0, 5), 14, 2, 3, 6)
+    seen = np.zeros((4, 5, 14), dtype=int)
+    for block in blocks:
+        assert isinstance(block, Block)
+        assert block.views <= 6
+        seen[slice(*block.rows), slice(*block.columns), slice(*block.pixel_rows)] += 1
+    assert (seen[1:] == 1).all()
+    assert not seen[0].any()
+
+
+@pytest.mark.parametrize("method", ["footprints", "rays"])
+def test_blocks_keep_to_the_limit(tmp_path, method):
+    """Counted by hand: samples of a block with its border, and what is said to be taken beside them."""
+    shape = (9, 11, 300, 200, 3)
+    values = np.broadcast_to(np.float32(0.5), shape)
+    stored = save_store(vcc.LightField.from_views(values, 1 * mm, 1e-3, 1.0, (0.0, 0.0)), tmp_path / "a.zarr")
+    camera = vcc.Camera([vcc.Lens(focal_length=50 * mm, diameter=11 * mm)], vcc.Sensor(FOCUS, (30, 20), 1e-5))
+    plan = camera.compile(stored, method=method)
+    fixed, view = pieces._fixed(plan, stored.outline), stored.view_bytes
+    assert view == 300 * 200 * 3 * 4
+    least = fixed + 20 * view / 300
+    for limit in np.geomspace(least * 1.01, fixed + 150 * view, 12):
+        border = 2 if method == "rays" else 0
+        blocks = pieces.cut(plan, stored, None, limit)
+        whole = (blocks.rows_each, blocks.columns_each) == (9, 11)
+        rows, columns = (blocks.rows_each, blocks.columns_each) if whole else (
+            blocks.rows_each + border,
+            blocks.columns_each + (border if blocks.columns_each < 11 else 0),
+        )  # fmt: skip
+        samples = rows * columns * view * blocks.pixel_rows_each / 300
+        assert fixed + samples <= limit
+    assert (blocks.rows_each, blocks.columns_each, blocks.pixel_rows_each) == (9, 11, 300)
+    with pytest.raises(vcc.InputError, match="is too little: this picture takes"):
+        pieces.cut(plan, stored, None, fixed)
+
+
+def test_a_limit_cuts_and_the_picture_stays(tmp_path):
+    values = np.random.default_rng(0).random((5, 6, 64, 64, 3)).astype(np.float32)
+    given = vcc.LightField.from_views(values, 1 * mm, 1e-3, 1.0, (0.0, 0.0))
+    stored = save_store(given, tmp_path / "a.zarr")
+    camera = vcc.Camera([vcc.Lens(focal_length=50 * mm, diameter=6 * mm)], vcc.Sensor(FOCUS, (40, 40), 6e-5))
+    plan = camera.compile(stored)
+    limit = pieces._fixed(plan, stored.outline) + 12 * stored.view_bytes
+    assert 1 < len(list(pieces.cut(plan, stored, None, limit))) < 20
+    whole = camera.capture(given).values
+    np.testing.assert_allclose(camera.capture(stored, memory_limit=limit).values, whole, atol=1e-5 * whole.max())
+    words = camera.explain(stored, memory_limit=limit)
+    assert "Light field on disk\n  read in" in words
+    assert "blocks of up to" in words
+    assert words.expected_seconds > 0
+    assert "one block of" in camera.explain(stored)
+    assert camera.explain(stored, method="rays").expected_seconds is None
+
+
+def test_what_cannot_be_is_refused(light_fields):
+    _, on_disk = light_fields
+    camera = CAMERAS["strong defocus"][0]
+    for limit in (0, -5, "much"):
+        with pytest.raises(vcc.InputError, match="memory_limit is a number of bytes above 0"):
+            camera.capture(on_disk, memory_limit=limit)
+    with pytest.raises(vcc.InputError, match="memory_limit=1000 bytes is too little"):
+        camera.capture(on_disk, memory_limit=1000)
+    with pytest.raises(vcc.InputError, match="tolerance is for pictures made by rays"):
+        camera.capture(on_disk, tolerance=0.1)
+    with pytest.raises(vcc.InputError, match=r"stored\.read\(\)"):
+        camera.light_field_at(on_disk, 0.0)
+    with pytest.raises(vcc.InputError, match="greater than 0"):
+        camera.capture(on_disk, method="rays", tolerance=-1)
+
+
+def test_electronics_take_it_too(light_fields):
+    in_memory, on_disk = light_fields
+    sensor = vcc.Sensor(FOCUS, (12, 14), FOCUS * 3e-3, electronics=vcc.Electronics(full_well=10_000))
+    camera = vcc.Camera([LENS], sensor)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.ResultWarning)
+        one, other = (camera.expose(open_or_not, "auto", seed=3) for open_or_not in (in_memory, on_disk))
+    assert one.exposure == pytest.approx(other.exposure, rel=1e-5)
+
+
+def test_opened_again_it_is_the_same(light_fields):
+    _, on_disk = light_fields
+    camera, options = CAMERAS["strong defocus"]
+    one, other = (camera.capture(each, **options).values for each in (on_disk, open_store(on_disk.path)))
+    np.testing.assert_array_equal(one, other)
