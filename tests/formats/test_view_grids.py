@@ -82,6 +82,11 @@ def test_names_with_row_and_column(name: Callable, views: Views, folder_of: Writ
     np.testing.assert_array_equal(field.values, views)
 
 
+def test_folders_of_any_name(views: Views, folder_of: Write) -> None:
+    folder = folder_of(views, lambda j, i: f"größe 日本 {j}_{i}.png", where="mit Leerzeichen und Ümlaut")
+    np.testing.assert_array_equal(open_light_field(folder, transfer="linear", **GIVEN).values, views)
+
+
 def test_srgb_becomes_linear_light(views: Views, folder_of: Write) -> None:
     field = open_light_field(folder_of(views, generic), **GIVEN)
     assert field.values.dtype == np.float32
@@ -350,15 +355,21 @@ def test_no_such_folder(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_text("")
     with refused(r"holds 1 files, for instance a\.png"):
         open_light_field(tmp_path)
-    with refused(r"a\.png is a file"):
+    with refused(r"a\.png cannot be read as a picture"):
         open_light_field(tmp_path / "a.png")
+    (tmp_path / "zarr.json").write_text("{}")
+    with refused(r"is a store, .*vcc\.store\.open_store"):
+        open_light_field(tmp_path)
+    (tmp_path / "a.txt").write_text("")
+    with refused(r"a\.txt is a file in no format that is known"):
+        open_light_field(tmp_path / "a.txt")
 
 
 def test_missing_views_are_named(views: Views, folder_of: Write) -> None:
     folder = folder_of(views, generic)
     (folder / "view_00_01.png").unlink()
     (folder / "view_02_03.png").unlink()
-    with refused(r"10 of the 12 views of its 3×4 grid; 2 are missing.*\(0, 1\), \(2, 3\)\. Incompl"):
+    with refused(r"10 of the 12 views of its 3×4 grid; 2 are missing.*\(0, 1\), \(2, 3\)\. .*open_sparse_views"):
         open_light_field(folder)
 
 
@@ -397,7 +408,7 @@ def test_a_truncated_picture_is_named(views: Views, folder_of: Write) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"transfer": "gamma"}, "transfer is one of 'srgb', 'linear', not 'gamma'"),
+        ({"transfer": "gamma"}, "transfer is one of 'auto', 'srgb', 'linear', not 'gamma'"),
         ({"orientation": "up"}, "'flip-both'.*not 'up'"),
         ({"spacing": 0}, "spacing must be greater than 0"),
         ({"slope_per_pixel": -1}, "slope_per_pixel must be greater than 0"),

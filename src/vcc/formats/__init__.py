@@ -1,5 +1,23 @@
-"""Light fields and pictures in files. `open_light_field` finds out which format a folder has."""
+"""Light fields and pictures in files. `open_light_field` finds out which format a folder or file has."""
 
-from vcc.formats.reading import FolderInfo, open_light_field, read_geometry
+from vcc.formats.containers import read_container
+from vcc.formats.ground_truth import GroundTruth, read_ground_truth
+from vcc.formats.lytro_lfp import LytroRaw, read_lytro
+from vcc.formats.reading import FolderInfo, open_light_field, open_sparse_views, read_geometry
+from vcc.formats.sparse import SparseViews
+from vcc.formats.writing import SavedLightField, save_light_field
 
-__all__ = ["FolderInfo", "open_light_field", "read_geometry"]
+__all__ = [
+    "FolderInfo",
+    "GroundTruth",
+    "LytroRaw",
+    "SavedLightField",
+    "SparseViews",
+    "open_light_field",
+    "open_sparse_views",
+    "read_container",
+    "read_geometry",
+    "read_ground_truth",
+    "read_lytro",
+    "save_light_field",
+]

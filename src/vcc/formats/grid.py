@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vcc.errors import InputError
 from vcc.units import mm
 
-PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr")
+if TYPE_CHECKING:
+    from vcc.affine import Affine
+
+PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")
 """The endings of the files that views may be stored in."""
 
 DEFAULT_SPACING = 1 * mm
@@ -36,42 +43,97 @@ class Geometry:
 
     Args:
         spacing: distance (dv, du) between neighbouring views, metres.
-        spacing_is_relative: the numbers are known, and their unit is not: taken as millimetres.
+        spacing_unit: "" where the unit of the spacing is known; else what its numbers are taken for, "mm" or "m".
         slope_per_pixel: pixel pitch over focal length.
         focus_distance: where the views converge, metres; infinite if parallel.
+        disparity_at_infinity: disparity of infinitely far points, pixels per view, from which the focus distance
+            follows with the spacing: −du/(p·F). For formats that state a shift of the pictures.
         disparity_range: (lowest, highest), pixels per view.
         directions: (+1 or −1 along rows of views, likewise columns): whether the stated camera
             position grows from one to the next.
+        directions_are_true: the positions are known to grow downwards and to the right, so that a −1 says that the
+            files are counted the other way.
         picture_shape: (rows, columns) that the pictures must have.
     """
 
     spacing: tuple[float, float] | None = None
-    spacing_is_relative: bool = False
+    spacing_unit: Literal["", "mm", "m"] = ""
     slope_per_pixel: float | None = None
     focus_distance: float | None = None
+    disparity_at_infinity: float | None = None
     disparity_range: tuple[float, float] | None = None
     directions: tuple[int, int] | None = None
+    directions_are_true: bool = False
     picture_shape: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Decoded:
+    """What one file (or a folder that is one thing) holds, before it is made a light field.
+
+    Args:
+        format: what the file follows, for people.
+        values: the samples as stored, shape (v, u, t, s) or (v, u, t, s, channels), unsigned integers (fractions
+            of their full scale) or floating point.
+        transfer: "srgb" for display-referred samples, "linear" for those proportional to light.
+        geometry: what is known of the cameras, where there is no ``frame``.
+        frame: the 5×5 frame, indices from 0, where the format has a full one.
+        depth: true distances Z, metres, of the pixels of each view, shape (v, u, t, s), or of the centre view,
+            shape (t, s).
+        disparity: likewise true disparities, pixels per view, positive where nearer than the focus.
+        weights: how much each sample is to be trusted, 0 (unknown) to 1, shape (v, u, t, s).
+        remarks: what a person should be told, each a sentence.
+        metadata: everything else that the file states, as plain values.
+    """
+
+    format: str
+    values: NDArray[Any]
+    transfer: Literal["srgb", "linear"]
+    geometry: Geometry = Geometry()
+    frame: Affine | None = None
+    depth: NDArray[Any] | None = None
+    disparity: NDArray[Any] | None = None
+    weights: NDArray[Any] | None = None
+    remarks: tuple[str, ...] = ()
+    metadata: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class ViewGrid:
-    """A complete grid of views.
+    """A grid of views.
 
     Args:
         format: what the files follow, for people.
-        files: files[row][column], row 0 at the top, column 0 at the left.
+        files: files[row][column], row 0 at the top, column 0 at the left; None for a view that is missing from a
+            grid that may be sparse.
         geometry: what is known of the cameras.
     """
 
     format: str
-    files: tuple[tuple[Path, ...], ...]
+    files: tuple[tuple[Path | None, ...], ...]
     geometry: Geometry = Geometry()
 
     @property
     def shape(self) -> tuple[int, int]:
         """(rows, columns) of views."""
         return len(self.files), len(self.files[0])
+
+    @property
+    def present(self) -> dict[tuple[int, int], Path]:
+        """The views there are, by (row, column), row by row."""
+        return {
+            (row, column): file
+            for row, line in enumerate(self.files)
+            for column, file in enumerate(line)
+            if file is not None
+        }
+
+    @property
+    def missing(self) -> tuple[tuple[int, int], ...]:
+        """(row, column) of the views that there are not."""
+        rows, columns = self.shape
+        present = self.present
+        return tuple((r, c) for r in range(rows) for c in range(columns) if (r, c) not in present)
 
 
 def pictures_in(folder: Path) -> list[Path]:
@@ -87,7 +149,9 @@ def arrange(
     places: Iterable[Place],
     folder: Path,
     numbers: tuple[Sequence[int], Sequence[int]] | None = None,
-) -> tuple[tuple[Path, ...], ...]:
+    *,
+    sparse: bool = False,
+) -> tuple[tuple[Path | None, ...], ...]:
     """Files as files[row][column], every place of the grid filled once.
 
     Rows and columns may be counted from any number and in any even step (0, 1, 2 …; 9 … 17; 0, 2, 4
@@ -97,6 +161,7 @@ def arrange(
         places: the views that there are.
         folder: how to name them all in an error.
         numbers: the row and column numbers that there must be, where the format states them.
+        sparse: leave None where a view is missing, instead of refusing the grid.
 
     Raises:
         InputError: two files for a place, places without a file, or files outside the grid.
@@ -114,8 +179,23 @@ def arrange(
         raise InputError(f"{folder} holds no views")
     rows, columns = numbers or (_counted([r for r, _ in at]), _counted([c for _, c in at]))
     _refuse_extra(at, rows, columns, folder)
-    _refuse_missing(at, rows, columns, folder)
-    return tuple(tuple(at[row, column] for column in columns) for row in rows)
+    if not sparse:
+        _refuse_missing(at, rows, columns, folder)
+    return tuple(tuple(at.get((row, column)) for column in columns) for row in rows)
+
+
+def mean_step(positions: NDArray[Any], axis: int) -> float:
+    """The mean step between neighbours along an axis of a grid; 0 if it has one place only, NaN where missing."""
+    if positions.shape[axis] < 2:
+        return 0.0
+    places = np.arange(positions.shape[axis])
+    along = np.moveaxis(positions, axis, -1).reshape(-1, positions.shape[axis])
+    slopes = []
+    for line in along:
+        there = np.isfinite(line)
+        if there.sum() > 1:
+            slopes.append(float(np.polyfit(places[there], line[there], 1)[0]))
+    return float(np.mean(slopes)) if slopes else 0.0
 
 
 def _counted(numbers: list[int]) -> range:
@@ -157,6 +237,6 @@ def _refuse_missing(
     named = ", ".join(map(str, missing)) + (", …" if count > len(missing) else "")
     raise InputError(
         f"{folder} has {len(at)} of the {total} views of its {len(rows)}×{len(columns)} grid; "
-        f"{count} are missing, by (row, column): {named}. Incomplete grids cannot be opened yet: "
-        "add the missing files, or move a smaller complete grid of them to a folder of its own"
+        f"{count} are missing, by (row, column): {named}. Incomplete grids are no light field: add the missing "
+        "files, or open those that there are with vcc.formats.open_sparse_views"
     )

@@ -1,5 +1,6 @@
-"""The 4D light-field benchmark of HCI (Honauer et al. 2016): ``input_CamNNN.png`` and
-``parameters.cfg``.
+"""The 4D light-field benchmark of HCI (Honauer et al. 2016): ``input_CamNNN.png`` and ``parameters.cfg``.
+
+INRIA's synthetic light fields have the same camera file under other names.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ PARAMETERS = "parameters.cfg"
 _NAME = re.compile(r"input_Cam(\d+)", re.IGNORECASE)
 
 
-def find(folder: Path) -> ViewGrid | None:
+def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
     """The grid of the folder's ``input_CamNNN`` pictures, NNN = row × columns + column; None
     without any.
 
@@ -34,7 +35,7 @@ def find(folder: Path) -> ViewGrid | None:
     stated = read_grid_shape(folder)
     rows, columns = stated or _square(list(numbered.values()), folder)
     places = [Place(number // columns, number % columns, file) for file, number in numbered.items()]
-    files = arrange(places, folder, (range(rows), range(columns)))
+    files = arrange(places, folder, (range(rows), range(columns)), sparse=sparse)
     return ViewGrid("HCI 4D light-field benchmark", files, read_geometry(folder) or Geometry())
 
 
@@ -49,7 +50,7 @@ def read_grid_shape(folder: Path) -> tuple[int, int] | None:
         return None
     rows, columns = (_number(settings, "extrinsics", f"num_cams_{axis}", folder) for axis in "yx")
     if rows < 1 or columns < 1 or rows % 1 or columns % 1:
-        raise InputError(f"{folder / PARAMETERS} states a grid of {rows:g}×{columns:g} cameras")
+        raise InputError(f"{parameters_file(folder)} states a grid of {rows:g}×{columns:g} cameras")
     return int(rows), int(columns)
 
 
@@ -70,7 +71,7 @@ def read_geometry(folder: Path) -> Geometry | None:
     def positive(section: str, key: str) -> float:
         value = _number(settings, section, key, folder)
         if not value > 0:
-            raise InputError(f"{folder / PARAMETERS}: {key} is {value:g}, and must be greater than 0")
+            raise InputError(f"{parameters_file(folder)}: {key} is {value:g}, and must be greater than 0")
         return value
 
     width = positive("intrinsics", "image_resolution_x_px")
@@ -80,7 +81,7 @@ def read_geometry(folder: Path) -> Geometry | None:
     focal_length = positive("intrinsics", "focal_length_mm") * mm
     focus = _number(settings, "extrinsics", "focus_distance_m", folder)
     if focus < 0:
-        raise InputError(f"{folder / PARAMETERS}: focus_distance_m is {focus:g}, and must be 0 or more")
+        raise InputError(f"{parameters_file(folder)}: focus_distance_m is {focus:g}, and must be 0 or more")
     low = _number(settings, "meta", "disp_min", folder, needed=False)
     high = _number(settings, "meta", "disp_max", folder, needed=False)
     return Geometry(
@@ -92,9 +93,27 @@ def read_geometry(folder: Path) -> Geometry | None:
     )
 
 
-def _settings(folder: Path) -> configparser.ConfigParser | None:
+def parameters_file(folder: Path) -> Path | None:
+    """The folder's ``parameters.cfg``, or the only .cfg file with the same sections, as INRIA names it."""
     path = folder / PARAMETERS
-    if not path.is_file():
+    if path.is_file():
+        return path
+    others = [
+        file
+        for file in sorted(folder.glob("*.cfg"))
+        if "[extrinsics]" in file.read_text(encoding="utf-8", errors="replace")
+    ]
+    if len(others) > 1:
+        raise InputError(
+            f"{folder} has {len(others)} camera files, {', '.join(file.name for file in others)}. "
+            "Leave the right one there"
+        )
+    return others[0] if others else None
+
+
+def _settings(folder: Path) -> configparser.ConfigParser | None:
+    path = parameters_file(folder)
+    if path is None:
         return None
     settings = configparser.ConfigParser(interpolation=None, strict=False)
     try:
@@ -117,13 +136,13 @@ def _number(
     if text is None:
         if not needed:
             return math.nan
-        raise InputError(f"{folder / PARAMETERS} does not state {key} in its section [{section}]. Add it")
+        raise InputError(f"{parameters_file(folder)} does not state {key} in its section [{section}]. Add it")
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f'{folder / PARAMETERS}: {key} is "{text}", not a number')
+        raise InputError(f'{parameters_file(folder)}: {key} is "{text}", not a number')
     return value
 
 

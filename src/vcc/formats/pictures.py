@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from vcc.errors import InputError
 from vcc.formats import transfer
 from vcc.formats.atomic import atomic_path
+from vcc.formats.netpbm import read_netpbm
 from vcc.image import Image
 
-READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy")
+READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
 """The endings that `read_picture` knows."""
 WRITE_ENDINGS = (".png", ".tif", ".tiff", ".exr", ".npy")
 """The endings that `save_image` knows."""
@@ -37,9 +38,9 @@ class _Unsuitable(Exception):
 def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
     """The samples of a picture as they are stored: nothing is scaled and no transfer curve undone.
 
-    PNG and JPEG of 8 bits and PNG of 16, TIFF, BMP, OpenEXR, and NumPy's .npy. Palettes become the
-    colours that they stand for, and PNGs of 1, 2 or 4 bits are widened to 8 (1-bit: 0 and 255). A
-    channel of opacity (alpha) that is opaque everywhere is dropped; any other is refused, because
+    PNG and JPEG of 8 bits and PNG of 16, TIFF, BMP, OpenEXR, Netpbm, and NumPy's .npy. Palettes become the
+    colours that they stand for, and PNGs of 1, 2 or 4 bits are widened to 8 (1-bit: 0 and 255), Netpbm of 10 to
+    16. A channel of opacity (alpha) that is opaque everywhere is dropped; any other is refused, because
     what lies behind is not known. OpenEXR gives the channels R, G, B, or the only one that there
     is.
 
@@ -70,6 +71,27 @@ def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
             f"{ending[1:].upper()} file ({error}). Copy it again from where it came from"
         ) from error
     return _checked(samples, path)
+
+
+def read_png_into(path: Path, out: NDArray[Any]) -> bool:
+    """Read a PNG of just this shape and type into memory that is there already, which spares fresh memory.
+
+    Args:
+        path: the file.
+        out: where to write, shape (rows, columns) or (rows, columns, channels), uint8 or uint16, contiguous.
+
+    Returns:
+        False, with anything in ``out``, for whatever is not such a PNG: `read_picture` reads it, or says why not.
+    """
+    if path.suffix.lower() != ".png" or out.dtype not in (np.uint8, np.uint16):
+        return False
+    import imagecodecs
+
+    try:
+        imagecodecs.png_decode(path.read_bytes(), out=out)
+    except Exception:  # each library has its own types for a damaged file
+        return False
+    return True
 
 
 def read_grey(path: str | PathLike[str]) -> NDArray[np.float64]:
@@ -438,6 +460,8 @@ _READERS: dict[str, Callable[[Path], NDArray[Any]]] = {
     ".bmp": _read_bmp,
     ".exr": _read_exr,
     ".npy": _read_npy,
+    ".ppm": read_netpbm,
+    ".pgm": read_netpbm,
 }
 
 

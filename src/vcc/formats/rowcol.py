@@ -14,7 +14,7 @@ from vcc.formats.grid import Place, ViewGrid, arrange, pictures_in
 _NAME = re.compile(r"(?P<before>.*?)(?P<row>\d+)(?P<between>[^\d.]{1,8})(?P<column>\d+)")
 
 
-def find(folder: Path) -> ViewGrid | None:
+def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
     """The grid of the pictures whose names end in two numbers, row then column; None if there are
     none.
 
@@ -40,4 +40,5 @@ def find(folder: Path) -> ViewGrid | None:
             f"names: {named}. "
             "Leave one of them in the folder, or list the views in a views.csv"
         )
-    return ViewGrid("names with row and column", arrange(next(iter(several.values())), folder))
+    files = arrange(next(iter(several.values())), folder, sparse=sparse)
+    return ViewGrid("names with row and column", files)

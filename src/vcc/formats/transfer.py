@@ -60,6 +60,18 @@ def table(bits: int) -> NDArray[np.float32]:
     return entries
 
 
+_AT_ONCE = 65536  # pairs: their indices, which NumPy widens to 8 bytes each, stay in the cache
+
+
+@functools.cache
+def _pairs() -> NDArray[np.uint64]:
+    """The table of 8 bits for two samples at a time: two float32 for each two bytes that lie side by side."""
+    both = table(8)[np.arange(65536, dtype=np.uint16).view(np.uint8)]
+    entries = both.view(np.uint64)
+    entries.flags.writeable = False
+    return entries
+
+
 def decode(samples: NDArray[Any], out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
     """Linear light of stored sRGB samples; floating-point samples are linear already and only
     copied.
@@ -78,6 +90,12 @@ def decode(samples: NDArray[Any], out: NDArray[np.float32] | None = None) -> NDA
         out = np.empty(samples.shape, np.float32)
     if samples.dtype.kind == "f":
         out[...] = samples
+    elif samples.dtype == np.uint8 and samples.size % 2 == 0 and _are_contiguous(samples, out):
+        # Twice as fast as one by one, and the same numbers.
+        codes, light = samples.reshape(-1).view(np.uint16), out.reshape(-1).view(np.uint64)
+        for start in range(0, len(codes), _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
+            np.take(_pairs(), codes[part], out=light[part], mode="clip")
     elif samples.dtype in (np.uint8, np.uint16):
         # Every code is inside the table, so "clip" changes nothing; it spares NumPy a buffered
         # copy.
@@ -85,6 +103,10 @@ def decode(samples: NDArray[Any], out: NDArray[np.float32] | None = None) -> NDA
     else:
         raise InputError(f"sRGB samples are uint8, uint16 or floating point, not {samples.dtype}")
     return out
+
+
+def _are_contiguous(*arrays: NDArray[Any]) -> bool:
+    return all(array.flags.c_contiguous for array in arrays)
 
 
 def encode(linear: NDArray[np.floating[Any]], bits: int) -> NDArray[Any]:

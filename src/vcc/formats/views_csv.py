@@ -13,7 +13,7 @@ from vcc.formats.grid import Place, ViewGrid, arrange
 NAME = "views.csv"
 
 
-def find(folder: Path) -> ViewGrid | None:
+def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
     """The grid that the folder's ``views.csv`` lists; None if there is no such file.
 
     Row 0 is at the top, column 0 at the left; files are named relative to the folder.
@@ -49,7 +49,7 @@ def find(folder: Path) -> ViewGrid | None:
                 "and there "
                 f"is no such file in {folder}. Add it or correct the list"
             )
-    return ViewGrid("list of views (views.csv)", arrange(places, folder))
+    return ViewGrid("list of views (views.csv)", arrange(places, folder, sparse=sparse))
 
 
 def _place(line: list[str], order: list[int], where: str) -> Place:

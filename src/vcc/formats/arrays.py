@@ -1,0 +1,220 @@
+"""Light fields as plain arrays, NumPy's ``.npy`` and ``.npz``; and an ``.npz`` of our own, which keeps everything.
+
+An ``.npy`` holds samples and nothing else, so their axes may have to be told and the cameras are unknown.
+The ``.npz`` that `save` makes holds, beside ``values`` (v, u, t, s[, channel]), the 5×5 ``frame`` (indices
+from 0 to metres and slopes), ``transfer`` ("linear" or "srgb") and, where known, ``disparity_range``. Other
+programs may write the same.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.formats.atomic import atomic_path
+from vcc.formats.grid import Decoded, Geometry
+
+if TYPE_CHECKING:
+    from vcc.light_field import LightField
+
+ENDINGS = (".npy", ".npz")
+
+_OWN = ("values", "frame", "transfer", "disparity_range")
+_MOST_LIKELY_CHANNELS = 4  # an axis of so few samples is colour rather than a picture's width
+_ORDER = "vutsc"
+
+
+def recognised(path: Path) -> bool:
+    """Whether this is meant to be such a file, by its ending."""
+    return path.suffix.lower() in ENDINGS and path.is_file()
+
+
+def read(
+    path: Path,
+    *,
+    shape: tuple[int, ...] | None = None,
+    axes: str | None = None,
+    key: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Decoded:
+    """The light field in an array.
+
+    Args:
+        path: an ``.npy`` or ``.npz`` file.
+        shape: how to divide the array: as many sizes as it has axes; or two, (rows, columns) of views, where its
+            first axis counts the views row by row.
+        axes: what the axes of the (divided) array are, a letter each: "vutsc" are rows of views, columns of
+            views, rows of pixels, columns of pixels, channels. Without it an array of four axes is taken as
+            "vuts", of five as "vutsc".
+        key: which array of an ``.npz``; needed where there are several and none is called "values".
+        progress: called when it is done.
+
+    Returns:
+        Samples as stored. Those of an ``.npz`` that states its transfer have that; else floating-point ones
+        are "linear" and unsigned integers "srgb".
+
+    Raises:
+        InputError: a truncated or damaged file, one of Python objects, several arrays and no key, a shape or axes
+            that do not fit the array, samples of another type, or entries of an ``.npz`` of ours that cannot be
+            understood.
+    """
+    path = Path(path)
+    arrays = _arrays(path, key)
+    values = _ordered(_divided(arrays["values"], shape, path), axes, path)
+    if values.dtype.kind not in "uf" or values.dtype.itemsize > 8:
+        raise InputError(
+            f"{path} holds samples of type {values.dtype}; a light field has unsigned integers (fractions of "
+            "their full scale) or floating-point numbers. Convert them, e.g. with values.astype('float32')"
+        )
+    if progress is not None:
+        progress(1, 1)
+    return Decoded(
+        format="NumPy array" if path.suffix.lower() == ".npy" else "NumPy arrays (.npz)",
+        values=values,
+        transfer=_transfer(arrays.get("transfer"), values, path),
+        geometry=Geometry(disparity_range=_disparity_range(arrays.get("disparity_range"), path)),
+        frame=_frame(arrays.get("frame"), shape is None and axes is None, path),
+    )
+
+
+def save(light_field: LightField, path: str | PathLike[str]) -> Path:
+    """Write a light field as an ``.npz`` that keeps it whole: samples of any type, any frame. Nothing is lost.
+
+    Args:
+        light_field: its values may be of any array library.
+        path: where to; the name ends in ``.npz``.
+
+    Raises:
+        InputError: another ending, or a place that cannot be written to.
+    """
+    from vcc.sampled import to_numpy
+
+    path = Path(path).expanduser()
+    if path.suffix.lower() != ".npz":
+        raise InputError(f'a light field is written as arrays to a name that ends in .npz, not "{path.name}"')
+    arrays: dict[str, Any] = {
+        "values": to_numpy(light_field.values),
+        "frame": light_field.frame.matrix,
+        "transfer": np.array("linear"),
+    }
+    if light_field.disparity_range is not None:
+        arrays["disparity_range"] = np.array(light_field.measured_disparity_range())
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **arrays)
+    return path
+
+
+def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
+    """The arrays that matter, the samples under the name of "values"."""
+    try:
+        with path.open("rb") as file:
+            loaded = np.load(file, allow_pickle=False)
+            if not isinstance(loaded, np.lib.npyio.NpzFile):
+                if key is not None:
+                    raise InputError(f"{path} holds one array without a name, so key={key!r} means nothing")
+                return {"values": loaded}
+            names = loaded.files
+            if key is not None:
+                if key not in names:
+                    raise InputError(f'{path} holds no array "{key}", but {_listed(names)}')
+                return {name: loaded[name] for name in names if name in _OWN} | {"values": loaded[key]}
+            if "values" in names:
+                return {name: loaded[name] for name in names if name in _OWN}
+            if len(names) == 1:
+                return {"values": loaded[names[0]]}
+    except InputError:
+        raise
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, KeyError, zipfile.error, MemoryError) as error:
+        objects = "Object arrays" in str(error) or "pickle" in str(error)
+        way_out = "Save numbers only" if objects else "Copy it again from where it came from"
+        raise InputError(
+            f"{path} cannot be read as arrays: it is truncated, damaged, of Python objects or too large "
+            f"({error}). {way_out}"
+        ) from error
+    held = f"the arrays {_listed(names)}" if names else "no array"
+    raise InputError(f"{path} holds {held}: say which one is the light field, key=…")
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(f'"{name}"' for name in names)
+
+
+def _divided(values: NDArray[Any], shape: tuple[int, ...] | None, path: Path) -> NDArray[Any]:
+    if shape is None:
+        return values
+    sizes = tuple(shape)
+    if not all(isinstance(n, int | np.integer) and n > 0 for n in sizes):
+        raise InputError(f"shape is made of whole numbers above 0, not {shape}")
+    if len(sizes) == 2 and values.ndim in (3, 4):
+        sizes = (*sizes, *values.shape[1:])
+    if math.prod(sizes) != values.size:
+        raise InputError(
+            f"{path} holds an array of shape {values.shape}, {values.size:,} samples, which cannot be divided "
+            f"as {tuple(shape)}: that makes {math.prod(sizes):,}"
+        )
+    return values.reshape(sizes)
+
+
+def _ordered(values: NDArray[Any], axes: str | None, path: Path) -> NDArray[Any]:
+    """The array with its axes in the order (v, u, t, s[, channel])."""
+    if axes is None:
+        if values.ndim not in (4, 5):
+            raise InputError(
+                f"{path} holds an array of shape {values.shape}; a light field has the axes (v, u, t, s[, "
+                "channel]). Give shape=(rows, columns) of views if its first axis counts them, or the whole shape"
+            )
+        if values.ndim == 4 and values.shape[3] <= _MOST_LIKELY_CHANNELS:
+            raise InputError(
+                f"{path} holds an array of shape {values.shape}, whose last axis may be a picture's width or its "
+                "channels. Give shape=(rows, columns) of views if the first axis counts them; or say what the "
+                'axes are: axes="vuts", or another order of these letters'
+            )
+        return values
+    if len(set(axes)) != len(axes) or set(axes) not in (set("vuts"), set(_ORDER)):
+        raise InputError(
+            f'axes="{axes}" must name v, u (rows and columns of views), t, s (of pixels) and perhaps c '
+            "(channels), each once"
+        )
+    if len(axes) != values.ndim:
+        raise InputError(
+            f'axes="{axes}" names {len(axes)} axes, and {path} holds an array of shape {values.shape}'
+        )
+    return np.transpose(values, [axes.index(name) for name in _ORDER if name in axes])
+
+
+def _transfer(stated: NDArray[Any] | None, values: NDArray[Any], path: Path) -> Literal["srgb", "linear"]:
+    if stated is None:
+        return "linear" if values.dtype.kind == "f" else "srgb"
+    if stated.shape == () and stated.item() == "linear":
+        return "linear"
+    if stated.shape == () and stated.item() == "srgb":
+        return "srgb"
+    raise InputError(f'{path}: its "transfer" is {stated.tolist()!r}; "linear" and "srgb" are known')
+
+
+def _frame(stated: NDArray[Any] | None, axes_as_stored: bool, path: Path) -> Affine | None:
+    if stated is None:
+        return None
+    if not axes_as_stored:
+        raise InputError(f"{path} holds a frame for its own axes: leave shape= and axes= out")
+    try:
+        return Affine(stated)
+    except (InputError, ValueError, TypeError) as error:
+        raise InputError(f'{path}: its "frame" is wrong: {error}') from None
+
+
+def _disparity_range(stated: NDArray[Any] | None, path: Path) -> tuple[float, float] | None:
+    if stated is None:
+        return None
+    if stated.shape != (2,) or stated.dtype.kind not in "fiu" or not stated[0] <= stated[1]:
+        raise InputError(f'{path}: its "disparity_range" is {stated.tolist()!r}, not two numbers, lowest first')
+    return float(stated[0]), float(stated[1])

@@ -1,0 +1,90 @@
+"""Light fields as numbers of 8 or 16 bits, view by view, and what of them that clips."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.errors import InputError
+from vcc.formats import transfer
+from vcc.formats.pictures import auto_exposure
+from vcc.sampled import to_numpy
+
+if TYPE_CHECKING:
+    from vcc.light_field import LightField
+    from vcc.store import StoredLightField
+
+Exposure = float | Literal["auto"]
+
+
+class Codes:
+    """The views of a light field as stored numbers; counts what does not fit.
+
+    Args:
+        light_field: in memory or in a store; only the views that are asked for are read.
+        bits: 8 or 16.
+        curve: "srgb" for display-referred numbers, "linear" for numbers proportional to light.
+        exposure: factor on the radiance (of which 1, or the full scale of integers, becomes the largest
+            number); "auto" takes 1 over the 99.5th percentile of the luminance of the middle view.
+
+    Raises:
+        InputError: other bits, an unknown curve, or an exposure that is neither "auto" nor a finite number
+            above 0.
+    """
+
+    def __init__(
+        self, light_field: LightField | StoredLightField, bits: int, curve: str, exposure: Exposure
+    ) -> None:
+        if bits not in (8, 16):
+            raise InputError(f"pictures are written with 8 or 16 bits per sample, not {bits}")
+        if curve not in ("srgb", "linear"):
+            raise InputError(f'transfer is "srgb" or "linear", not {curve!r}')
+        self._light_field, self._bits, self._curve = light_field, bits, curve
+        self._seen = self._beyond = 0
+        self.exposure = self._automatic() if exposure == "auto" else _number(exposure)
+
+    @property
+    def clipped(self) -> float:
+        """The share, 0 to 1, of the samples asked for so far that are too bright."""
+        return self._beyond / self._seen if self._seen else 0.0
+
+    def view(self, row: int, column: int) -> NDArray[Any]:
+        """A view's numbers, uint8 or uint16, shape (rows, columns) or (rows, columns, channels)."""
+        samples, full_scale = stored_view(self._light_field, row, column)
+        kind = np.dtype(f"uint{self._bits}")
+        self._seen += samples.size
+        if self._curve == "linear" and samples.dtype == kind and self.exposure == 1:
+            return samples
+        light = samples.astype(np.float32) * np.float32(self.exposure / full_scale)
+        largest = 2**self._bits - 1
+        self._beyond += int(np.count_nonzero(light > 1 + 0.5 / largest))  # what rounds to white is not lost
+        if self._curve == "srgb":
+            return transfer.encode(light, self._bits)
+        # float64: in float32, 16-bit numbers above 2^24/2^16 would come with an error of their own
+        codes: NDArray[Any] = np.rint(np.clip(light.astype(np.float64), 0, 1) * largest).astype(kind)
+        return codes
+
+    def _automatic(self) -> float:
+        rows, columns = self._light_field.shape[:2]
+        samples, full_scale = stored_view(self._light_field, rows // 2, columns // 2)
+        light = samples.astype(np.float32) / np.float32(full_scale)
+        return auto_exposure(light if light.ndim == 2 or light.shape[2] == 3 else light.max(axis=2))
+
+
+def stored_view(light_field: LightField | StoredLightField, row: int, column: int) -> tuple[NDArray[Any], float]:
+    """A view's samples, linear, as they are held, and what of them stands for radiance 1."""
+    piece = light_field[row : row + 1, column : column + 1]
+    samples: NDArray[Any] = to_numpy(piece.values)[0, 0]
+    return samples, piece.full_scale
+
+
+def _number(exposure: Any) -> float:
+    try:
+        factor = float(exposure)
+    except (TypeError, ValueError):
+        factor = float("nan")
+    if not (factor > 0 and np.isfinite(factor)):
+        raise InputError(f'exposure is "auto" or a finite number above 0, not {exposure!r}')
+    return factor

@@ -1,0 +1,82 @@
+"""Opening HDF5 files, with errors that a person understands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vcc.errors import InputError
+
+MAGIC = b"\x89HDF\r\n\x1a\n"
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether a file begins as HDF5 files do, at the start or, as MATLAB's, after a block of 512 bytes."""
+    with path.open("rb") as file:
+        start = file.read(520)
+    return start.startswith(MAGIC) or start[512:520] == MAGIC
+
+
+def library() -> Any:
+    """The module h5py.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        import h5py
+    except ImportError:
+        raise InputError(
+            'HDF5 files (.mat, .h5) need the package h5py: pip install "virtual-computational-camera[hdf5]"'
+        ) from None
+    return h5py
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """An HDF5 file to read from.
+
+    Raises:
+        InputError: no such file, another format, a truncated or damaged file, or no h5py.
+    """
+    if not path.is_file():
+        raise InputError(f"there is no file {path}")
+    if not is_hdf5(path):
+        text = f"{path} is not an HDF5 file: it does not begin with HDF5's signature. "
+        if path.suffix.lower() == ".mat":
+            text += "In MATLAB, save it again with save(…, '-v7.3')"
+        else:
+            text += "Copy it again from where it came from"
+        raise InputError(text)
+    h5py = library()
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except InputError:
+        raise
+    except (OSError, RuntimeError, KeyError) as error:
+        raise InputError(
+            f"{path} cannot be read: it is truncated or damaged ({error}). Copy it again from where it came from"
+        ) from error
+
+
+def number(found: Any, name: str, path: Path) -> float:
+    """An attribute that is one number, alone or in an array of one.
+
+    Raises:
+        InputError: it is not there, or no finite number.
+    """
+    value = found.get(name)
+    if value is None:
+        raise InputError(f"{path} does not state the attribute {name}")
+    try:
+        only = float(np.asarray(value).reshape(-1)[0])
+    except (ValueError, TypeError, IndexError):
+        only = float("nan")
+    if not np.isfinite(only) or np.asarray(value).size != 1:
+        raise InputError(f"{path}: the attribute {name} is {value!r}, not a finite number")
+    return only

@@ -1,0 +1,198 @@
+"""Light fields of the Light Field Toolbox for MATLAB (Dansereau): ``.mat`` of version 7.3, which is HDF5.
+
+``LF`` has MATLAB's axes [j, i, l, k, channel], a fourth channel being a weight; HDF5 shows them reversed.
+Rectified light fields come with the intrinsics H of Dansereau, Pizarro and Williams (CVPR 2013): [s, t, u, v, 1]ᵀ
+= H·[i, j, k, l, 1]ᵀ, indices from 1, s, t places in metres and u, v slopes towards the scene. A ray that leaves
+towards the scene with slope u comes from it with ours of −u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.formats import hdf5
+from vcc.formats.atomic import atomic_path
+from vcc.formats.grid import Decoded, Geometry
+from vcc.light_field import LightField
+from vcc.sampled import to_numpy
+
+_TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
+_FROM_ZERO = Affine.translation(1, 1, 1, 1)  # from indices counted from 0 to MATLAB's
+_HEADER = "MATLAB 7.3 MAT-file, written by vcc. HDF5 schema 1.00 ."
+_OURS = "VccLightField"
+_CLASSES = {"uint8": "uint8", "uint16": "uint16", "uint32": "uint32", "float32": "single", "float64": "double"}
+
+
+def recognised(path: Path) -> bool:
+    """Whether the name is one of a MATLAB file."""
+    return path.suffix.lower() == ".mat" and path.is_file()
+
+
+def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> Decoded:
+    """The light field ``LF`` with its weights and, if it was rectified, its full frame.
+
+    Decoded and not colour-corrected samples are linear; those that DecodeOptions calls colour-corrected have been
+    through a gamma and are taken as sRGB.
+
+    Raises:
+        InputError: no h5py, a .mat of an earlier version, a damaged file, one without ``LF``, or intrinsics that
+            are no 5×5 matrix.
+    """
+    with hdf5.opened(path) as file:
+        if "LF" not in file:
+            raise InputError(
+                f"{path} has no variable LF, which light fields of the Light Field Toolbox have; it holds "
+                f"{', '.join(name for name in file if not name.startswith('#')) or 'nothing'}"
+            )
+        stored = file["LF"][...]
+        if stored.ndim not in (4, 5):
+            raise InputError(f"{path}: LF has {stored.ndim} axes; it has [j, i, l, k, channel]")
+        intrinsics = (
+            file["RectOptions/RectCamIntrinsicsH"][...].T if "RectOptions/RectCamIntrinsicsH" in file else None
+        )
+        corrected = "ColourCorrect" in _text(file, "DecodeOptions/OptionalTasks")
+        ours = _text(file, f"{_OURS}/Transfer")
+        has_weight = file[f"{_OURS}/HasWeight"][0, 0] != 0 if _OURS in file else None
+        disparities = file[f"{_OURS}/DisparityRange"][...].ravel() if f"{_OURS}/DisparityRange" in file else None
+        metadata: dict[str, Any] = {}
+        if "LFMetadata" in file:
+            metadata["LFMetadata"] = sorted(file["LFMetadata"])
+    values = np.ascontiguousarray(stored.T)
+    if values.dtype == np.float64:
+        values = values.astype(np.float32)
+    weights = None
+    if has_weight is None:
+        has_weight = values.ndim == 5 and values.shape[4] in (2, 4)
+    if has_weight:
+        whole = np.iinfo(values.dtype).max if values.dtype.kind == "u" else 1
+        weights = values[..., -1].astype(np.float32) / np.float32(whole)
+        values = np.ascontiguousarray(values[..., :-1])
+    remarks = []
+    if weights is not None and (unknown := float((weights == 0).mean())) > 0:
+        remarks.append(
+            f"{unknown:.1%} of the samples have the weight 0: nothing is known of them, and they are dark"
+        )
+    if progress is not None:
+        progress(1, 1)
+    transfer: Literal["srgb", "linear"] = "srgb" if (ours == "srgb" or corrected) else "linear"
+    return Decoded(
+        format="Light Field Toolbox (.mat)",
+        values=values,
+        transfer=transfer,
+        geometry=Geometry(
+            disparity_range=None if disparities is None else (float(disparities[0]), float(disparities[1]))
+        ),
+        frame=None if intrinsics is None else frame_of(intrinsics, path),
+        weights=weights,
+        remarks=tuple(remarks),
+        metadata=metadata,
+    )
+
+
+def frame_of(intrinsics: NDArray[Any], where: Path | str = "the intrinsics") -> Affine:
+    """The frame, indices from 0, of the toolbox's intrinsics H.
+
+    Args:
+        intrinsics: H, 5×5.
+        where: how to name it in an error.
+
+    Raises:
+        InputError: not 5×5, not finite, or not invertible.
+    """
+    matrix = np.asarray(intrinsics, dtype=np.float64)
+    if matrix.shape != (5, 5) or not np.isfinite(matrix).all():
+        raise InputError(f"{where}: the intrinsics H are a finite 5×5 matrix, not of shape {matrix.shape}")
+    if not np.allclose(matrix[4], (0, 0, 0, 0, 1)) or abs(np.linalg.det(matrix[:4, :4])) == 0:
+        raise InputError(
+            f"{where}: the intrinsics H are invertible and end in the row 0 0 0 0 1; these do not:\n{matrix}"
+        )
+    matrix[4] = (0, 0, 0, 0, 1)
+    return Affine(_TURNED @ matrix) @ _FROM_ZERO
+
+
+def intrinsics_of(frame: Affine) -> NDArray[np.float64]:
+    """The toolbox's intrinsics H, 5×5, of a light field's frame."""
+    matrix: NDArray[np.float64] = _TURNED @ (frame @ Affine.translation(-1, -1, -1, -1)).matrix
+    return matrix
+
+
+def save(light_field: LightField, path: str | PathLike[str], *, weights: NDArray[Any] | None = None) -> Path:
+    """Write a light field as the Light Field Toolbox does, with its frame as RectOptions.RectCamIntrinsicsH.
+
+    Samples keep their type and are linear. MATLAB reads the file with ``load``.
+
+    Args:
+        light_field: what to write.
+        path: where to; ends in .mat.
+        weights: 0 (unknown) to 1 of each sample, shape (v, u, t, s), as a further channel.
+
+    Raises:
+        InputError: another ending, no h5py, a sample type that MATLAB's files do not have, weights of another
+            shape, or a place that cannot be written to.
+    """
+    path = Path(path).expanduser()
+    if path.suffix.lower() != ".mat":
+        raise InputError(f'a light field of the Light Field Toolbox is a .mat file, not "{path.name}"')
+    h5py = hdf5.library()
+    values = np.asarray(to_numpy(light_field.values))
+    if values.dtype == np.float16:
+        values = values.astype(np.float32)
+    if values.dtype.name not in _CLASSES:
+        raise InputError(f"a .mat file has no samples of type {values.dtype}; convert them to float32")
+    if weights is not None:
+        if weights.shape != values.shape[:4]:
+            raise InputError(f"weights of shape {weights.shape} do not fit a light field of shape {values.shape}")
+        whole = np.iinfo(values.dtype).max if values.dtype.kind == "u" else 1
+        colours = values if values.ndim == 5 else values[..., None]
+        scaled = np.rint(weights * whole) if values.dtype.kind == "u" else weights
+        values = np.concatenate([colours, scaled[..., None].astype(values.dtype)], axis=4)
+    with atomic_path(path) as temporary:
+        with h5py.File(temporary, "w", userblock_size=512) as file:
+            _variable(
+                file, "LF", np.ascontiguousarray(values.T), compression="gzip", compression_opts=1, shuffle=True
+            )
+            options = _struct(file, "RectOptions")
+            _variable(options, "RectCamIntrinsicsH", np.ascontiguousarray(intrinsics_of(light_field.frame).T))
+            ours = _struct(file, _OURS)
+            _variable(ours, "Transfer", np.frombuffer("linear".encode("utf-16-le"), np.uint16)[:, None], "char")
+            _variable(ours, "HasWeight", np.array([[float(weights is not None)]]))
+            if light_field.disparity_range is not None:
+                _variable(ours, "DisparityRange", np.array(light_field.disparity_range, float)[:, None])
+        with temporary.open("r+b") as raw:
+            # Text, no subsystem, version 2.0 and the byte order: what MATLAB looks at before it calls HDF5.
+            raw.write(_HEADER.encode().ljust(116) + bytes(8) + b"\x00\x02IM")
+    return path
+
+
+def _struct(file: Any, name: str) -> Any:
+    group = file.create_group(name)
+    group.attrs["MATLAB_class"] = np.bytes_("struct")
+    return group
+
+
+def _variable(group: Any, name: str, values: NDArray[Any], kind: str | None = None, **how: Any) -> None:
+    """A variable as MATLAB stores it: its axes reversed, its class in an attribute."""
+    made = group.create_dataset(name, data=values, **how)
+    made.attrs["MATLAB_class"] = np.bytes_(kind or _CLASSES[values.dtype.name])
+    if kind == "char":
+        made.attrs["MATLAB_int_decode"] = np.int32(2)
+
+
+def _text(file: Any, name: str) -> str:
+    """The text, or texts in a cell array, of a variable; empty if there is none."""
+    if name not in file:
+        return ""
+    found = file[name][...]
+    if found.dtype.kind == "u":
+        return "".join(map(chr, found.ravel()))
+    if found.dtype == object:
+        return " ".join("".join(map(chr, file[reference][...].ravel())) for reference in found.ravel())
+    return ""

@@ -1,0 +1,499 @@
+"""Containers of Lytro cameras, ``.lfp`` and ``.lfr``: the raw mosaic behind the microlenses, and the
+camera's account of itself.
+
+Such a file holds no light field yet: its mosaic must first be decoded, microlens by microlens.
+`read_lytro` gives the mosaic and what is needed for that; `read`, which `vcc.open_light_field` calls,
+refuses and says so.
+
+The container is a header, a table of contents in JSON and blobs that the table calls by their SHA-1::
+
+    89 4C 46 50 0D 0A 1A 0A  00 00 00 01  00 00 00 00    the file begins
+    89 4C 46 4D 0D 0A 1A 0A  00 00 00 00                 the table of contents; 43 for 4D: a blob
+        length, 4 bytes, big-endian
+        "sha1-" and 40 hexadecimal digits
+        35 zeros
+        data, and zeros up to a multiple of 16 bytes
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.errors import InputError
+from vcc.formats.grid import Decoded
+
+ENDINGS = (".lfp", ".lfr", ".lfx")
+
+_FILE = bytes.fromhex("894C46500D0A1A0A")
+_CONTENTS = bytes.fromhex("894C464D0D0A1A0A")
+_BLOB = bytes.fromhex("894C46430D0A1A0A")
+_FILE_HEADER = 16
+_SECTION_HEADER = 96  # magic 8, zeros 4, length 4, name 45, zeros 35
+_NAME = slice(16, 61)
+_ALIGNMENT = 16
+
+_CORNERS = {"r": "RGGB", "gr": "GRBG", "gb": "GBRG", "b": "BGGR"}
+"""What colour the upper left pixel has, and the tile that this makes."""
+_PLACES = {"RGGB": ("r", "gr", "gb", "b"), "GRBG": ("gr", "r", "b", "gb")}
+_PLACES |= {"BGGR": ("b", "gb", "gr", "r"), "GBRG": ("gb", "b", "r", "gr")}
+"""The kinds of pixel of a tile, row by row."""
+
+
+@dataclass(frozen=True)
+class _Packing:
+    """How a camera packs its pixels, and what it is."""
+
+    camera: str
+    bits: int
+    endianness: str
+    shape: tuple[int, int]
+    color_filter: str
+
+
+_PACKINGS = (
+    _Packing("Lytro Illum", 10, "little", (5368, 7728), "GRBG"),
+    _Packing("Lytro F01", 12, "big", (3280, 3280), "BGGR"),
+)
+
+
+@dataclass(frozen=True)
+class LytroGeometry:
+    """What a file states of the camera's optics; None for what it does not state.
+
+    Args:
+        lens_pitch: distance between the centres of neighbouring microlenses, metres.
+        lens_rotation: of the grid of microlenses against the grid of pixels, radians.
+        lens_height: of the microlenses above the sensor, metres.
+        pixel_pitch: of the sensor, metres.
+        focal_length: of the main lens as it was zoomed, metres.
+        f_number: of the main lens.
+        exit_pupil_distance: of the main lens's exit pupil from the microlenses, metres.
+    """
+
+    lens_pitch: float | None = field(default=None, metadata={"unit": "length"})
+    lens_rotation: float | None = field(default=None, metadata={"unit": "angle"})
+    lens_height: float | None = field(default=None, metadata={"unit": "length"})
+    pixel_pitch: float | None = field(default=None, metadata={"unit": "length"})
+    focal_length: float | None = field(default=None, metadata={"unit": "length"})
+    f_number: float | None = None
+    exit_pupil_distance: float | None = field(default=None, metadata={"unit": "length"})
+
+
+@dataclass(frozen=True, eq=False)
+class LytroRaw:
+    """A raw recording of a Lytro camera: numbers proportional to light, one colour a pixel, behind microlenses.
+
+    Args:
+        mosaic: the numbers as recorded, uint16, shape (rows, columns), 0 to 2^bits − 1.
+        bits: of each number: 10 (Illum) or 12 (F01).
+        color_filter: the colours of a tile of 2×2 pixels, row by row, like "GRBG".
+        camera: its make and model, for people.
+        geometry: of microlenses and main lens.
+        black: the number that stands for no light, of the four pixels of a tile, row by row; None if not stated.
+        white: the number that stands for a full pixel, likewise.
+        color_matrix: 3×3, from the camera's linear red, green and blue to linear sRGB; None if not stated.
+        metadata: all that the file states of the picture, as its JSON has it.
+        private_metadata: the same of the camera itself (serial numbers); empty if not there.
+    """
+
+    mosaic: NDArray[np.uint16]
+    bits: int
+    color_filter: str
+    camera: str
+    geometry: LytroGeometry
+    black: tuple[float, float, float, float] | None
+    white: tuple[float, float, float, float] | None
+    color_matrix: NDArray[np.float64] | None
+    metadata: dict[str, Any]
+    private_metadata: dict[str, Any]
+
+    def linear(self) -> NDArray[np.float32]:
+        """The mosaic as light: 0 at the black level, 1 at the white level; noise may be below, highlights above.
+
+        Where the file states no levels, black is 0 and white 2^bits − 1.
+
+        Returns:
+            float32, shape (rows, columns).
+        """
+        black = self.black or (0.0,) * 4
+        white = self.white or (2.0**self.bits - 1,) * 4
+        light = np.empty(self.mosaic.shape, np.float32)
+        for place in range(4):
+            pixels = np.s_[place // 2 :: 2, place % 2 :: 2]
+            scale = 1 / (white[place] - black[place])
+            light[pixels] = (self.mosaic[pixels] - np.float32(black[place])) * np.float32(scale)
+        return light
+
+
+def unpack(packed: bytes, bits: int, shape: tuple[int, int]) -> NDArray[np.uint16]:
+    """The pixels of a packed mosaic.
+
+    10 bits, little-endian (Illum): of every 5 bytes four hold the high bits of a pixel each, and the fifth the low
+    two bits of all, the first pixel's lowest. 12 bits, big-endian (F01): every 3 bytes hold 2 pixels, high bits
+    first.
+
+    Args:
+        packed: the bytes.
+        bits: 10 or 12.
+        shape: (rows, columns).
+
+    Returns:
+        uint16, shape (rows, columns).
+
+    Raises:
+        InputError: other bits, or a number of bytes or pixels that does not fit.
+    """
+    if bits not in (10, 12):
+        raise InputError(f"a packed mosaic has 10 or 12 bits a pixel, not {bits}")
+    group = 4 if bits == 10 else 2
+    pixels = shape[0] * shape[1]
+    if pixels % group or len(packed) != pixels * bits // 8:
+        raise InputError(
+            f"{shape[1]}×{shape[0]} pixels of {bits} bits make {pixels * bits / 8:,.0f} bytes, and there are "
+            f"{len(packed):,}"
+        )
+    data = np.frombuffer(packed, np.uint8).reshape(-1, group * bits // 8)
+    mosaic = np.empty((len(data), group), np.uint16)
+    if bits == 10:
+        for place in range(4):
+            low = (data[:, 4] >> (2 * place)) & 3
+            mosaic[:, place] = data[:, place].astype(np.uint16) << 2 | low
+    else:
+        middle = data[:, 1].astype(np.uint16)
+        mosaic[:, 0] = data[:, 0].astype(np.uint16) << 4 | middle >> 4
+        mosaic[:, 1] = (middle & 15) << 8 | data[:, 2]
+    return mosaic.reshape(shape)
+
+
+def recognised(path: Path) -> bool:
+    """Whether this is meant to be such a container, by its ending or its first bytes."""
+    if not path.is_file():
+        return False
+    if path.suffix.lower() in ENDINGS:
+        return True
+    try:
+        with path.open("rb") as file:
+            return file.read(len(_FILE)) == _FILE
+    except OSError:
+        return False
+
+
+def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> Decoded:
+    """Refuse: a raw recording is no light field yet.
+
+    Raises:
+        InputError: always; of a damaged file what `read_lytro` says, of a sound one what it holds and
+            how to get it.
+    """
+    with _Container(Path(path)) as container:
+        image = _Recording(container)
+        rows, columns = image.shape
+        raise InputError(
+            f"{path} holds a raw recording of a {image.camera} ({columns}×{rows} pixels of {image.bits} bits "
+            "behind microlenses), not the views of a light field. vcc.formats.lytro_lfp.read_lytro(path) reads "
+            "the recording and the camera's geometry; to get views, decode it first (LFToolbox, PlenoptiCam) "
+            "and open what comes of that"
+        )
+
+
+def read_lytro(path: str | PathLike[str]) -> LytroRaw:
+    """The raw recording in a container of a Lytro camera.
+
+    Args:
+        path: an ``.lfp``, ``.lfr`` file.
+
+    Raises:
+        InputError: no such file, a wrong magic number, missing or damaged bytes, a container without a raw
+            recording (Lytro's web files hold only pictures made of one), metadata that cannot be understood, or
+            an unknown packing.
+    """
+    with _Container(Path(path).expanduser()) as container:
+        image = _Recording(container)
+        return LytroRaw(
+            mosaic=unpack(image.packed(), image.bits, image.shape),
+            bits=image.bits,
+            color_filter=image.color_filter,
+            camera=image.camera,
+            geometry=image.geometry(),
+            black=image.levels("black"),
+            white=image.levels("white"),
+            color_matrix=image.color_matrix(),
+            metadata=image.metadata,
+            private_metadata=image.private_metadata,
+        )
+
+
+class _Container:
+    """The sections of a file, found by walking through their headers; their bytes are read when asked for."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.is_file():
+            raise InputError(f"there is no file {path}")
+        self._file: BinaryIO = path.open("rb")
+        try:
+            self._size = path.stat().st_size
+            self._blobs: dict[str, tuple[int, int]] = {}
+            self._contents = self._walk()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> _Container:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def fault(self, words: str) -> InputError:
+        """What is wrong with this file, to be raised."""
+        return InputError(f"{self.path}: {words}")
+
+    def contents(self) -> dict[str, Any]:
+        """The table of contents."""
+        return self.json(self._contents, "its table of contents")
+
+    def bytes_of(self, name: str, what: str) -> bytes:
+        """The bytes of a section, whose SHA-1 is its name."""
+        if name not in self._blobs:
+            raise self.fault(f"{what} ({name}) is not in the file. Copy it again from where it came from")
+        start, length = self._blobs[name]
+        self._file.seek(start)
+        data = self._file.read(length)
+        if "sha1-" + hashlib.sha1(data, usedforsecurity=False).hexdigest() != name:
+            raise self.fault(
+                f"{what} is damaged: its SHA-1 is not {name}. Copy the file again from where it came from"
+            )
+        return data
+
+    def json(self, name: str, what: str) -> dict[str, Any]:
+        """The JSON object that a section holds."""
+        try:
+            found = json.loads(self.bytes_of(name, what).rstrip(b"\0"))
+        except ValueError as error:  # not JSON, or not UTF-8
+            raise self.fault(f"{what} is not JSON: {error}") from None
+        if not isinstance(found, dict):
+            raise self.fault(f"{what} is not a JSON object")
+        return found
+
+    def _walk(self) -> str:
+        """Find all sections; returns the name of the table of contents."""
+        header = self._file.read(_FILE_HEADER)
+        if header[: len(_FILE)] != _FILE:
+            raise self.fault(
+                f"it begins with {header[:8].hex(' ').upper() or 'nothing'}, not with "
+                f"{_FILE.hex(' ').upper()}, so it is no container of a Lytro camera"
+            )
+        place, contents = _FILE_HEADER, None
+        while place < self._size:
+            self._file.seek(place)
+            header = self._file.read(_SECTION_HEADER)
+            if header[:8] not in (_CONTENTS, _BLOB):
+                if not header.strip(b"\0"):
+                    break  # padding behind the last section
+                raise self.fault(
+                    f"at byte {place:,} stands {header[:8].hex(' ').upper()}, and no section begins so"
+                )
+            length = int.from_bytes(header[12:16], "big")
+            start = place + _SECTION_HEADER
+            if start + length > self._size:
+                missing = start + length - self._size
+                raise self.fault(
+                    f"{missing:,} bytes are missing at its end (the section at byte {place:,} has {length:,} "
+                    "bytes). Copy it again from where it came from"
+                )
+            name = header[_NAME].decode("ascii", "replace")
+            self._blobs[name] = (start, length)
+            if header[:8] == _CONTENTS:
+                contents = name
+            place = start + -(-length // _ALIGNMENT) * _ALIGNMENT
+        if contents is None:
+            raise self.fault("it has no table of contents. Copy it again from where it came from")
+        return contents
+
+
+class _Recording:
+    """The raw picture of a container: what its metadata state, with the metadata's own names hidden here."""
+
+    def __init__(self, container: _Container) -> None:
+        self._container = container
+        frame = _frame(container)
+        self._image_name = _reference(container, frame, "imageRef")
+        self.metadata = container.json(_reference(container, frame, "metadataRef"), "its metadata")
+        private = frame.get("privateMetadataRef")
+        self.private_metadata = container.json(private, "its private metadata") if isinstance(private, str) else {}
+        _, length = container._blobs.get(self._image_name, (0, -1))
+        self.bits, self.shape, packing = self._packing(length)
+        self.camera = self._camera(packing)
+        self.color_filter = self._color_filter(packing)
+
+    def packed(self) -> bytes:
+        """The bytes of the mosaic."""
+        return self._container.bytes_of(self._image_name, "its picture")
+
+    def geometry(self) -> LytroGeometry:
+        """The devices' geometry."""
+        return LytroGeometry(
+            lens_pitch=self._length("devices", "mla", "lensPitch"),
+            lens_rotation=self._number("devices", "mla", "rotation"),
+            lens_height=self._length("devices", "mla", "sensorOffset", "z"),
+            pixel_pitch=self._length("devices", "sensor", "pixelPitch"),
+            focal_length=self._length("devices", "lens", "focalLength"),
+            f_number=self._length("devices", "lens", "fNumber"),
+            exit_pupil_distance=self._number("devices", "lens", "exitPupilOffset", "z"),
+        )
+
+    def levels(self, name: str) -> tuple[float, float, float, float] | None:
+        """The black or white levels of the pixels of a tile, row by row."""
+        for image in self._images():
+            if isinstance(_at(self.metadata, *image, "pixelFormat", name), dict):
+                found = [self._number(*image, "pixelFormat", name, kind) for kind in _PLACES[self.color_filter]]
+                if None in found:
+                    raise self._container.fault(f"its metadata state {name} levels for some of the colours only")
+                a, b, c, d = (value or 0.0 for value in found)
+                self._check_levels(name, (a, b, c, d))
+                return a, b, c, d
+        return None
+
+    def color_matrix(self) -> NDArray[np.float64] | None:
+        """From the camera's colours to sRGB."""
+        for name in ("ccm", "ccmRgbToSrgbArray"):
+            given = _at(self.metadata, "image", "color", name)
+            if given is None:
+                continue
+            try:
+                matrix = np.array(given, dtype=np.float64).reshape(3, 3)
+            except (TypeError, ValueError):
+                matrix = np.full((3, 3), np.nan)
+            if not np.isfinite(matrix).all():
+                raise self._container.fault(f"image.color.{name} of its metadata is no matrix of 3×3 numbers")
+            return matrix
+        return None
+
+    def _check_levels(self, name: str, levels: tuple[float, ...]) -> None:
+        top = 2**self.bits - 1
+        if not all(0 <= level <= top for level in levels) or (name == "white" and 0 in levels):
+            raise self._container.fault(
+                f"its metadata state {name} levels of {levels}, and pixels hold 0 to {top}"
+            )
+        black = self.levels("black") if name == "white" else None
+        if black is not None and any(high <= low for low, high in zip(black, levels, strict=True)):
+            raise self._container.fault(
+                f"its metadata state white levels of {levels}, not above the black ones, {black}"
+            )
+
+    @staticmethod
+    def _images() -> tuple[tuple[str, ...], ...]:
+        """Where the metadata may speak of pixels: directly (Illum) or among details of the raw data (F01)."""
+        return ("image",), ("image", "rawDetails")
+
+    def _stated(self, *keys: str) -> Any:
+        for image in self._images():
+            found = _at(self.metadata, *image, *keys)
+            if found is not None:
+                return found
+        return None
+
+    def _packing(self, length: int) -> tuple[int, tuple[int, int], _Packing]:
+        """Bits, shape, and the camera that packs so; from what is stated, and else from the number of bytes."""
+        fault = self._container.fault
+        if length < 0:
+            raise fault(
+                f"its picture ({self._image_name}) is not in the file. Copy it again from where it came from"
+            )
+        bits = self._stated("pixelPacking", "bitsPerPixel")
+        size = (_at(self.metadata, "image", "height"), _at(self.metadata, "image", "width"))
+        for packing in _PACKINGS:
+            shape = packing.shape if None in size else size
+            if not all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in shape):
+                raise fault(f"its metadata state a picture of {size[1]}×{size[0]} pixels")
+            fits_bytes = shape[0] * shape[1] * packing.bits == length * 8
+            if not (fits_bytes if bits is None else bits == packing.bits):
+                continue
+            order = self._stated("pixelPacking", "endianness")
+            if order not in (None, packing.endianness):
+                raise fault(
+                    f"it packs {packing.bits} bits {order}-endian; only {packing.endianness}-endian is known"
+                )
+            if not fits_bytes:
+                raise fault(
+                    f"a picture of {shape[1]}×{shape[0]} pixels of {packing.bits} bits has "
+                    f"{shape[0] * shape[1] * packing.bits / 8:,.0f} bytes, and this one has {length:,}"
+                )
+            return packing.bits, (shape[0], shape[1]), packing
+        stated = f"pixels of {bits} bits" if bits is not None else f"{length:,} bytes"
+        raise fault(
+            f"its picture has {stated}, which is neither the raw recording of an Illum (10 bits, 7728×5368) "
+            "nor of an F01 (12 bits, 3280×3280)"
+        )
+
+    def _camera(self, packing: _Packing) -> str:
+        make, model = (_at(self.metadata, "camera", key) for key in ("make", "model"))
+        words = [word for word in (make, model) if isinstance(word, str) and word]
+        return " ".join(words) if words else packing.camera
+
+    def _color_filter(self, packing: _Packing) -> str:
+        corner = self._stated("mosaic", "upperLeftPixel")
+        if corner is None:
+            return packing.color_filter
+        if corner not in _CORNERS:
+            raise self._container.fault(
+                f'the upper left pixel of its colour filter is "{corner}"; {", ".join(_CORNERS)} are known'
+            )
+        return _CORNERS[corner]
+
+    def _number(self, *keys: str) -> float | None:
+        value = _at(self.metadata, *keys)
+        if value is None:
+            return None
+        if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+            raise self._container.fault(f"{'.'.join(keys)} of its metadata is {value!r}, not a number")
+        return float(value)
+
+    def _length(self, *keys: str) -> float | None:
+        """A number above 0, in metres if it is a length."""
+        value = self._number(*keys)
+        if value is not None and not value > 0:
+            raise self._container.fault(
+                f"{'.'.join(keys)} of its metadata is {value:g}, and must be greater than 0"
+            )
+        return value
+
+
+def _frame(container: _Container) -> dict[str, Any]:
+    """The names of a container's picture and metadata."""
+    contents = container.contents()
+    for keys in (("frames",), ("picture", "frameArray")):
+        frames = _at(contents, *keys)
+        if isinstance(frames, list) and frames and isinstance(frames[0], dict):
+            frame = frames[0].get("frame")
+            if isinstance(frame, dict):
+                return frame
+    raise container.fault(
+        "it holds no raw recording. Files for the web (…-stk.lfp) hold only pictures made of one; "
+        "take the camera's own file"
+    )
+
+
+def _reference(container: _Container, frame: dict[str, Any], key: str) -> str:
+    name = frame.get(key)
+    if not isinstance(name, str):
+        raise container.fault(f"its table of contents has no {key}, so it holds no raw recording")
+    return name
+
+
+def _at(tree: Any, *keys: str) -> Any:
+    """What stands in a tree of JSON under these keys; None if nothing does."""
+    for key in keys:
+        tree = tree.get(key) if isinstance(tree, dict) else None
+    return tree

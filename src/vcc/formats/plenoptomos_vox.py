@@ -1,0 +1,187 @@
+"""``.vox`` files of the plenoptomos toolbox: HDF5 with the samples and the plenoptic camera that recorded them.
+
+Facts of the format: https://cicwi.github.io/plenoptomos. Its (v, u) are places on the main lens, its (t, s)
+places in the plane of the microlenses, at a distance z₁ behind the main lens. A ray through the main lens
+(focal length f₁) at u that arrives at x there has the slope (x − u)/z₁ behind the lens and (x − u)/z₁ + u/f₁
+before it; and with the picture upright, x = −(k − k₀)·p::
+
+    s = (1/f₁ − 1/z₁)·u − (k − k₀)·p/z₁    (p: pitch of the microlenses; likewise t)
+
+which is a camera array in the plane of the main lens that converges where the lens focuses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.formats import hdf5
+from vcc.formats.grid import Decoded, Geometry
+from vcc.units import mm, um
+
+ENDINGS = (".vox",)
+
+_CAMERA = "/instrument/camera"
+_UNITS = {"m": 1.0, "mm": mm, "um": um, "µm": um}
+_DEFAULT_UNIT = "mm"
+_ORDER = "vutsc"
+_FOCUSED = 1e-2  # sensor out of the microlenses' focal plane by more than this share: plenoptomos calls it focused
+_EXACT_IN_FLOAT32 = 2**24
+
+
+def recognised(path: Path) -> bool:
+    """Whether this is meant to be such a file, by its ending."""
+    return path.suffix.lower() in ENDINGS and path.is_file()
+
+
+def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> Decoded:
+    """The light field of a ``.vox`` file, with the frame that its camera makes.
+
+    Args:
+        path: the file.
+        progress: called when it is done.
+
+    Returns:
+        Linear samples: 8- and 16-bit counts as stored, others as floating-point numbers. The white and dark
+        pictures that the file may hold are not applied, and a remark says so.
+
+    Raises:
+        InputError: no h5py, a file that is truncated or no ``.vox``, one that holds a raw sensor picture, axes or
+            units that are not known, or negative samples.
+    """
+    path = Path(path)
+    with hdf5.opened(path) as file:
+        kind = _text(file.attrs.get("description"))
+        if kind != "VoxelDataFormat":
+            stated = f'its description is "{kind}"' if kind else "it has no description"
+            raise InputError(f'{path} is HDF5 and no .vox file: {stated}, not "VoxelDataFormat"')
+        if "/data/image" not in file:
+            raise InputError(f"{path} has no /data/image. Copy it again from where it came from")
+        values = _samples(file["/data/image"], path)
+        camera = _Camera(file, path)
+        frame, remarks = camera.frame(values.shape)
+        geometry = Geometry(spacing=None if frame else camera.lengths("main_lens/pixel_size", "v:u"))
+        kept = [name for name in ("white", "dark") if f"/data/{name}" in file]
+        if kept:
+            remarks.append(f"it holds {' and '.join(kept)} pictures too, which are not applied")
+        model = _text(file[_CAMERA].attrs.get("model")) if _CAMERA in file else ""
+    if progress is not None:
+        progress(1, 1)
+    return Decoded(
+        format="plenoptomos .vox",
+        values=values,
+        transfer="linear",
+        geometry=geometry,
+        frame=frame,
+        remarks=tuple(remarks),
+        metadata={"camera": model} if model else {},
+    )
+
+
+def _text(value: Any) -> str:
+    """An attribute as text, however it was written."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return "" if value is None else str(value)
+
+
+def _samples(image: Any, path: Path) -> NDArray[Any]:
+    """The samples with axes (v, u, t, s[, channel])."""
+    mode, axes = _text(image.attrs.get("mode")), _text(image.attrs.get("axes"))
+    names = axes.split(":")
+    if mode == "raw" or {"tau", "sigma"} & set(names):
+        raise InputError(
+            f"{path} holds a raw picture of the sensor (mode raw, axes {axes}), not the views of a light field: "
+            "decode it first with plenoptomos and save what comes of that"
+        )
+    if sorted(names) not in (sorted("vuts"), sorted(_ORDER)) or len(names) != image.ndim:
+        raise InputError(
+            f'{path}: the axes of /data/image are "{axes}", and it has {image.ndim}; "v:u:t:s" in any order, and '
+            "perhaps c, is known"
+        )
+    values: NDArray[Any] = np.transpose(image[()], [names.index(name) for name in _ORDER if name in names])
+    if values.dtype.kind not in "iuf":
+        raise InputError(f"{path} holds samples of type {values.dtype}, not numbers")
+    if 0 not in values.shape and values.min() < 0:
+        raise InputError(f"{path} holds negative samples, down to {values.min()}: light is not negative")
+    if values.dtype in (np.uint8, np.uint16) or values.dtype.kind == "f":
+        return values
+    exact = 0 in values.shape or values.max() <= _EXACT_IN_FLOAT32
+    return values.astype(np.float32 if exact else np.float64)
+
+
+class _Camera:
+    """The camera that a file describes: lengths in metres; None for what it does not state, or states as 0."""
+
+    def __init__(self, file: Any, path: Path) -> None:
+        self._file, self._path = file, path
+
+    def lengths(self, name: str, axes: str) -> tuple[float, float] | None:
+        """Two lengths above 0, in the order of these axes."""
+        found = self._stated(name, axes)
+        if found is None or not all(found):
+            return None
+        if min(found) < 0:
+            raise InputError(
+                f"{self._path}: {_CAMERA}/{name} is {found[0]:g}, {found[1]:g} m: a length is above 0"
+            )
+        return found[0], found[1]
+
+    def height(self, name: str) -> float | None:
+        """The distance of something behind the main lens; None if it is not stated."""
+        found = self._stated(f"{name}/position", "x:y:z")
+        return found[2] or None if found is not None else None
+
+    def length(self, name: str) -> float | None:
+        """One length."""
+        found = self._stated(name, "")
+        return found[0] or None if found is not None else None
+
+    def frame(self, shape: tuple[int, ...]) -> tuple[Affine | None, list[str]]:
+        """The frame of samples of this shape, None where the file states too little; and what to say."""
+        apart = self.lengths("main_lens/pixel_size", "v:u")
+        pitch = self.lengths("micro_lens/physical_size", "t:s")
+        focal_length, behind = self.length("main_lens/f1"), self.height("micro_lenses_array")
+        if apart is None or pitch is None or focal_length is None or behind is None:
+            return None, ["it does not state all of its camera, so the directions of its rays are not known"]
+        small, sensor = self.length("micro_lens/f2"), self.height("sensor")
+        if small is not None and sensor is not None and abs(sensor - behind - small) > _FOCUSED * abs(small):
+            return None, [
+                "its sensor is not in the focal plane of its microlenses (a focused plenoptic camera), so the "
+                "directions of its rays are not known"
+            ]
+        (dv, du), (pt, ps) = apart, pitch
+        vergence = 1 / focal_length - 1 / behind
+        linear = np.zeros((4, 4))
+        linear[0, 0], linear[1, 1] = du, dv
+        linear[2, 0], linear[3, 1] = du * vergence, dv * vergence
+        linear[2, 2], linear[3, 3] = -ps / behind, -pt / behind
+        nv, nu, nt, ns = shape[:4]
+        middle = -np.array([nu - 1, nv - 1, ns - 1, nt - 1]) / 2
+        return Affine.from_parts(linear, linear @ middle), []
+
+    def _stated(self, name: str, axes: str) -> tuple[float, ...] | None:
+        """Lengths in metres in the order of these axes, "" for a single one."""
+        where = f"{_CAMERA}/{name}"
+        if where not in self._file:
+            return None
+        data = self._file[where]
+        unit = _text(data.attrs.get("units")) or _DEFAULT_UNIT
+        if unit not in _UNITS:
+            raise InputError(f'{self._path}: {where} is in "{unit}"; {", ".join(_UNITS)} are known')
+        wanted = axes.split(":") if axes else [""]
+        given = (_text(data.attrs.get("axes")) or axes).split(":") if axes else [""]
+        numbers = np.ravel(data[()])
+        if sorted(given) != sorted(wanted) or numbers.size != len(wanted) or numbers.dtype.kind not in "iuf":
+            raise InputError(
+                f'{self._path}: {where} holds {numbers.size} numbers along "{":".join(given)}", not along "{axes}"'
+            )
+        if not np.isfinite(numbers).all():
+            raise InputError(f"{self._path}: {where} holds {numbers.tolist()}, not finite numbers")
+        return tuple(float(numbers[given.index(axis)]) * _UNITS[unit] for axis in wanted)

@@ -1,0 +1,103 @@
+"""Reading the pictures of a grid of views into one array."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Collection
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed, wait
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.errors import InputError
+from vcc.formats.pictures import read_picture, read_png_into
+from vcc.formats.transfer import decode
+
+_THREADS = 2  # decoding releases the interpreter's lock
+
+
+def read_views(
+    files: dict[tuple[int, int], Path],
+    picture: tuple[int, ...],
+    stored: type[np.generic],
+    *,
+    linear: bool,
+    progress: Callable[[int, int], None] | None = None,
+    first: Collection[tuple[int, int]] = (),
+    meanwhile: Callable[[NDArray[Any]], None] | None = None,
+) -> NDArray[Any]:
+    """All pictures in one array, shape (n, t, s[, channel]), in the order of ``files``.
+
+    Args:
+        files: by (row, column).
+        picture: the shape that all pictures must have.
+        stored: the type that they must have.
+        linear: keep that type; else decode from sRGB to float32.
+        progress: called as progress(done, total) after each picture.
+        first: places of the views to read before the others.
+        meanwhile: called with the array when these have been read, beside the reading of the others: what takes
+            some time and needs only them. Not called if one of them cannot be read.
+
+    Raises:
+        InputError: pictures that differ in size or type, a damaged picture, or more memory needed than there is.
+    """
+    kind = stored if linear else np.float32
+    shape = (len(files), *picture)
+    try:
+        values: NDArray[Any] = np.empty(shape, kind)
+    except MemoryError:
+        size = math.prod(shape) * np.dtype(kind).itemsize / 1e9
+        raise InputError(
+            f"{len(files)} views of shape {picture} need {size:.1f} GB of memory as {np.dtype(kind)}, more than "
+            'there is. transfer="linear" keeps the stored type, or leave views out'
+        ) from None
+    listed = list(files.values())
+    own = threading.local()
+
+    def read(number: int) -> None:
+        file = listed[number]
+        if not linear and not hasattr(own, "scratch"):
+            own.scratch = np.empty(picture, stored)
+        into = values[number] if linear else own.scratch
+        if not read_png_into(file, into):
+            samples, _ = read_picture(file)
+            if samples.shape != picture or samples.dtype != stored:
+                raise InputError(
+                    f"{file.name} and {listed[0].name} in {file.parent} are not alike: "
+                    f"{_describe(samples.shape, samples.dtype)} and "
+                    f"{_describe(picture, np.dtype(stored))}. "
+                    "All views have the same size and type"
+                )
+            into[...] = samples
+        if not linear:
+            decode(into, values[number])
+
+    def when_read(awaited: list[Future[None]]) -> None:
+        wait(awaited)  # they were begun before this: it cannot wait for ever
+        if meanwhile is not None and all(not task.cancelled() and task.exception() is None for task in awaited):
+            meanwhile(values)
+
+    early = [number for number, place in enumerate(files) if place in first]
+    late = [number for number, place in enumerate(files) if place not in first]
+    with ThreadPoolExecutor(_THREADS) as pool:
+        tasks = [pool.submit(read, number) for number in early]
+        beside = pool.submit(when_read, tasks[:])
+        tasks += [pool.submit(read, number) for number in late]
+        try:
+            for done, task in enumerate(as_completed(tasks), 1):
+                task.result()
+                if progress is not None:
+                    progress(done, len(listed))
+            beside.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)  # one fault is enough
+            raise
+    return values
+
+
+def _describe(shape: tuple[int, ...], kind: np.dtype[Any]) -> str:
+    channels = f"{shape[2]} channels" if len(shape) == 3 else "grey"
+    return f"{shape[1]}×{shape[0]} pixels, {channels}, {kind}"

@@ -1,0 +1,100 @@
+"""Views of a grid that is not complete: not a light field, and nothing is made up for what is missing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.light_field import LightField
+
+
+@dataclass(frozen=True, eq=False)
+class SparseViews:
+    """Some of the views of a grid, each in its place.
+
+    ``views[4, :]`` is the light field of a row that is complete, ``views[2:5, 3:6]`` that of a part; a part with
+    holes is refused, with what is missing.
+
+    Args:
+        pictures: samples of the views there are, shape (n, t, s) or (n, t, s, channels), as in a `vcc.LightField`.
+        places: (row, column) of each, row 0 at the top, column 0 at the left.
+        shape: (rows, columns) of the whole grid.
+        frame: the 5×5 frame of the whole grid's light field.
+        disparity_range: (lowest, highest), pixels per view, where known.
+
+    Raises:
+        InputError: places that do not fit the pictures or the grid.
+    """
+
+    pictures: NDArray[Any]
+    places: tuple[tuple[int, int], ...]
+    shape: tuple[int, int]
+    frame: Affine
+    disparity_range: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.places) != len(self.pictures) or len(set(self.places)) != len(self.places):
+            raise InputError(
+                f"{len(self.pictures)} pictures need as many different places, not {len(self.places)}"
+            )
+        for row, column in self.places:
+            if not (0 <= row < self.shape[0] and 0 <= column < self.shape[1]):
+                raise InputError(
+                    f"the place {(row, column)} is outside a grid of {self.shape[0]}×{self.shape[1]} views"
+                )
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Which views there are, shape (rows, columns)."""
+        there = np.zeros(self.shape, dtype=np.bool_)
+        for place in self.places:
+            there[place] = True
+        return there
+
+    @property
+    def missing(self) -> tuple[tuple[int, int], ...]:
+        """(row, column) of the views that there are not."""
+        return tuple((int(row), int(column)) for row, column in np.argwhere(~self.present))
+
+    def __getitem__(self, part: tuple[int | slice, int | slice]) -> LightField:
+        """The light field of a complete part of the grid, in its place.
+
+        Args:
+            part: (rows, columns), each a number or a slice.
+
+        Raises:
+            InputError: a view of the part is missing, or there is none in it.
+        """
+        rows, columns = (_numbers(wanted, size) for wanted, size in zip(part, self.shape, strict=True))
+        number = {place: n for n, place in enumerate(self.places)}
+        missing = [(row, column) for row in rows for column in columns if (row, column) not in number]
+        if missing or not rows or not columns:
+            named = ", ".join(map(str, missing[:12])) + (", …" if len(missing) > 12 else "")
+            raise InputError(
+                f"this part of the grid has no light field: its views {named} are missing"
+                if missing
+                else f"there is no view in this part of a grid of {self.shape[0]}×{self.shape[1]}"
+            )
+        picture = self.pictures.shape[1:]
+        chosen = [number[row, column] for row in rows for column in columns]
+        values = self.pictures[chosen].reshape(len(rows), len(columns), *picture)
+        steps = [places[1] - places[0] if len(places) > 1 else 1 for places in (rows, columns)]
+        place = Affine.scaling(steps[1], steps[0], 1, 1)
+        frame = self.frame @ Affine.translation(columns[0], rows[0], 0, 0) @ place
+        known = self.disparity_range
+        if known is not None:
+            known = (known[0] * steps[1], known[1] * steps[1]) if steps[1] > 0 else None
+        return LightField(values, frame, known)
+
+
+def _numbers(wanted: int | slice, size: int) -> list[int]:
+    if isinstance(wanted, slice):
+        return list(range(*wanted.indices(size)))
+    if not -size <= wanted < size:
+        raise InputError(f"there is no row or column {wanted} of views in {size}")
+    return [wanted % size]

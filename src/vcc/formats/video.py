@@ -1,0 +1,287 @@
+"""Videos of a camera that moves along a line, each frame a view; and flights through a light field, as videos
+for people.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.errors import InputError
+from vcc.formats.atomic import atomic_path
+from vcc.formats.exposing import Codes, Exposure
+from vcc.formats.grid import Decoded
+
+if TYPE_CHECKING:
+    from vcc.light_field import LightField
+    from vcc.store import StoredLightField
+
+ENDINGS = (".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v")
+
+Movement = Literal["right", "left", "down", "up"]
+"""Where the camera of a video goes, as someone sees it who looks at the scene."""
+Flight = Literal["serpentine", "circle", "row"]
+"""Ways through the views of a light field; see `save`."""
+
+_BT709, _UNSPECIFIED, _SRGB_CURVE = 1, 2, 13  # ITU-T H.273
+_HIGH_DYNAMIC_RANGE = {16: "PQ", 18: "HLG"}
+_HD = 720  # rows from which players take BT.709 where nothing is stated
+
+
+def recognised(path: Path) -> bool:
+    """Whether this is meant to be a video, by its ending."""
+    return path.suffix.lower() in ENDINGS and path.is_file()
+
+
+def read(
+    path: Path,
+    *,
+    every: int = 1,
+    first: int = 0,
+    last: int | None = None,
+    moves: Movement = "right",
+    progress: Callable[[int, int], None] | None = None,
+) -> Decoded:
+    """The frames of a video as views from places in equal steps along a line.
+
+    Args:
+        path: the video.
+        every: take every n-th frame.
+        first: the first frame to take, counted from 0.
+        last: the last that may be taken; the video's last if not given.
+        moves: where the camera goes: "right" and "left" make one row of views, "down" and "up" one column.
+        progress: called as progress(done, total) after each frame; total is 0 where the video does not state it.
+
+    Returns:
+        Samples of shape (1, views, t, s, 3) or (views, 1, t, s, 3), uint8, or uint16 of videos of more than 8
+        bits, display-referred. Spacing and field of view are unknown.
+
+    Raises:
+        InputError: no PyAV, a damaged or truncated video, fewer than two frames to take, or one in the brightness
+            curves of high dynamic range.
+    """
+    path = Path(path)
+    _check_selection(every, first, last, moves)
+    av = _library()
+    frames: list[NDArray[Any]] = []
+    remarks: list[str] = []
+    try:
+        with av.open(str(path)) as container:
+            if not container.streams.video:
+                raise InputError(f"{path} holds no video")
+            stream = container.streams.video[0]
+            stream.thread_type = "AUTO"
+            decoded, end = 0, 0.0
+            for frame in container.decode(stream):
+                if last is not None and decoded > last:
+                    break
+                if decoded >= first and (decoded - first) % every == 0:
+                    frames.append(_picture(frame, path))
+                    if frames[-1].shape != frames[0].shape:
+                        raise InputError(f"{path}: the size of the picture changes at frame {decoded}")
+                    if len(frames) == 1:
+                        remarks = _remarks(frame, stream)
+                decoded += 1
+                end = frame.time or 0.0
+                if progress is not None:
+                    progress(decoded, stream.frames)
+            else:
+                _check_complete(stream, decoded, end, path)
+    except av.error.FFmpegError as error:
+        raise InputError(
+            f"{path} cannot be read as a video: it is truncated, damaged or in a format that is not "
+            f"known ({error}). Copy it again from where it came from"
+        ) from error
+    if len(frames) < 2:
+        raise InputError(
+            f"{path} gives {len(frames)} of its {decoded} frames with every={every}, first={first}, last={last}; "
+            "a light field needs two or more"
+        )
+    if moves in ("left", "up"):
+        frames.reverse()
+    values = np.stack(frames)
+    return Decoded(
+        format="video of a camera on a line",
+        values=values[None] if moves in ("left", "right") else values[:, None],
+        transfer="srgb",
+        remarks=tuple(remarks),
+        metadata={"frames": decoded, "frames_per_second": float(stream.average_rate or 0)},
+    )
+
+
+def save(
+    light_field: LightField | StoredLightField,
+    path: str | PathLike[str],
+    *,
+    flight: Flight = "serpentine",
+    frames_per_second: float = 25,
+    exposure: Exposure = 1.0,
+    quality: int = 18,
+    lossless: bool = False,
+) -> tuple[int, float, float]:
+    """Write a flight through the views as an MP4 (H.264, sRGB): each frame is a view, none is interpolated.
+
+    Args:
+        light_field: 1 or 3 channels.
+        path: where to; ends in ``.mp4``.
+        flight: "serpentine" passes all views, every other row backwards; "circle" the views nearest to the
+            largest ellipse, once round, so that it can be played over and over; "row" the middle row, left to
+            right (the column, if there is but one).
+        frames_per_second: how fast.
+        exposure: factor before the sRGB curve; "auto" takes 1 over the 99.5th percentile of
+            the luminance of the middle view.
+        quality: libx264's constant rate factor: 0 (best) to 51.
+        lossless: keep each 8-bit sample exactly (H.264 in RGB: large, and few players know it).
+
+    Returns:
+        The number of frames, the exposure, and the share of the samples, 0 to 1, that it clipped. Without
+        ``lossless`` pictures of odd height or width have their last row or column doubled.
+
+    Raises:
+        InputError: no PyAV, another ending or number of channels, an unknown flight, an impossible rate or
+            quality, or a place that cannot be written to.
+    """
+    path = Path(path).expanduser()
+    if path.suffix.lower() != ".mp4":
+        raise InputError(f'a flight is written to a name that ends in .mp4, not "{path.name}"')
+    if light_field.channels not in (None, 1, 3):
+        raise InputError(f"a video has 1 or 3 channels, and this light field has {light_field.channels}")
+    if not (frames_per_second > 0 and math.isfinite(frames_per_second)):
+        raise InputError(f"frames_per_second is a number above 0, not {frames_per_second}")
+    if not 0 <= quality <= 51:
+        raise InputError(f"quality is libx264's constant rate factor, 0 to 51, not {quality}")
+    rows, columns, height, width = light_field.shape[:4]
+    way = _way(rows, columns, flight)
+    numbers = Codes(light_field, 8, "srgb", exposure)
+    av = _library()
+
+    def pictures() -> Iterator[NDArray[np.uint8]]:
+        for row, column in way:
+            codes = numbers.view(row, column).reshape(height, width, -1)
+            codes = np.broadcast_to(codes, (height, width, 3))
+            if not lossless:
+                codes = np.pad(codes, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+            yield np.ascontiguousarray(codes)
+
+    with atomic_path(path) as temporary:
+        try:
+            _encode(av, temporary, pictures(), frames_per_second, quality, lossless)
+        except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
+            raise InputError(f"{path} could not be written as a video: {error}") from error
+    return len(way), numbers.exposure, numbers.clipped
+
+
+def _library() -> Any:
+    try:
+        import av
+    except ImportError:
+        raise InputError('videos need the package av: pip install "virtual-computational-camera[video]"') from None
+    return av
+
+
+def _check_selection(every: int, first: int, last: int | None, moves: str) -> None:
+    if moves not in get_args(Movement):
+        raise InputError(f"moves is one of {', '.join(map(repr, get_args(Movement)))}, not {moves!r}")
+    for name, value, least in (("every", every, 1), ("first", first, 0), ("last", last, first)):
+        if value is not None and (not isinstance(value, int | np.integer) or value < least):
+            raise InputError(f"{name} is a whole number of {least} or more, not {value!r}")
+
+
+def _picture(frame: Any, path: Path) -> NDArray[Any]:
+    """A frame as RGB, upright."""
+    if frame.is_corrupt:
+        raise InputError(f"{path}: the frame at {frame.time} s is damaged. Copy it again from where it came from")
+    if frame.color_trc in _HIGH_DYNAMIC_RANGE:
+        raise InputError(
+            f"{path} has the brightness curve {_HIGH_DYNAMIC_RANGE[frame.color_trc]} (high dynamic range), which "
+            "is not sRGB: convert it to a video of standard dynamic range"
+        )
+    bits = max(component.bits for component in frame.format.components)
+    source = "ITU709" if frame.colorspace == _UNSPECIFIED and frame.height >= _HD else None
+    samples: NDArray[Any] = frame.to_ndarray(format="rgb24" if bits <= 8 else "rgb48le", src_colorspace=source)
+    if frame.rotation % 90:
+        raise InputError(f"{path} is to be turned by {frame.rotation}°, which is no multiple of 90°")
+    return np.rot90(samples, frame.rotation // 90)
+
+
+def _remarks(frame: Any, stream: Any) -> list[str]:
+    said = ["its frames are taken as views from places in equal steps, and its samples as sRGB"]
+    if frame.interlaced_frame:
+        said.append("it is interlaced: every other row is from another moment. Deinterlace it first")
+    aspect = stream.sample_aspect_ratio
+    if aspect and aspect != 1:
+        said.append(
+            f"its pixels are {aspect} as wide as high: give slope_per_pixel=(pt, ps), the second that much larger"
+        )
+    return said
+
+
+def _check_complete(stream: Any, decoded: int, end: float, path: Path) -> None:
+    """Refuse a video whose frames end before it says that they do."""
+    stated = stream.frames
+    hours, _, rest = stream.metadata.get("DURATION", "").partition(":")  # Matroska counts no frames
+    if not stated and rest and stream.average_rate:
+        minutes, _, seconds = rest.partition(":")
+        step = 1 / float(stream.average_rate)
+        lasts = 3600 * float(hours) + 60 * float(minutes) + float(seconds)
+        stated = decoded + max(0, round((lasts - end) / step) - 1)
+    if decoded < stated:
+        raise InputError(
+            f"{path} has {decoded} of the {stated} frames that it states: the rest is missing. Copy it again "
+            "from where it came from, or take those there are with last="
+        )
+
+
+def _way(rows: int, columns: int, flight: str) -> list[tuple[int, int]]:
+    """(row, column) of the views of a flight."""
+    if flight == "serpentine":
+        return [(r, c if r % 2 == 0 else columns - 1 - c) for r in range(rows) for c in range(columns)]
+    if flight == "row":
+        if columns == 1:
+            return [(r, 0) for r in range(rows)]
+        return [((rows - 1) // 2, c) for c in range(columns)]
+    if flight == "circle":
+        angles = np.linspace(0, 2 * np.pi, 16 * (rows + columns), endpoint=False)
+        down = np.rint((rows - 1) / 2 * (1 - np.cos(angles))).astype(int)
+        right = np.rint((columns - 1) / 2 * (1 + np.sin(angles))).astype(int)
+        way: list[tuple[int, int]] = []
+        for place in zip(down.tolist(), right.tolist(), strict=True):
+            if not way or place != way[-1]:
+                way.append(place)
+        return way[:-1] if len(way) > 1 and way[0] == way[-1] else way
+    raise InputError(f"flight is one of {', '.join(map(repr, get_args(Flight)))}, not {flight!r}")
+
+
+def _encode(
+    av: Any,
+    path: Path,
+    pictures: Iterator[NDArray[np.uint8]],
+    frames_per_second: float,
+    quality: int,
+    lossless: bool,
+) -> None:
+    with av.open(str(path), "w", options={"movflags": "+faststart"}) as container:
+        stream: Any = None
+        for picture in pictures:
+            if stream is None:
+                codec, options = ("libx264rgb", {"qp": "0"}) if lossless else ("libx264", {"crf": str(quality)})
+                rate = Fraction(frames_per_second).limit_denominator(1001)
+                stream = container.add_stream(codec, rate=rate, options=options)
+                stream.height, stream.width = picture.shape[:2]
+                stream.pix_fmt = "rgb24" if lossless else "yuv420p"
+                context = stream.codec_context
+                context.color_primaries, context.color_trc = _BT709, _SRGB_CURVE
+                if not lossless:
+                    context.colorspace = context.color_range = _BT709
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            if not lossless:
+                frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))

@@ -1,0 +1,231 @@
+"""Lytro containers built byte by byte from the layout; pixels packed by a few lines that are not ours."""
+
+import hashlib
+import json
+
+import numpy as np
+import pytest
+
+from vcc.errors import InputError
+from vcc.formats import lytro_lfp
+from vcc.formats.lytro_lfp import read_lytro, unpack
+
+FILE = bytes.fromhex("89 4C 46 50 0D 0A 1A 0A 00 00 00 01 00 00 00 00")
+CONTENTS, BLOB = (bytes.fromhex(f"89 4C 46 {kind} 0D 0A 1A 0A 00 00 00 00") for kind in ("4D", "43"))
+GEOMETRY = {
+    "mla": {"lensPitch": 2e-5, "rotation": 1e-3, "sensorOffset": {"x": 1e-6, "y": 0, "z": 3.7e-5}},
+    "sensor": {"pixelPitch": 1.4e-6, "bitsPerPixel": 10},
+    "lens": {"focalLength": 9.5e-3, "fNumber": 2, "exitPupilOffset": {"z": 0.11}},
+}
+
+
+def pack_little(pixels):
+    """10 bits: four bytes of high bits, then one of low bits, pixel 0 in bits 0 and 1."""
+    packed = bytearray()
+    for a, b, c, d in np.reshape(pixels, (-1, 4)).tolist():
+        packed += bytes([a // 4, b // 4, c // 4, d // 4, a % 4 + 4 * (b % 4) + 16 * (c % 4) + 64 * (d % 4)])
+    return bytes(packed)
+
+
+def pack_big(pixels):
+    """12 bits, written one after the other."""
+    digits = "".join(f"{pixel:03x}" for pixel in np.ravel(pixels).tolist())
+    return bytes.fromhex(digits)
+
+
+def name_of(data):
+    return "sha1-" + hashlib.sha1(data).hexdigest()
+
+
+def section(magic, data):
+    header = magic + len(data).to_bytes(4, "big") + name_of(data).encode() + bytes(35)
+    return header + data + bytes(-len(data) % 16)
+
+
+def container(picture, metadata, *, old=False, private=None, broken_name=None):
+    """A container's bytes, with the table of contents of the old or the new kind."""
+    blobs = [json.dumps(metadata).encode(), picture]
+    frame = {"metadataRef": name_of(blobs[0]), "imageRef": broken_name or name_of(picture)}
+    if private is not None:
+        blobs.append(json.dumps(private).encode())
+        frame["privateMetadataRef"] = name_of(blobs[-1])
+    frames = [{"frame": frame}]
+    contents = {"picture": {"frameArray": frames}} if old else {"frames": frames, "version": {"major": 1}}
+    return FILE + section(CONTENTS, json.dumps(contents).encode()) + b"".join(section(BLOB, b) for b in blobs)
+
+
+@pytest.fixture
+def illum():
+    """Pixels of an Illum of 6×8 pixels, and the file."""
+    pixels = np.random.default_rng(1).integers(0, 1024, (6, 8)).astype(np.uint16)
+    metadata = {
+        "camera": {"make": "Lytro, Inc.", "model": "ILLUM"},
+        "devices": GEOMETRY,
+        "image": {
+            "width": 8,
+            "height": 6,
+            "pixelPacking": {"endianness": "little", "bitsPerPixel": 10},
+            "pixelFormat": {
+                "black": {"r": 64, "gr": 65, "gb": 66, "b": 67},
+                "white": {"r": 1023, "gr": 1022, "gb": 1021, "b": 1020},
+            },
+            "mosaic": {"tile": "r,gr:gb,b", "upperLeftPixel": "gr"},
+            "color": {"ccm": [2, -1, 0, -0.5, 1.5, 0, 0, -1, 2], "gamma": 0.4},
+        },
+    }
+    return pixels, metadata, container(pack_little(pixels), metadata, private={"camera": {"serialNumber": "B1"}})
+
+
+def test_illum(tmp_path, illum):
+    pixels, metadata, data = illum
+    path = tmp_path / "Größe 1.lfr"
+    path.write_bytes(data)
+    raw = read_lytro(path)
+    assert raw.mosaic.dtype == np.uint16
+    assert np.array_equal(raw.mosaic, pixels)
+    assert (raw.bits, raw.color_filter, raw.camera) == (10, "GRBG", "Lytro, Inc. ILLUM")
+    g = raw.geometry
+    assert (g.lens_pitch, g.lens_rotation, g.lens_height, g.pixel_pitch) == (2e-5, 1e-3, 3.7e-5, 1.4e-6)
+    assert (g.focal_length, g.f_number, g.exit_pupil_distance) == (9.5e-3, 2, 0.11)
+    assert raw.metadata == metadata
+    assert raw.private_metadata["camera"]["serialNumber"] == "B1"
+    assert raw.color_matrix[0].tolist() == [2, -1, 0]
+    # a tile is G R / B G: green (of the red rows), red / blue, green (of the blue rows)
+    assert raw.black == (65, 64, 67, 66)
+    assert raw.white == (1022, 1023, 1020, 1021)
+    light = raw.linear()
+    for row, column in np.ndindex(6, 8):
+        kind = [["gr", "r"], ["b", "gb"]][row % 2][column % 2]
+        low, high = (metadata["image"]["pixelFormat"][level][kind] for level in ("black", "white"))
+        # float32: a few roundings of 6e-8 each
+        assert light[row, column] == pytest.approx((int(pixels[row, column]) - low) / (high - low), abs=5e-7)
+
+
+def test_f01_of_the_old_kind(tmp_path):
+    pixels = np.random.default_rng(2).integers(0, 4096, (4, 6)).astype(np.uint16)
+    levels = {
+        "black": dict.fromkeys(("r", "gr", "gb", "b"), 168),
+        "white": dict.fromkeys(("r", "gr", "gb", "b"), 4095),
+    }
+    details = {"pixelFormat": levels, "pixelPacking": {"endianness": "big", "bitsPerPixel": 12}}
+    color = {"ccmRgbToSrgbArray": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+    metadata = {"image": {"width": 6, "height": 4, "rawDetails": details, "color": color}}
+    path = tmp_path / "old.lfp"
+    path.write_bytes(container(pack_big(pixels), metadata, old=True))
+    raw = read_lytro(path)
+    assert np.array_equal(raw.mosaic, pixels)
+    assert (raw.bits, raw.color_filter, raw.camera) == (12, "BGGR", "Lytro F01")
+    assert raw.black == (168,) * 4
+    assert np.array_equal(raw.color_matrix, np.eye(3))
+    assert raw.geometry.lens_pitch is None
+    assert raw.private_metadata == {}
+
+
+def test_levels_that_are_not_stated_are_those_of_the_bits(tmp_path):
+    pixels = np.array([[0, 4095, 0, 4095]] * 2)
+    path = tmp_path / "a.lfp"
+    path.write_bytes(container(pack_big(pixels), {"image": {"width": 4, "height": 2}}))
+    raw = read_lytro(path)  # the packing follows from the number of bytes
+    assert (raw.bits, raw.black, raw.white) == (12, None, None)
+    assert np.array_equal(raw.linear(), pixels / 4095)
+
+
+@pytest.mark.parametrize(
+    ("bits", "shape", "size"), [(10, (5368, 7728), 51_854_880), (12, (3280, 3280), 16_137_600)]
+)
+def test_the_cameras_own_sizes(bits, shape, size):
+    packed = np.random.default_rng(3).integers(0, 256, size, np.uint8).tobytes()
+    mosaic = unpack(packed, bits, shape)
+    assert mosaic.shape == shape
+    pack = pack_little if bits == 10 else pack_big
+    assert pack(mosaic[:1]) == packed[: shape[1] * bits // 8]
+    assert pack(mosaic[-1:]) == packed[-shape[1] * bits // 8 :]
+
+
+def test_sizes_of_the_cameras_need_not_be_stated(tmp_path):
+    path = tmp_path / "a.lfp"
+    path.write_bytes(container(bytes(16_137_600), {}))
+    raw = read_lytro(path)
+    assert raw.mosaic.shape == (3280, 3280)
+    assert raw.color_filter == "BGGR"
+
+
+def test_a_recording_is_no_light_field_yet(tmp_path, illum):
+    path = tmp_path / "a.lfr"
+    path.write_bytes(illum[2])
+    assert lytro_lfp.recognised(path)
+    with pytest.raises(
+        InputError, match=r"a\.lfr holds a raw recording of a Lytro, Inc\. ILLUM \(8×6 .*read_lytro"
+    ):
+        lytro_lfp.read(path)
+    other = tmp_path / "a.bin"
+    other.write_bytes(illum[2])
+    assert lytro_lfp.recognised(other)
+    other.write_bytes(b"something else")
+    assert not lytro_lfp.recognised(other)
+    assert not lytro_lfp.recognised(tmp_path)
+
+
+def refused(tmp_path, data):
+    path = tmp_path / "bad.lfp"
+    path.write_bytes(data)
+    with pytest.raises(InputError) as caught:
+        read_lytro(path)
+    assert str(path) in str(caught.value)
+    return str(caught.value)
+
+
+def test_what_is_damaged_is_refused(tmp_path, illum):
+    data = illum[2]
+    assert "begins with 50 4B 03 04 00 00 00 00" in refused(tmp_path, b"PK\3\4" + bytes(100))
+    assert "begins with nothing" in refused(tmp_path, b"")
+    assert "no table of contents" in refused(tmp_path, FILE)
+    assert "no section begins so" in refused(tmp_path, FILE + b"\1" * 200)
+    # Cut anywhere, something is said; only the padding behind the last section may be missing.
+    for length in range(0, len(data.rstrip(b"\0")), 37):
+        refused(tmp_path, data[:length])
+    picture = data.index(b"sha1-", data.index(BLOB, data.index(BLOB) + 1)) + 80
+    assert "its picture is damaged" in refused(tmp_path, data[:picture] + b"\xff\xfe" + data[picture + 2 :])
+    pixels, metadata, _ = illum
+    missing = container(pack_little(pixels), metadata, broken_name="sha1-" + "0" * 40)
+    assert "is not in the file" in refused(tmp_path, missing)
+    with pytest.raises(InputError, match="there is no file"):
+        read_lytro(tmp_path / "lost.lfp")
+
+
+def test_what_cannot_be_understood_is_refused(tmp_path, illum):
+    pixels, metadata, _ = illum
+    picture = pack_little(pixels)
+
+    def said(**image):
+        return refused(tmp_path, container(picture, {**metadata, "image": {**metadata["image"], **image}}))
+
+    assert "10 bits big-endian" in said(pixelPacking={"bitsPerPixel": 10, "endianness": "big"})
+    assert "pixels of 14 bits" in said(pixelPacking={"bitsPerPixel": 14})
+    assert "has 70 bytes, and this one has 60" in said(width=8, height=7)
+    assert "a picture of -8×6" in said(width=-8)
+    assert 'upper left pixel of its colour filter is "w"' in said(mosaic={"upperLeftPixel": "w"})
+    assert "no matrix of 3×3" in said(color={"ccm": [1, 2]})
+    levels = {"r": 5000, "gr": 0, "gb": 0, "b": 0}
+    assert "black levels of" in said(pixelFormat={"black": levels})
+    assert "for some of the colours only" in said(pixelFormat={"black": {"r": 1}})
+    full = dict.fromkeys(levels, 60)
+    assert "not above the black ones" in said(pixelFormat={"black": full, "white": full})
+    wrong = {**metadata, "devices": {"mla": {"lensPitch": "20 um"}}}
+    assert "devices.mla.lensPitch of its metadata is '20 um'" in refused(tmp_path, container(picture, wrong))
+    wrong = {**metadata, "devices": {"mla": {"lensPitch": -1}}}
+    assert "must be greater than 0" in refused(tmp_path, container(picture, wrong))
+    web = section(CONTENTS, json.dumps({"picture": {"accelerationArray": []}}).encode())
+    assert "it holds no raw recording" in refused(tmp_path, FILE + web)
+    assert "not JSON" in refused(tmp_path, FILE + section(CONTENTS, b"{"))
+    assert "not a JSON object" in refused(tmp_path, FILE + section(CONTENTS, b"[]"))
+    assert "has no imageRef" in refused(tmp_path, FILE + section(CONTENTS, b'{"frames": [{"frame": {}}]}'))
+
+
+def test_unpacking_refuses_what_does_not_fit():
+    with pytest.raises(InputError, match="10 or 12 bits"):
+        unpack(b"", 8, (2, 2))
+    with pytest.raises(InputError, match="make 5 bytes, and there are 6"):
+        unpack(bytes(6), 10, (1, 4))
+    with pytest.raises(InputError, match="there are 4"):
+        unpack(bytes(4), 12, (1, 3))

@@ -1,0 +1,151 @@
+"""ESLF, PFM and Netpbm, against files and pictures written by hand."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+from pathlib import Path
+from typing import Any
+
+import imagecodecs
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vcc.errors import InputError, ResultWarning
+from vcc.formats import eslf, open_light_field, read_container, read_ground_truth, transfer
+from vcc.formats.pfm import read_pfm
+from vcc.formats.pictures import read_picture
+from vcc.light_field import LightField
+
+GIVEN = {"spacing": 1e-3, "slope_per_pixel": 1e-3, "focus_distance": 1.0}
+
+
+def tiled(views: NDArray[Any]) -> NDArray[Any]:
+    """The picture in which the block behind lenslet (l, k) holds pixel (l, k) of all views."""
+    rows, columns, height, width = views.shape[:4]
+    picture = np.zeros((height * rows, width * columns, *views.shape[4:]), views.dtype)
+    for j, i, l, k in np.ndindex(rows, columns, height, width):
+        picture[l * rows + j, k * columns + i] = views[j, i, l, k]
+    return picture
+
+
+@pytest.fixture
+def samples() -> NDArray[np.uint8]:
+    return np.random.default_rng(3).integers(0, 256, (2, 3, 5, 4, 3), np.uint8)
+
+
+def write(path: Path, picture: NDArray[Any]) -> Path:
+    path.write_bytes(imagecodecs.png_encode(np.ascontiguousarray(picture)))
+    return path
+
+
+def test_eslf_is_read(samples: NDArray[np.uint8], tmp_path: Path) -> None:
+    path = write(tmp_path / "one_eslf.png", tiled(samples))
+    field = open_light_field(path, views=(2, 3), transfer="linear", **GIVEN)
+    np.testing.assert_array_equal(field.values, samples)
+    np.testing.assert_array_equal(
+        open_light_field(path, views=(2, 3), **GIVEN).values, transfer.to_linear(samples / 255)
+    )
+    with pytest.raises(InputError, match=r"one picture of 12×10 pixels.*views=\(rows, columns\)"):
+        open_light_field(path)
+    with pytest.raises(InputError, match="do not fit"):
+        open_light_field(path, views=(20, 3))
+
+
+def test_opacity_is_weight_and_cut_blocks_are_said(samples: NDArray[np.uint8], tmp_path: Path) -> None:
+    opacity = np.random.default_rng(4).integers(0, 256, (*samples.shape[:4], 1), np.uint8)
+    picture = tiled(np.concatenate([samples, opacity], axis=4))
+    decoded = read_container(write(tmp_path / "a.png", picture[:-1, :-2]), views=(2, 3))
+    np.testing.assert_array_equal(decoded.values, samples[:, :, :-1, :-1])
+    np.testing.assert_allclose(decoded.weights, opacity[:, :, :-1, :-1, 0] / 255, rtol=1e-6)
+    assert "last 1 rows and 1 columns" in decoded.remarks[0]
+    with pytest.warns(ResultWarning, match="were left out"):
+        open_light_field(tmp_path / "a.png", views=(2, 3), **GIVEN)
+
+
+@pytest.mark.parametrize(("bits", "size", "views"), [(8, (6510, 9375), (15, 15)), (8, (5264, 7574), (14, 14))])
+def test_sizes_that_are_known(bits: int, size: tuple[int, int], views: tuple[int, int]) -> None:
+    assert eslf._KNOWN[size] == views
+    assert size[0] % views[0] == size[1] % views[1] == 0
+
+
+@pytest.mark.parametrize("channels", [None, 3])
+@pytest.mark.parametrize("bits", [8, 16])
+def test_eslf_written_and_read_back(channels: int | None, bits: int, tmp_path: Path) -> None:
+    shape = (2, 3, 5, 4) if channels is None else (2, 3, 5, 4, channels)
+    codes = np.random.default_rng(5).integers(0, 2**bits, shape, dtype=f"u{bits // 8}")
+    field = LightField.from_views(transfer.decode(codes), 1e-3, 1e-3, 1.0)
+    eslf.save(field, tmp_path / "a.png", bits=bits)
+    back = open_light_field(tmp_path / "a.png", views=(2, 3), **GIVEN)
+    np.testing.assert_array_equal(back.values, field.values)  # each code is its own nearest
+    picture, _ = read_picture(tmp_path / "a.png")
+    np.testing.assert_array_equal(picture, tiled(codes))
+
+
+def test_eslf_that_cannot_be_written(tmp_path: Path) -> None:
+    field = LightField.from_views(np.full((1, 1, 2, 2), 1.5, np.float32), 1e-3, 1e-3)
+    with pytest.raises(InputError, match=r"reaches 1\.5"):
+        eslf.save(field, tmp_path / "a.png")
+    with pytest.raises(InputError, match=r"written as \.png"):
+        eslf.save(field, tmp_path / "a.jpg")
+    with pytest.raises(InputError, match="1 or 3 channels"):
+        eslf.save(field.replaced(np.zeros((1, 1, 2, 2, 5), np.float32)), tmp_path / "a.png")
+
+
+@pytest.mark.parametrize(("order", "scale"), [("<", b"-1.0"), (">", b"1.0")])
+def test_pfm(order: str, scale: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "gt_disp.pfm"
+    path.write_bytes(b"Pf\n3 2\n" + scale + b"\n" + struct.pack(f"{order}6f", 4, 5, 6, 1, 2, 3))
+    assert read_pfm(path).tolist() == [[1, 2, 3], [4, 5, 6]]  # the bottom row comes first in the file
+    truth = read_ground_truth(path)
+    assert truth.depth is None
+    assert truth.disparity is not None
+    assert truth.disparity.tolist() == [[1, 2, 3], [4, 5, 6]]
+    path.write_bytes(b"PF\n1 1\n" + scale + b"\n" + struct.pack(f"{order}3f", 1, 2, 3))
+    assert read_pfm(path).tolist() == [[[1, 2, 3]]]
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"P6\n1 1\n255\nabc", "is not a PFM file"),
+        (b"Pf\n1 1\nwide\n", "is not a PFM file"),
+        (b"Pf\n2 2\n-1\n" + bytes(12), "truncated: 2×2 .*16 bytes, and it has 12"),
+    ],
+)
+def test_bad_pfm(data: bytes, message: str, tmp_path: Path) -> None:
+    (tmp_path / "a.pfm").write_bytes(data)
+    with pytest.raises(InputError, match=message):
+        read_pfm(tmp_path / "a.pfm")
+    with pytest.raises(InputError, match="no file"):
+        read_pfm(tmp_path / "b.pfm")
+
+
+def test_jpeg_pleno_views_of_ten_bits(tmp_path: Path) -> None:
+    """Big-endian, up to 1023: full scale is full scale, and each code stays its own."""
+    codes = np.arange(1024).reshape(4, 4, 64)
+    for j, i in np.ndindex(4, 4):
+        rgb = np.stack([codes[j, i].reshape(8, 8)] * 3, axis=2)
+        (tmp_path / f"{j:03d}_{i:03d}.ppm").write_bytes(b"P6\n# a word\n8 8\n1023\n" + rgb.astype(">u2").tobytes())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResultWarning)
+        field = open_light_field(tmp_path, transfer="linear", orientation="as-is", **GIVEN)
+    assert field.values.dtype == np.uint16
+    np.testing.assert_array_equal(np.rint(field.values[..., 0].ravel() / 65535 * 1023), np.arange(1024))
+    assert field.values.max() == 65535
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"P3\n1 1\n255\n0 0 0\n", "no binary Netpbm"),
+        (b"P6\n2 1\n255\nabc", "truncated: 2×1 pixels are 6 bytes, and it has 3"),
+        (b"P5\n1 1\n1023\n\xff\xff", "holds 65535, and states that nothing is above 1023"),
+        (b"P5\n0 1\n255\n", "states 0×1 pixels"),
+    ],
+)
+def test_bad_netpbm(data: bytes, message: str, tmp_path: Path) -> None:
+    (tmp_path / "a.ppm").write_bytes(data)
+    with pytest.raises(InputError, match=rf"a\.ppm: .*{message}"):
+        read_picture(tmp_path / "a.ppm")
