@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from vcc.cli import options as given
+from vcc.cli import synth_blender, synth_depth, synth_opengl  # noqa: F401
 from vcc.cli.console import Commands, check_output, make_folder, progress, show
+from vcc.cli.synth import synth
 from vcc.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-    from vcc.formats import FolderInfo
-    from vcc.light_field import LightField
 
+_STORING = "Making a store"
 SAMPLES_WORTH_A_BAR = 3e8
 """Below this, a picture takes less than a second, and asking for progress would only slow it down."""
 
@@ -31,6 +32,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
+
+
+app.add_typer(synth)
 
 
 def _show_version(wanted: bool) -> None:
@@ -89,14 +93,15 @@ def capture(
     tolerance: given.Tolerance = None,
     ray_seed: given.RaySeed = 0,
     engine: given.Engine = "numba",
-    transfer: given.Transfer = "srgb",
+    memory_limit: given.MemoryLimit = None,
+    transfer: given.Transfer = "auto",
     spacing: given.Spacing = None,
     slope_per_pixel: given.SlopePerPixel = None,
     focus_distance: given.FocusDistance = None,
     orientation: given.Orientation = "auto",
 ) -> None:
     """Make the picture that a camera records of a light field."""
-    factor = given.exposure_of(exposure)
+    factor, limit = given.exposure_of(exposure), given.memory_size(memory_limit)
     how = given.how_made(
         method=method,
         interpolation=interpolation,
@@ -113,10 +118,18 @@ def capture(
     optics = load_camera(camera)
     field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
     plan = optics.compile(field, **how)
-    expensive = plan.samples_touched * (field.channels or 1) > SAMPLES_WORTH_A_BAR
+    from vcc.light_field import LightField
+
+    in_memory = isinstance(field, LightField)
+    expensive = not in_memory or plan.samples_touched * (field.channels or 1) > SAMPLES_WORTH_A_BAR
     with progress("Capturing") as advance:
         image = optics.capture(
-            field, **how, tolerance=tolerance, engine=engine, progress=advance if expensive else None
+            field,
+            **how,
+            tolerance=tolerance,
+            engine=engine,
+            memory_limit=limit,
+            progress=advance if expensive else None,
         )
     show(image.save(output, exposure=factor, upright=not as_recorded).description)
 
@@ -169,7 +182,8 @@ def expose(
     tolerance: given.Tolerance = None,
     ray_seed: given.RaySeed = 0,
     engine: given.Engine = "numba",
-    transfer: given.Transfer = "srgb",
+    memory_limit: given.MemoryLimit = None,
+    transfer: given.Transfer = "auto",
     spacing: given.Spacing = None,
     slope_per_pixel: given.SlopePerPixel = None,
     focus_distance: given.FocusDistance = None,
@@ -179,7 +193,7 @@ def expose(
 
     The camera file says how the sensor does so, in a table sensor.electronics.
     """
-    time = given.exposure_time(exposure)
+    time, limit = given.exposure_time(exposure), given.memory_size(memory_limit)
     how = given.how_made(
         method=method,
         interpolation=interpolation,
@@ -208,6 +222,7 @@ def expose(
         **how,
         tolerance=tolerance,
         engine=engine,
+        memory_limit=limit,
     )
     show(recording.save(output).description)
     if picture is not None:
@@ -228,7 +243,8 @@ def explain(
     tolerance: given.Tolerance = None,
     ray_seed: given.RaySeed = 0,
     engine: given.Engine = "numba",
-    transfer: given.Transfer = "srgb",
+    memory_limit: given.MemoryLimit = None,
+    transfer: given.Transfer = "auto",
     spacing: given.Spacing = None,
     slope_per_pixel: given.SlopePerPixel = None,
     focus_distance: given.FocusDistance = None,
@@ -248,81 +264,36 @@ def explain(
 
     optics = load_camera(camera)
     field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
-    words = optics.explain(field, **how, tolerance=tolerance, engine=engine)
+    limit = given.memory_size(memory_limit)
+    words = optics.explain(field, **how, tolerance=tolerance, engine=engine, memory_limit=limit)
     show(str(words))
 
 
-@app.command(epilog="Example:  vcc info views/\n\nExample:  vcc info views/ --quick")
+@app.command(
+    epilog="Example:  vcc info views/\n\nExample:  vcc info views/ --quick\n\n"
+    "Example:  vcc info views/ --picture grid.png"
+)
 def info(
     light_field: given.LightFieldFolder,
     quick: Annotated[
         bool,
         typer.Option("--quick", help="Read one view only: nothing is measured, and no view compared."),
     ] = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Draw all views where their cameras stand, .png, .svg or .pdf.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Say what a light field is: views, cameras, disparities, and what its files leave open."""
-    from vcc.formats import read_geometry
+    """Say what a light field is: views, cameras, disparities, brightness, and what its files leave open."""
+    from vcc.cli.info import describe
 
-    facts = read_geometry(light_field)
-    lines = _facts(facts)
-    if not quick:
-        # Linear keeps the type of the files: disparities do not need light, and memory is short.
-        field = given.read_light_field(light_field, "linear", None, None, None, "auto")
-        lines["disparities"] = _disparities(field, facts)
-    width = max(map(len, lines)) + 2
-    show("\n".join(f"{name:<{width}}{value}" for name, value in lines.items()))
-
-
-def _facts(facts: FolderInfo) -> dict[str, str]:
-    """What the folder states and what is taken for granted, line by line."""
-    import math
-
-    from vcc.units import short
-
-    def assumed(name: str) -> str:
-        return "  (not stated: assumed)" if name in facts.unknown else ""
-
-    kind = "floating-point" if facts.bits == 32 else f"{facts.bits}-bit"
-    colour = "grey" if facts.channels is None else f"{facts.channels} channels"
-    samples = facts.rows * facts.columns * facts.height * facts.width * (facts.channels or 1)
-    vertical, horizontal = facts.spacing
-    apart = short(vertical)
-    if vertical != horizontal:
-        apart = f"{apart} (rows), {short(horizontal)} (columns)"
-    focus = facts.focus_distance
-    converge = "parallel" if math.isinf(focus) else f"converge {short(focus)} away"
-    lines = {
-        "format": facts.format,
-        "views": f"{facts.rows} × {facts.columns} (rows × columns)",
-        "pictures": f"{facts.width} × {facts.height} pixels, {colour}, {kind}",
-        "size": f"{samples * facts.bits // 8 / 1e6:,.1f} MB in memory as stored, "
-        f"{samples * 4 / 1e6:,.1f} MB as linear light",
-        "spacing": apart + assumed("spacing"),
-        "slope per pixel": f"{facts.slope_per_pixel:.6g}" + assumed("slope_per_pixel"),
-        "views are": converge + assumed("focus_distance"),
-    }
-    if facts.disparity_range is not None:
-        low, high = facts.disparity_range
-        lines["disparities"] = f"{low:.3g} to {high:.3g} pixels per view (stated)"
-    return lines
-
-
-def _disparities(field: LightField, facts: FolderInfo) -> str:
-    """The disparities and what they mean in metres."""
-    from vcc.units import short
-
-    known = field.measured_disparity_range()
-    if known is None:
-        return "none to measure: one view, or pictures without texture"
-    low, high = known
-    source = "measured" if facts.disparity_range is None else "stated"
-    words = f"{low:.3g} to {high:.3g} pixels per view ({source})"
-    near, far = field.distance_of(high), field.distance_of(low)
-    if 0 < near < far:
-        places = f"{short(near, digits=3)} to {short(far, digits=3)}"
-        words += f": things {places} away"
-        words += " if what is assumed is right" if facts.unknown else ""
-    return words
+    if picture is not None:
+        picture = check_output(picture, (".png", ".svg", ".pdf"))
+    show(describe(light_field, quick, picture))
 
 
 @app.command(
@@ -367,7 +338,7 @@ def plot(
             "element, on the sensor.",
         ),
     ] = False,
-    transfer: given.Transfer = "srgb",
+    transfer: given.Transfer = "auto",
     spacing: given.Spacing = None,
     slope_per_pixel: given.SlopePerPixel = None,
     focus_distance: given.FocusDistance = None,
@@ -385,9 +356,12 @@ def plot(
     optics = load_camera(camera)
     field = None
     if light_field is not None:
-        field = given.read_light_field(
+        found = given.read_light_field(
             light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation
         )
+        from vcc.light_field import LightField
+
+        field = found if isinstance(found, LightField) else found.read()
     if phase_space and field is not None:
         stages = plot_phase_space_stages(optics, field, across="u" if across == "x" else "v")
         figure: Figure | SubFigure = stages
@@ -423,3 +397,134 @@ def demo(
     from vcc.demo import run_demo
 
     run_demo(folder, light_field, small, Console())
+
+
+@app.command(
+    epilog='Example:  vcc convert views/ scene.zarr --spacing "1 mm"\n\n'
+    "Example:  vcc convert views/ small.zarr --lossy jpegxl --quality 90\n\n"
+    "Example:  vcc convert scene.zarr half.zarr --dtype float16\n\n"
+    "Example:  vcc convert scene.zarr flight.mp4"
+)
+def convert(
+    light_field: given.LightFieldFolder,
+    output: Annotated[
+        Path,
+        typer.Argument(
+            metavar="OUT",
+            help="What to make: a store (.zarr); or .npz, .mat, .png (ESLF), .mp4 (a flight through the views), a "
+            "folder (no ending).",
+            show_default=False,
+        ),
+    ],
+    dtype: Annotated[
+        Literal["uint8", "uint16", "float16", "float32"] | None,
+        typer.Option(
+            help="What samples are stored as: uint8 and uint16 as sRGB codes where they were not integers before, "
+            "float16 and float32 as linear light. Default: as they are, bit for bit.",
+            show_default=False,
+            rich_help_panel=_STORING,
+        ),
+    ] = None,
+    compression: Annotated[
+        Literal["zstd", "lz4"] | None,
+        typer.Option(
+            help="Lossless: zstd (the default) packs more, lz4 is faster.",
+            show_default=False,
+            rich_help_panel=_STORING,
+        ),
+    ] = None,
+    level: Annotated[
+        int | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="Of lossless packing, 0 (fast) to 9 (small). Default: 3.",
+            show_default=False,
+            rich_help_panel=_STORING,
+        ),
+    ] = None,
+    lossy: Annotated[
+        Literal["jpegxl", "avif"] | None,
+        typer.Option(
+            help="Keep each view as a picture, changed and smaller; how much it is changed is measured and said.",
+            show_default=False,
+            rich_help_panel=_STORING,
+        ),
+    ] = None,
+    quality: Annotated[
+        int | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="With --lossy, 1 (small) to 99 (fine). Default: 90.",
+            show_default=False,
+            rich_help_panel=_STORING,
+        ),
+    ] = None,
+    chunks: Annotated[
+        int | None,
+        typer.Option(
+            metavar="ROWS",
+            help="Rows of pixels packed together: with fewer, parts of a view cost less to read. Default: 128 kB.",
+            show_default=False,
+            rich_help_panel=_STORING,
+        ),
+    ] = None,
+    kind: Annotated[
+        Literal["hci", "views"] | None,
+        typer.Option(
+            help="Names of views in a folder: as the HCI benchmark has them (the default), or row and column.",
+            show_default=False,
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what has that name.")] = False,
+    transfer: Annotated[
+        Literal["auto", "srgb", "linear"],
+        typer.Option(
+            help="How pixel values of the views stand for light: srgb, as pictures for people do, or linear. "
+            "auto takes what the format has. A store keeps it, and is read as linear light.",
+            rich_help_panel="Reading the light field",
+        ),
+    ] = "auto",
+    spacing: given.Spacing = None,
+    slope_per_pixel: given.SlopePerPixel = None,
+    focus_distance: given.FocusDistance = None,
+    orientation: given.Orientation = "auto",
+) -> None:
+    """Put a light field into a store (Zarr), or into files of another format.
+
+    A store keeps samples bit for bit, with their cameras, opens at once and is read in parts: a camera takes a
+    picture of it in whatever memory there is (--memory-limit). It appears when it is whole.
+    """
+    from vcc.cli.convert import to_file, to_store
+
+    reading = (transfer, spacing, slope_per_pixel, focus_distance, orientation)
+    storing = {"--dtype": dtype, "--compression": compression, "--level": level, "--lossy": lossy}
+    storing |= {"--quality": quality, "--chunks": chunks}
+    if output.suffix.lower() != ".zarr":
+        if wrong := [name for name, value in storing.items() if value is not None]:
+            raise InputError(
+                f"{', '.join(wrong)} {'is' if len(wrong) == 1 else 'are'} for stores: end OUT in .zarr"
+            )
+        show(to_file(light_field, output, kind=kind, overwrite=overwrite, reading=reading))
+        return
+    if lossy and (compression or level is not None):
+        raise InputError("--compression and --level are for lossless packing: leave them out with --lossy")
+    if quality is not None and not lossy:
+        raise InputError("--quality is for --lossy: say jpegxl or avif")
+    if kind:
+        raise InputError("--kind is for folders of views: OUT is a store")
+    packing = (
+        (lossy, 90 if quality is None else quality)
+        if lossy
+        else (compression or "zstd", 3 if level is None else level)
+    )
+    show(
+        to_store(
+            light_field,
+            output,
+            dtype=dtype,
+            packing=packing,
+            chunks=chunks,
+            overwrite=overwrite,
+            reading=reading,
+        )
+    )

@@ -17,7 +17,7 @@ from vcc.errors import InputError, ResultWarning
 
 _LIBRARY_OPTION = re.compile(
     r"\b(transfer|spacing|slope_per_pixel|focus_distance|orientation|scene_distance|interpolation"
-    r"|between_views|engine|exposure|radiance|seed|method|samples|tolerance|refine)=(?=\S)"
+    r"|between_views|memory_limit|engine|exposure|radiance|seed|method|samples|tolerance|refine)=(?=\S)"
 )
 
 

@@ -12,6 +12,7 @@ from vcc.errors import InputError
 
 if TYPE_CHECKING:
     from vcc.light_field import LightField
+    from vcc.store import StoredLightField
 
 _READING = "Reading the light field"
 _CAPTURING = "Making the picture"
@@ -19,14 +20,14 @@ _CAPTURING = "Making the picture"
 CameraFile = Annotated[Path, typer.Argument(metavar="CAMERA.toml", help="The camera file.", show_default=False)]
 LightFieldFolder = Annotated[
     Path,
-    typer.Argument(metavar="LIGHTFIELD", help="A folder with a picture for each view.", show_default=False),
+    typer.Argument(metavar="LIGHTFIELD", help="A folder of views, a file or a store.", show_default=False),
 ]
 
 Transfer = Annotated[
-    Literal["srgb", "linear"],
+    Literal["auto", "srgb", "linear"],
     typer.Option(
-        help="How pixel values of the views stand for light: srgb, as pictures for people do, or "
-        "linear (proportional to it).",
+        help="How pixel values of the views stand for light: srgb, as pictures for people do, linear "
+        "(proportional to it), or auto: as the format says, srgb where it says nothing.",
         rich_help_panel=_READING,
     ),
 ]
@@ -137,6 +138,15 @@ Engine = Annotated[
         rich_help_panel=_CAPTURING,
     ),
 ]
+MemoryLimit = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SIZE",
+        help='Of a light field in a store: what reading it in pieces may take, "1.5 GB". Default: 1 GiB.',
+        show_default=False,
+        rich_help_panel=_CAPTURING,
+    ),
+]
 
 
 def how_made(
@@ -194,6 +204,25 @@ def length(given: str | None, option: str) -> float | None:
     return parse(given, "length", option)
 
 
+def memory_size(given: str | None, option: str = "--memory-limit") -> int | None:
+    """Bytes of a size on the command line, "800 MB" or "1.5 GiB"; None if it is not given.
+
+    Raises:
+        InputError: no unit, or not a size above 0.
+    """
+    if given is None:
+        return None
+    units = {"kb": 1e3, "mb": 1e6, "gb": 1e9, "tb": 1e12, "kib": 2**10, "mib": 2**20, "gib": 2**30, "tib": 2**40}
+    number, unit = given.strip().rstrip("BbiIkKmMgGtT"), given.strip().lstrip("0123456789.eE+- ")
+    try:
+        size = float(number) * units[unit.lower()]
+    except (ValueError, KeyError):
+        size = math.nan
+    if not (size >= 1 and math.isfinite(size)):
+        raise InputError(f'{option} is "{given}": a size has a number and a unit, like "800 MB" or "1.5 GiB"')
+    return int(size)
+
+
 def spacing_of(given: str | None) -> float | tuple[float, float] | None:
     """Metres of one length, or of two (rows, columns) with a comma between them.
 
@@ -243,12 +272,21 @@ def read_light_field(
     slope_per_pixel: float | None,
     focus_distance: str | None,
     orientation: str,
-) -> LightField:
-    """The light field that the options of a command ask for, with a progress bar.
+) -> LightField | StoredLightField:
+    """The light field that the options of a command ask for, with a progress bar; a store is opened, not read.
 
     Raises:
-        InputError: what `vcc.open_light_field` and the lengths refuse.
+        InputError: what `vcc.open_light_field` and the lengths refuse; a store and cameras told beside it.
     """
+    from vcc.store import is_store, open_store
+
+    if is_store(folder):
+        told = {"--spacing": spacing, "--slope-per-pixel": slope_per_pixel, "--focus-distance": focus_distance}
+        names = [name for name, value in told.items() if value is not None]
+        names += ["--orientation"] if orientation != "auto" else []
+        if names:
+            raise InputError(f"{folder} is a store, which states its cameras: leave out {', '.join(names)}")
+        return open_store(folder)
     given: dict[str, Any] = {
         "transfer": transfer,
         "orientation": orientation,

@@ -1,6 +1,22 @@
 """Where light fields come from when no camera took them."""
 
+from vcc.sources.blender import blender_script
+from vcc.sources.depth_map import DepthMapScene
+from vcc.sources.opengl import Lighting, OpenGLRenderer, Viewpoint
 from vcc.sources.planes import PlanesScene, TexturedPlane
+from vcc.sources.synthesis import Renderer, synthesize
 from vcc.sources.views import CameraArray, ViewCamera
 
-__all__ = ["CameraArray", "PlanesScene", "TexturedPlane", "ViewCamera"]
+__all__ = [
+    "CameraArray",
+    "DepthMapScene",
+    "Lighting",
+    "OpenGLRenderer",
+    "PlanesScene",
+    "Renderer",
+    "TexturedPlane",
+    "ViewCamera",
+    "Viewpoint",
+    "blender_script",
+    "synthesize",
+]

@@ -2,7 +2,9 @@
 
 A texture is any function of positions (x, y) in metres (x right, y down, from the plane's middle; arrays that
 broadcast against each other) that returns radiance, shape (...) for grey or (..., 3), or (..., 4) with opacity
-last and the radiance already multiplied by it. All of it is procedural: this package ships no pictures.
+last and the radiance already multiplied by it. A texture with detail finer than pixels may have a method
+``mean(x, y, cell)`` besides, its mean over squares of side ``cell`` (metres, broadcast against x and y), as
+`Picture` has. This package ships no pictures: its own textures are procedural.
 """
 
 from __future__ import annotations
@@ -10,7 +12,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,8 +38,28 @@ def radiance_and_opacity(texture: Texture, x: Array, y: Array) -> Array:
     Raises:
         InputError: the texture returned another shape.
     """
-    shape = np.broadcast_shapes(np.shape(x), np.shape(y))
-    values = np.asarray(texture(x, y))
+    return _with_opacity(texture, np.asarray(texture(x, y)), np.broadcast_shapes(np.shape(x), np.shape(y)))
+
+
+def mean_radiance_and_opacity(texture: Texture, x: Array, y: Array, cell: Array | float) -> Array:
+    """What a texture returns for squares around positions, as (..., 4): by its ``mean``, or at their middles.
+
+    Args:
+        texture: see the head of this module.
+        x: positions, metres.
+        y: positions, metres, which broadcast against x.
+        cell: side of the squares, metres.
+
+    Raises:
+        InputError: the texture returned another shape.
+    """
+    mean = getattr(texture, "mean", None)
+    if mean is None:
+        return radiance_and_opacity(texture, x, y)
+    return _with_opacity(texture, np.asarray(mean(x, y, cell)), np.broadcast_shapes(np.shape(x), np.shape(y)))
+
+
+def _with_opacity(texture: Texture, values: Array, shape: tuple[int, ...]) -> Array:
     if values.shape == (*shape, 4):
         return values
     if values.ndim <= len(shape):  # grey, or one number for all
@@ -154,20 +178,127 @@ class Picture:
             values = np.concatenate([values, np.ones_like(values[..., :1])], axis=-1)
         object.__setattr__(self, "values", values)
 
+    @classmethod
+    def read(
+        cls, path: str | PathLike[str], width: float, *, transfer: Literal["srgb", "linear"] = "srgb"
+    ) -> Picture:
+        """The picture in a file, with its opacity where it is a PNG or OpenEXR file that has one.
+
+        Args:
+            path: a file that `vcc.formats.pictures.read_picture` reads.
+            width: of the sheet, metres.
+            transfer: how stored integers stand for light: ``"srgb"``, as pictures for people do, or ``"linear"``.
+                Floating point is linear.
+
+        Raises:
+            InputError: a file that cannot be read, an opacity in another kind of file, or a transfer that there is
+                not.
+        """
+        from vcc.formats.transfer import decode
+
+        if transfer not in ("srgb", "linear"):
+            raise InputError(f'transfer is "srgb" or "linear", not "{transfer}"')
+        samples, opacity = _read_with_opacity(Path(path))
+        full = float(np.iinfo(samples.dtype).max) if samples.dtype.kind == "u" else 1.0
+        values = decode(samples).astype(np.float64) if transfer == "srgb" else samples.astype(np.float64) / full
+        if values.ndim == 2:
+            values = np.repeat(values[..., None], 3, axis=-1)
+        if opacity is not None:
+            # PNG stores colours by themselves, OpenEXR stores them times opacity.
+            factor = opacity[..., None] if samples.dtype.kind == "u" else 1.0
+            values = np.concatenate([values * factor, opacity[..., None]], axis=-1)
+        return cls(values, width)
+
+    @property
+    def height(self) -> float:
+        """Of the sheet, metres."""
+        rows, columns = np.shape(self.values)[:2]
+        return float(self.width * rows / columns)
+
     def __call__(self, x: Array, y: Array) -> Array:
         """Colour times opacity and opacity at each position, (..., 4)."""
+        return self._interpolated(np.asarray(self.values), x, y)
+
+    def mean(self, x: Array, y: Array, cell: Array | float) -> Array:
+        """Colour times opacity and opacity, (..., 4), averaged over squares about as large as ``cell``, metres.
+
+        Interpolated in a pyramid of pictures, each half as fine as the one before (Williams 1983, mip maps).
+        """
+        shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(cell))
+        pitch = self.width / np.shape(self.values)[1]
+        deepest = max(0, math.floor(math.log2(max(np.shape(self.values)[:2]))))
+        # A box of pitch g, interpolated linearly, spreads light with a variance of g²/12 + g²/6; a square with
+        # cell²/12.
+        level = np.clip(np.log2(np.maximum(np.asarray(cell) / (math.sqrt(3) * pitch), 1.0)), 0, deepest)
+        if level.ndim == 0 and level == 0:
+            return self(x, y)
+        x, y, level = np.broadcast_to(x, shape), np.broadcast_to(y, shape), np.broadcast_to(level, shape)
+        result = np.zeros((*shape, 4))
+        for n in range(math.floor(level.min()), math.ceil(level.max()) + 1):
+            weight = np.maximum(1 - np.abs(level - n), 0)
+            where = weight > 0
+            result[where] += weight[where][:, None] * self._interpolated(self._halved(n), x[where], y[where])
+        return result
+
+    def _halved(self, times: int) -> Array:
+        """The samples with 2^times as large a pitch, or as near to that as whole numbers of samples allow."""
+        kept: dict[int, Array] = self.__dict__.setdefault("_levels", {})
+        if times not in kept:
+            values = np.asarray(self.values)
+            for axis in (0, 1):
+                count = values.shape[axis]
+                values = _averaged(values, axis, max(1, round(count / 2**times)))
+            kept[times] = values
+        return kept[times]
+
+    def _interpolated(self, values: Array, x: Array, y: Array) -> Array:
         from scipy.ndimage import map_coordinates
 
-        values = np.asarray(self.values)
         rows, columns = values.shape[:2]
-        pitch = self.width / columns
-        column, row = np.broadcast_arrays(
-            np.asarray(x, float) / pitch + (columns - 1) / 2, np.asarray(y, float) / pitch + (rows - 1) / 2
-        )
-        inside = (np.abs(column - (columns - 1) / 2) <= columns / 2) & (np.abs(row - (rows - 1) / 2) <= rows / 2)
-        places = [row.ravel(), column.ravel()]
+        across, down = np.broadcast_arrays(np.asarray(x, float) / self.width, np.asarray(y, float) / self.height)
+        inside = (np.abs(across) <= 0.5) & (np.abs(down) <= 0.5)
+        places = [(down.ravel() + 0.5) * rows - 0.5, (across.ravel() + 0.5) * columns - 0.5]
         channels = [map_coordinates(values[..., c], places, order=1, mode="nearest") for c in range(4)]
-        return np.asarray(np.stack(channels, axis=-1).reshape(*row.shape, 4) * inside[..., None])
+        return np.asarray(np.stack(channels, axis=-1).reshape(*across.shape, 4) * inside[..., None])
+
+
+def _averaged(values: Array, axis: int, count: int) -> Array:
+    """Means over ``count`` equal parts of an axis, samples being boxes that parts may cut."""
+    moved = np.moveaxis(values, axis, 0)
+    total = np.concatenate([np.zeros_like(moved[:1]), np.cumsum(moved, axis=0)])
+    border = np.linspace(0, len(moved), count + 1)
+    whole = np.minimum(border.astype(int), len(moved) - 1)
+    share = (border - whole).reshape(-1, *[1] * (moved.ndim - 1))
+    at_border = total[whole] + share * moved[whole]
+    return np.moveaxis(np.diff(at_border, axis=0) * (count / len(moved)), 0, axis)
+
+
+def _read_with_opacity(path: Path) -> tuple[Array, Array | None]:
+    """Samples as stored, (rows, columns[, 3]), and opacity, 0 to 1, if there is any that is not 1."""
+    from vcc.formats.pictures import read_picture
+
+    if path.suffix.lower() == ".png" and path.is_file():
+        import imagecodecs
+
+        try:
+            samples = np.asarray(imagecodecs.png_decode(path.read_bytes()))
+        except Exception:  # what is wrong is said below
+            samples = np.empty((0, 0))
+        if samples.ndim == 3 and samples.shape[2] in (2, 4):
+            opacity = samples[..., -1] / np.iinfo(samples.dtype).max
+            colour = samples[..., :-1]
+            return (colour[..., 0] if colour.shape[2] == 1 else colour), opacity
+    if path.suffix.lower() == ".exr" and path.is_file():
+        import OpenEXR
+
+        try:
+            with OpenEXR.File(str(path), separate_channels=True) as file:
+                channels = {name: np.asarray(file.channels()[name].pixels) for name in file.channels()}
+        except Exception:  # likewise
+            channels = {}
+        if set(channels) == set("RGBA"):
+            return np.stack([channels[name] for name in "RGB"], axis=-1), channels["A"].astype(np.float64)
+    return read_picture(path)[0], None
 
 
 class Painting:

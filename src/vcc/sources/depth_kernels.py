@@ -1,0 +1,101 @@
+"""The compiled loops that draw surfaces over a picture's pixels as another pinhole sees them."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+_compiled = numba.njit(nogil=True, cache=True, error_model="numpy")
+
+
+@_compiled
+def draw_surface(  # type: ignore[no-untyped-def]
+    quads, across, down, vergence, colour, cover, place, scale, nearest, out
+):
+    """Draw a surface of pixels into a picture that keeps what is nearest.
+
+    quads: (rows − 1, columns − 1), whether the four pixels from (r, c) on span a piece of it.
+    across, down: tangents of the directions of columns and rows, as the picture's own pinhole sees them.
+    vergence: (rows, columns), 1 / distance. colour: (rows, columns, channels). cover: (rows, columns),
+    interpolated; where it is below ½ the surface is not there.
+    place, scale: column = place[0] + scale[0] · (across − x · vergence) is given as place[0] + …, with
+    place = (offset of columns, of rows, x, y).
+    nearest: (rows, columns) of the picture, the vergence of what it shows, below 0 for nothing. out: its colours.
+    """
+    rows, columns = vergence.shape
+    high, wide = nearest.shape
+    channels = colour.shape[2]
+    h = np.empty(4)
+    g = np.empty(4)
+    weight = np.empty(3)
+    for r in range(rows - 1):
+        for c in range(columns - 1):
+            if not quads[r, c]:
+                continue
+            for n in range(4):
+                w = vergence[r + n // 2, c + n % 2]
+                h[n] = place[0] + scale[0] * (across[c + n % 2] - place[2] * w)
+                g[n] = place[1] + scale[1] * (down[r + n // 2] - place[3] * w)
+            first_column = max(int(np.ceil(h.min() - 1e-9)), 0)
+            last_column = min(int(np.floor(h.max() + 1e-9)), wide - 1)
+            first_row = max(int(np.ceil(g.min() - 1e-9)), 0)
+            last_row = min(int(np.floor(g.max() + 1e-9)), high - 1)
+            if first_column > last_column or first_row > last_row:
+                continue
+            for half in range(2):
+                a, b, d = (0, 1, 2) if half == 0 else (3, 2, 1)
+                area = (h[b] - h[a]) * (g[d] - g[a]) - (h[d] - h[a]) * (g[b] - g[a])
+                if area <= 0:
+                    continue  # seen from behind: something nearer hides it
+                for y in range(first_row, last_row + 1):
+                    for x in range(first_column, last_column + 1):
+                        weight[1] = ((x - h[a]) * (g[d] - g[a]) - (h[d] - h[a]) * (y - g[a])) / area
+                        weight[2] = ((h[b] - h[a]) * (y - g[a]) - (x - h[a]) * (g[b] - g[a])) / area
+                        weight[0] = 1 - weight[1] - weight[2]
+                        # a hair more than the triangle, so that no sample falls between two
+                        if weight[0] < -1e-9 or weight[1] < -1e-9 or weight[2] < -1e-9:
+                            continue
+                        w = 0.0
+                        covered = 0.0
+                        for n in range(3):
+                            corner = a if n == 0 else (b if n == 1 else d)
+                            w += weight[n] * vergence[r + corner // 2, c + corner % 2]
+                            covered += weight[n] * cover[r + corner // 2, c + corner % 2]
+                        if covered < 0.5 or w <= nearest[y, x]:
+                            continue
+                        nearest[y, x] = w
+                        for m in range(channels):
+                            value = 0.0
+                            for n in range(3):
+                                corner = a if n == 0 else (b if n == 1 else d)
+                                value += weight[n] * colour[r + corner // 2, c + corner % 2, m]
+                            out[y, x, m] = value
+
+
+@_compiled
+def fill_gaps(nearest, out):  # type: ignore[no-untyped-def]
+    """Fill what nothing was drawn on from the nearest samples of its row, of the two the farther thing.
+
+    The last channel, how much of a sample is known, becomes 0 there. Returns how many rows were empty.
+    """
+    high, wide = nearest.shape
+    empty = 0
+    for y in range(high):
+        x = 0
+        while x < wide:
+            if nearest[y, x] >= 0:
+                x += 1
+                continue
+            end = x
+            while end < wide and nearest[y, end] < 0:
+                end += 1
+            if x == 0 and end == wide:
+                empty += 1
+                break
+            from_left = end == wide or (x > 0 and nearest[y, x - 1] <= nearest[y, end])
+            source = x - 1 if from_left else end
+            for column in range(x, end):
+                out[y, column] = out[y, source]
+                out[y, column, -1] = 0
+            x = end
+    return empty

@@ -1,0 +1,397 @@
+"""Pictures by Mitsuba 3: any of its scenes, seen by shifted perspective cameras."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import math
+import subprocess
+import sys
+import warnings
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.errors import InputError, ResultWarning
+from vcc.sources.views import ViewCamera
+
+FAST, PLAIN = "llvm_ad_rgb", "scalar_rgb"
+"""The variant that is several times faster and needs LLVM 16 or newer, and the one that runs everywhere."""
+
+_PROBE_SECONDS = 180
+_PROBE = """
+import sys
+import mitsuba as mi
+mi.set_variant(sys.argv[1])
+to_world = mi.ScalarTransform4f().translate([0, 0, 4])
+picture = mi.render(mi.load_dict({
+    "type": "scene", "integrator": {"type": "path"}, "light": {"type": "constant"},
+    "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
+    "glass": {"type": "sphere", "to_world": to_world, "bsdf": {"type": "roughdielectric"}},
+    "metal": {"type": "cube", "to_world": to_world, "bsdf": {"type": "roughconductor"}},
+    "paint": {"type": "disk", "to_world": to_world, "bsdf": {"type": "plastic", "diffuse_reflectance": {
+        "type": "checkerboard"}}},
+}), spp=4)
+sum(float(value) for value in picture.array)
+"""
+
+
+def mitsuba_library() -> Any:
+    """The package mitsuba.
+
+    Raises:
+        InputError: it is not installed, or does not load.
+    """
+    try:
+        import mitsuba
+    except ImportError as error:
+        raise InputError(
+            f"rendering by Mitsuba needs the package mitsuba ({error}): "
+            'pip install "virtual-computational-camera[mitsuba]"'
+        ) from None
+    return mitsuba
+
+
+@functools.cache
+def variant_fault(variant: str) -> str | None:
+    """Why a variant of Mitsuba does not work on this machine; None if it does.
+
+    Those that compile while they run (LLVM, CUDA) end the whole process where a library is too old, so that a
+    child process tries it, with a picture of a few pixels. Asked once per process.
+
+    Args:
+        variant: its name, like ``"llvm_ad_rgb"``.
+
+    Raises:
+        InputError: Mitsuba is not installed, or has no such variant.
+    """
+    known = mitsuba_library().variants()
+    if variant not in known:
+        raise InputError(f'Mitsuba has no variant "{variant}"; it has {", ".join(known)}')
+    if variant.startswith("scalar"):
+        return None
+    try:
+        tried = subprocess.run(
+            [sys.executable, "-c", _PROBE, variant], capture_output=True, text=True, timeout=_PROBE_SECONDS
+        )
+    except subprocess.TimeoutExpired:
+        return f"a picture of 8×8 pixels was not done in {_PROBE_SECONDS} s"
+    if tried.returncode == 0:
+        return None
+    said = [line for line in tried.stderr.splitlines() if line.strip()]
+    telling = [line.strip() for line in said if "error" in line.lower() or "could not" in line.lower()]
+    words = (telling or [line.strip() for line in said[-1:]] or ["it said nothing"])[0]
+    words = words.split(": 0x")[0][:160]  # LLVM goes on with addresses
+    return f"a trial of it ended with code {tried.returncode}: {words}"
+
+
+def _chosen(wanted: str) -> str:
+    """The variant to render with: one that works.
+
+    Raises:
+        InputError: the one asked for does not.
+    """
+    mitsuba = mitsuba_library()
+    if wanted == "auto":
+        current: str | None = mitsuba.variant()
+        if current is not None:
+            return current
+        fault = variant_fault(FAST)
+        if fault is None:
+            return FAST
+        warnings.warn(
+            ResultWarning(
+                f"Mitsuba renders with {PLAIN}, several times slower than {FAST}, which does not work here: "
+                f"{fault}. It needs LLVM 16 or newer; DRJIT_LIBLLVM_PATH names the library to take"
+            ),
+            stacklevel=3,
+        )
+        return PLAIN
+    fault = variant_fault(wanted)
+    if fault is not None:
+        raise InputError(f'Mitsuba\'s variant "{wanted}" does not work here: {fault}. variant="{PLAIN}" does')
+    return wanted
+
+
+@contextmanager
+def _variant(name: str) -> Iterator[Any]:
+    """Mitsuba with a variant set; the one before is set again afterwards, if there was one."""
+    mitsuba = mitsuba_library()
+    before = mitsuba.variant()
+    if before == name:
+        yield mitsuba
+        return
+    mitsuba.set_variant(name)
+    try:
+        yield mitsuba
+    finally:
+        if before is not None:
+            mitsuba.set_variant(before)
+
+
+class MitsubaRenderer:
+    """A scene of Mitsuba 3, rendered by shifted perspective cameras in place of its own.
+
+    The scene is loaded once. Its own sensor says where the middle of the array stands and where it looks, which
+    sampler is used, how near and far it sees and in which medium it is; its field of view and film give way to
+    those of the views. Pixels are boxes, so that a sample is the mean over its pixel; each view has its own seed.
+    A scene without an integrator is rendered by path tracing.
+
+    Args:
+        scene: an XML file, or a dict as `mitsuba.load_dict` takes it, in which NumPy arrays may stand for
+            transforms (``"to_world"``, ``"to_uv"``: 4×4) and for pictures (``"bitmap"``).
+        samples: paths per pixel; samplers that need a certain number round it up (`samples` then says so).
+        variant: of Mitsuba. ``"auto"`` takes the one that is set in this process, or else ``"llvm_ad_rgb"`` where
+            it works and ``"scalar_rgb"`` where it does not, with a warning.
+        seed: of the random numbers: the same gives the same pictures, another one other noise.
+        metres_per_unit: how long a unit of the scene is, metres.
+        to_world: 4×4, where the middle of the array stands in the scene and how it is turned, in Mitsuba's way
+            (the camera looks along its +z, y points up and x to the left). None takes that of the scene's sensor.
+        sensor: which of the scene's sensors to take it from.
+        parameters: values for the ``$names`` of an XML file.
+
+    Raises:
+        InputError: Mitsuba is not installed, the variant does not work, the scene does not load or has no such
+            sensor, or a number that is not above 0.
+    """
+
+    def __init__(
+        self,
+        scene: str | PathLike[str] | Mapping[str, Any],
+        *,
+        samples: int = 64,
+        variant: str = "auto",
+        seed: int = 0,
+        metres_per_unit: float = 1.0,
+        to_world: ArrayLike | None = None,
+        sensor: int = 0,
+        parameters: Mapping[str, str] | None = None,
+    ) -> None:
+        if samples < 1:
+            raise InputError(f"samples are paths per pixel, 1 or more, not {samples}")
+        if not (metres_per_unit > 0 and math.isfinite(metres_per_unit)):
+            raise InputError(f"metres_per_unit must be greater than 0, not {metres_per_unit}")
+        self.variant = _chosen(variant)
+        self._seed = int(seed)
+        self._metres_per_unit = float(metres_per_unit)
+        self._contents = _contents(scene, dict(parameters or {}))
+        with _variant(self.variant) as mitsuba:
+            self._scene = _loaded(mitsuba, scene, dict(parameters or {}))
+            self._own = self._sensor(sensor, to_world is not None)
+            self._sampler = (
+                self._own.sampler() if self._own is not None else mitsuba.load_dict({"type": "independent"})
+            )
+            self._integrator = self._scene.integrator() or mitsuba.load_dict({"type": "path"})
+            self.samples = _settled(mitsuba, self._sampler, samples)
+            if to_world is None:
+                self._to_world = np.array(self._own.world_transform().matrix, dtype=np.float64).reshape(-1, 4)[:4]
+            else:
+                self._to_world = _pose(to_world)
+
+    def _sensor(self, number: int, optional: bool) -> Any:
+        """The scene's own sensor, or None where it has none and none is needed."""
+        sensors = self._scene.sensors()
+        if number < len(sensors):
+            return sensors[number]
+        if not sensors and optional:
+            return None
+        raise InputError(
+            f"the scene has {len(sensors) or 'no'} sensor{'s' * (len(sensors) != 1)}, and number {number} "
+            "(counted from 0) is to say where the views are: give to_world=… or a sensor that is there"
+        )
+
+    def description(self) -> dict[str, Any]:
+        """All that a picture depends on except the camera; the scene's files by their SHA-256."""
+        return {
+            "name": "mitsuba",
+            "version": mitsuba_library().__version__,
+            "variant": self.variant,
+            "scene": self._contents,
+            "samples": self.samples,
+            "seed": self._seed,
+            "metres_per_unit": self._metres_per_unit,
+            "to_world": self._to_world.tolist(),
+        }
+
+    def render(self, camera: ViewCamera) -> NDArray[np.float32]:
+        """The picture that a camera takes: linear radiance, shape (rows, columns, 3).
+
+        Raises:
+            InputError: pixels that are not square, or a failure of Mitsuba.
+        """
+        # The same view has the same noise whatever else is rendered; 2^32 seeds, spread by a prime.
+        seed = (self._seed * 1_000_003 + camera.row * 65_537 + camera.column) % 2**32
+        with _variant(self.variant) as mitsuba:
+            sensor = mitsuba.load_dict(self.sensor_for(camera))
+            try:
+                picture = mitsuba.render(
+                    self._scene, sensor=sensor, integrator=self._integrator, spp=self.samples, seed=seed
+                )
+                return np.array(picture, dtype=np.float32)
+            except RuntimeError as error:
+                raise InputError(f"Mitsuba: {error}") from error
+
+    def sensor_for(self, camera: ViewCamera) -> dict[str, Any]:
+        """The sensor of a view, as `mitsuba.load_dict` takes it.
+
+        Mitsuba shifts a picture by its principal point, in widths to the right and in heights downwards.
+
+        Raises:
+            InputError: pixels that are not square: Mitsuba has no others.
+        """
+        rows, columns = camera.pixels
+        wide, high = camera.right - camera.left, camera.bottom - camera.top
+        if not math.isclose(wide / columns, high / rows, rel_tol=1e-6):
+            raise InputError(
+                f"Mitsuba's pixels are square, and these span {wide / columns:g} across and {high / rows:g} down: "
+                "give one slope_per_pixel for both"
+            )
+        # Mitsuba's x points left and its y up.
+        move = np.eye(4)
+        move[:2, 3] = -camera.x / self._metres_per_unit, -camera.y / self._metres_per_unit
+        mitsuba = mitsuba_library()
+        given: dict[str, Any] = {
+            "type": "perspective",
+            "fov": math.degrees(2 * math.atan(wide / 2)),
+            "fov_axis": "x",
+            "principal_point_offset_x": (camera.left + camera.right) / 2 / wide,
+            "principal_point_offset_y": (camera.top + camera.bottom) / 2 / high,
+            "to_world": mitsuba.ScalarTransform4f(self._to_world @ move),
+            "sampler": self._sampler,
+            "film": {
+                "type": "hdrfilm",
+                "width": columns,
+                "height": rows,
+                "pixel_format": "rgb",
+                "component_format": "float32",
+                "rfilter": {"type": "box"},
+            },
+        }
+        if self._own is not None:
+            given["near_clip"], given["far_clip"] = self._own.near_clip(), self._own.far_clip()
+            medium = self._own.get_medium()
+            if medium is not None:
+                given["medium"] = medium
+        return given
+
+
+def _settled(mitsuba: Any, sampler: Any, samples: int) -> int:
+    """How many samples a sampler takes when asked for so many."""
+    level = mitsuba.log_level()
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)  # it would warn that it rounds, at every view
+    try:
+        sampler.set_sample_count(samples)
+        return int(sampler.sample_count())
+    finally:
+        mitsuba.set_log_level(level)
+
+
+def _pose(to_world: ArrayLike) -> NDArray[np.float64]:
+    matrix = np.asarray(to_world, dtype=np.float64)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        raise InputError(f"to_world is a 4×4 matrix of finite numbers, not an array of shape {matrix.shape}")
+    turn = matrix[:3, :3]
+    # Single precision is all that Mitsuba keeps of a matrix.
+    if not np.allclose(turn.T @ turn, np.eye(3), atol=1e-5) or not np.allclose(matrix[3], (0, 0, 0, 1)):
+        raise InputError("to_world moves and turns, and must not scale: say how long a unit is by metres_per_unit")
+    return matrix
+
+
+def _loaded(mitsuba: Any, scene: Any, parameters: dict[str, str]) -> Any:
+    """The scene, loaded.
+
+    Raises:
+        InputError: Mitsuba refuses it.
+    """
+    try:
+        if isinstance(scene, Mapping):
+            return mitsuba.load_dict(_for_mitsuba(mitsuba, scene))
+        return mitsuba.load_file(str(Path(fspath(scene)).expanduser()), **parameters)
+    except (RuntimeError, TypeError, ValueError) as error:
+        name = "the dict" if isinstance(scene, Mapping) else str(scene)
+        raise InputError(f"Mitsuba cannot load {name}: {error}") from error
+
+
+def _for_mitsuba(mitsuba: Any, plugin: Mapping[str, Any]) -> dict[str, Any]:
+    """A scene with Mitsuba's objects for NumPy's arrays: matrices of transforms, and pictures."""
+    made: dict[str, Any] = {}
+    for name, value in plugin.items():
+        if isinstance(value, Mapping):
+            made[name] = _for_mitsuba(mitsuba, value)
+        elif isinstance(value, np.ndarray) and name in ("to_world", "to_uv"):
+            made[name] = mitsuba.ScalarTransform4f(value)
+        elif isinstance(value, np.ndarray) and name == "bitmap":
+            made[name] = mitsuba.Bitmap(np.ascontiguousarray(value))
+        else:
+            made[name] = value
+    return made
+
+
+def _contents(scene: Any, parameters: dict[str, str]) -> dict[str, Any]:
+    """What tells one scene from another: the SHA-256 of a dict, or of an XML file and of all files that it names.
+
+    Raises:
+        InputError: there is no such file, or it is no XML.
+    """
+    if isinstance(scene, Mapping):
+        if parameters:
+            raise InputError("parameters are values for the $names of an XML file; this scene is a dict")
+        text = json.dumps(scene, default=_plain, sort_keys=True)
+        return {"dict_sha256": hashlib.sha256(text.encode()).hexdigest()}
+    path = Path(fspath(scene)).expanduser()
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    files: dict[str, str] = {}
+    _collect(path, path.parent, dict(parameters), files)
+    return {"file": path.name, "files_sha256": files, "parameters": parameters}
+
+
+def _collect(path: Path, folder: Path, names: dict[str, str], files: dict[str, str]) -> None:
+    """Add the SHA-256 of a scene file and of all that it names, by their paths from its folder."""
+    data = path.read_bytes()
+    files[str(path.relative_to(folder) if path.is_relative_to(folder) else path)] = hashlib.sha256(
+        data
+    ).hexdigest()
+    try:
+        root = ElementTree.fromstring(data)
+    except ElementTree.ParseError as error:
+        raise InputError(f"{path} is no XML: {error}") from None
+    for element in root.iter():
+        if element.tag == "default":
+            names.setdefault(element.get("name", ""), element.get("value", ""))
+        named = element.get("filename") if element.tag == "include" else element.get("value")
+        if element.tag not in ("include", "string") or named is None:
+            continue
+        # Longest first, as $name2 is not $name followed by a 2.
+        for name in sorted(names, key=len, reverse=True):
+            named = named.replace(f"${name}", names[name])
+        file = folder / named
+        if element.tag == "string" and element.get("name") != "filename":
+            continue
+        if not file.is_file():  # Mitsuba may know of another folder, or else says that it is not there
+            files[named] = "not found beside the scene"
+        elif element.tag == "include":
+            _collect(file, folder, names, files)
+        else:
+            files[named] = hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """What stands for an object of a dict in JSON: its numbers if it has any, else what it says of itself."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    try:
+        numbers = np.asarray(getattr(value, "matrix", value))
+    except (TypeError, ValueError):
+        return repr(value)
+    if numbers.dtype.kind in "fiub":
+        data = np.ascontiguousarray(numbers)
+        return [str(data.dtype), list(data.shape), hashlib.sha256(data.tobytes()).hexdigest()]
+    return repr(value)

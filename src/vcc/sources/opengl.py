@@ -1,0 +1,608 @@
+"""Views of triangle meshes, drawn by OpenGL without a screen: glTF, OBJ and PLY, textured and simply lit.
+
+moderngl draws through EGL, on a graphics card or in software (Mesa's llvmpipe); trimesh reads the files. Every
+view is an off-axis projection from a pinhole in the entrance plane, so things are where the frame of the light
+field says. Radiance is linear: textures are decoded from sRGB before they are filtered.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.errors import InputError
+from vcc.sources.views import CameraArray, ViewCamera
+
+MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply")
+"""The endings of the files that `OpenGLRenderer` reads."""
+
+_NEAREST_SHARE = 1e-4
+"""The depth buffer reaches from this share of the farthest distance on."""
+_COSINE_OF_CREASE = math.cos(math.radians(30))
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Viewpoint:
+    """Where the array of cameras stands in a scene's own coordinates.
+
+    Args:
+        eye: the middle of the array, in the scene's units.
+        target: a point on the array's axis in front of it, likewise.
+        up: a direction that is upwards in the pictures.
+        unit: metres that the scene's unit of length stands for; glTF is in metres.
+
+    Raises:
+        InputError: eye and target coincide, up points along the axis, or a unit that is not above 0.
+    """
+
+    eye: Vector = (0.0, 0.0, 0.0)
+    target: Vector = (0.0, 0.0, -1.0)
+    up: Vector = (0.0, 1.0, 0.0)
+    unit: float = field(default=1.0, metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        if not (self.unit > 0 and math.isfinite(self.unit)):
+            raise InputError(f"the unit of a scene is a length in metres above 0, not {self.unit}")
+        back = np.subtract(self.eye, self.target)
+        if not np.linalg.norm(back) > 0:
+            raise InputError(f"a viewpoint looks from eye to target, and both are {self.eye}")
+        if not np.linalg.norm(np.cross(self.up, back)) > 1e-9 * np.linalg.norm(back) * np.linalg.norm(self.up):
+            raise InputError(f"up is {self.up}, which does not say how pictures are turned: it is along the view")
+
+    def array_from_scene(self) -> NDArray[np.float64]:
+        """4×4 matrix from the scene's coordinates to the array's: metres, x right, y down, z against the view."""
+        back = np.subtract(self.eye, self.target)
+        back = back / np.linalg.norm(back)
+        right = np.cross(self.up, back)
+        right /= np.linalg.norm(right)
+        axes = np.stack([right, -np.cross(back, right), back])
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.unit * axes
+        matrix[:3, 3] = -self.unit * axes @ np.asarray(self.eye, dtype=np.float64)
+        return matrix
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """The light on a scene of meshes, in the axes of the camera array; there are no shadows.
+
+    Radiance = albedo · (ambient + fill·(1 − n_y)/2 + sun·max(0, n·l)): n is the surface's normal, of length 1, on
+    the side that is seen; l points to the sun; y is downwards.
+
+    Args:
+        ambient: light from everywhere (red, green, blue), linear.
+        sun: light from one direction, likewise: what a surface of albedo 1 that faces it shows.
+        sun_from: direction towards the sun (x right, y down, z from the scene to the cameras); any length above 0.
+        fill: soft light from above, half of it from the horizon, likewise.
+
+    Raises:
+        InputError: light below 0, or no direction of the sun.
+    """
+
+    ambient: Vector = (0.15, 0.15, 0.17)
+    sun: Vector = (0.7, 0.68, 0.62)
+    sun_from: Vector = (-0.5, -0.8, 0.7)
+    fill: Vector = (0.25, 0.27, 0.3)
+
+    def __post_init__(self) -> None:
+        for name in ("ambient", "sun", "fill"):
+            light = getattr(self, name)
+            if len(light) != 3 or not all(part >= 0 and math.isfinite(part) for part in light):
+                raise InputError(f"{name} is light as (red, green, blue), each 0 or more, not {light}")
+        if not 0 < math.hypot(*self.sun_from) < math.inf:
+            raise InputError(f"sun_from is a direction of three numbers, not {self.sun_from}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Triangles that share a material, in the array's coordinates."""
+
+    corners: NDArray[np.float32]
+    """(3 · triangles, 12): position, normal, texture place (0 to 1, v upwards), linear colour with opacity."""
+    texture: NDArray[np.float16] | None
+    """(rows, columns, 4), linear, bottom row first."""
+    cutoff: float
+    """Opacity below which nothing is drawn."""
+    two_sided: bool
+
+
+class OpenGLRenderer:
+    """Draws the views of triangle meshes; a renderer for `vcc.sources.synthesize`.
+
+    Meshes are solid: what is less opaque than half (or than glTF's alphaCutoff) is not drawn, the rest hides what
+    is behind it. There are no shadows, mirrors or glass. A glTF material that is not double-sided is not seen from
+    behind, as glTF wants it; all others are seen from both sides. Textures repeat, with mipmaps and anisotropic
+    filtering where the driver has it. Of materials only the base colour and its texture are used. 8-bit colours of
+    OBJ and PLY are taken as sRGB, glTF's factors and vertex colours as linear; an OBJ material with a picture
+    has the picture's colour alone.
+
+    Views are drawn in the thread that draws the first of them.
+
+    Args:
+        meshes: files (.glb, .gltf, .obj, .ply), or trimesh scenes and meshes; one or several.
+        viewpoint: where the array stands in the scene's coordinates.
+        lighting: the light.
+        background: linear radiance (red, green, blue) where nothing is.
+        supersampling: pixels each way that are drawn for one of a view, and averaged.
+        multisampling: samples of the outline within each drawn pixel, 1 to what the driver has.
+
+    Raises:
+        InputError: a file that is not there or cannot be understood, or a picture that it names and that is not
+            there; no triangles, or none in front of the array; packages that are missing.
+    """
+
+    def __init__(
+        self,
+        meshes: Any,
+        viewpoint: Viewpoint | None = None,
+        *,
+        lighting: Lighting | None = None,
+        background: Vector = (0.0, 0.0, 0.0),
+        supersampling: int = 1,
+        multisampling: int = 4,
+    ) -> None:
+        for name, count in (("supersampling", supersampling), ("multisampling", multisampling)):
+            if not isinstance(count, int) or not 1 <= count <= 16:
+                raise InputError(f"{name} is a whole number from 1 to 16, not {count}")
+        if len(background) != 3 or not all(part >= 0 and math.isfinite(part) for part in background):
+            raise InputError(f"background is (red, green, blue), each 0 or more, not {background}")
+        self.viewpoint = viewpoint or Viewpoint()
+        self.lighting = lighting or Lighting()
+        self.background = tuple(float(part) for part in background)
+        self.supersampling, self.multisampling = supersampling, multisampling
+        self._names, scenes = _loaded(meshes)
+        self._parts = _parts(scenes, self.viewpoint.array_from_scene())
+        far = np.concatenate([-part.corners[:, 2] for part in self._parts])
+        if not far.max() > 0:
+            raise InputError(
+                "all meshes are behind the cameras: move the viewpoint's eye, or let `fitted` choose it"
+            )
+        self._distances = (float(far[far > 0].min()), float(far.max()))
+        self._drawing: _Drawing | None = None
+
+    @classmethod
+    def fitted(
+        cls,
+        meshes: Any,
+        cameras: CameraArray,
+        *,
+        direction: Vector = (0.0, 0.0, 1.0),
+        up: Vector = (0.0, 1.0, 0.0),
+        unit: float = 1.0,
+        **options: Any,
+    ) -> OpenGLRenderer:
+        """A renderer whose array stands where the middle of its views has all meshes in the picture.
+
+        Args:
+            meshes: see the class.
+            cameras: the array that is to see them.
+            direction: from the middle of the meshes to the array, in the scene's coordinates; glTF's front is +z.
+            up: upwards in the pictures, likewise.
+            unit: metres that the scene's unit stands for.
+            options: of the class.
+
+        Raises:
+            InputError: see the class; or views so far apart or so narrow that nothing fits.
+        """
+        _, scenes = _loaded(meshes)
+        low = np.min([scene.bounds[0] for scene in scenes], axis=0)
+        high = np.max([scene.bounds[1] for scene in scenes], axis=0)
+        middle = (low + high) / 2
+        away = np.asarray(direction, dtype=np.float64)
+        place = Viewpoint(tuple(middle + away), tuple(middle), up, unit)
+        corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3) - middle
+        x, y, z = (place.array_from_scene()[:3, :3] / unit) @ corners.T
+        tangents = [n * slope / 2 for n, slope in zip(cameras.pixels, cameras.slopes_per_pixel, strict=True)]
+        # A corner at depth D − z is in the picture where |x| ≤ tangent · (D − z); a little air around it.
+        distance = float(np.max([z + np.abs(x) / tangents[1], z + np.abs(y) / tangents[0]])) * 1.02
+        eye = middle + away / np.linalg.norm(away) * distance
+        return cls(meshes, Viewpoint(tuple(eye.tolist()), tuple(middle.tolist()), up, unit), **options)
+
+    @property
+    def distances(self) -> tuple[float, float]:
+        """The nearest and the farthest vertex in front of the entrance plane, metres along the axis."""
+        return self._distances
+
+    def description(self) -> dict[str, Any]:
+        """All that the pictures depend on but the cameras; meshes and textures by their SHA-256."""
+        digest = hashlib.sha256()
+        for part in self._parts:
+            digest.update(part.corners.tobytes())
+            digest.update(b"-" if part.texture is None else part.texture.tobytes())
+            digest.update(repr((part.cutoff, part.two_sided)).encode())
+        return {
+            "renderer": "opengl",
+            "meshes": self._names,
+            "sha256": digest.hexdigest(),
+            "viewpoint": asdict(self.viewpoint),
+            "lighting": asdict(self.lighting),
+            "background": list(self.background),
+            "supersampling": self.supersampling,
+            "multisampling": self.multisampling,
+        }
+
+    def render(self, camera: ViewCamera) -> NDArray[np.float32]:
+        """The picture of one view.
+
+        Args:
+            camera: where it is and where it looks.
+
+        Returns:
+            Linear radiance, (rows, columns, 3), row 0 at the top.
+
+        Raises:
+            InputError: no OpenGL on this machine, or pictures larger than it can draw.
+        """
+        if self._drawing is None:
+            self._drawing = _Drawing(self._parts, self.lighting, self.multisampling)
+        far = self._distances[1] * 1.001
+        near = max(self._distances[0] * 0.999, far * _NEAREST_SHARE)
+        fine = self.supersampling
+        rows, columns = camera.pixels
+        drawn = self._drawing.draw(
+            _projection(camera, near, far), camera, (rows * fine, columns * fine), self.background
+        )
+        if fine > 1:
+            drawn = drawn.reshape(rows, fine, columns, fine, 3).mean(axis=(1, 3))
+        return drawn
+
+    def close(self) -> None:
+        """Give the graphics memory back; drawing again takes it again."""
+        if self._drawing is not None:
+            self._drawing.release()
+            self._drawing = None
+
+
+def _projection(camera: ViewCamera, near: float, far: float) -> NDArray[np.float64]:
+    """4×4 from the array's coordinates to clip coordinates, row 0 of the picture at the bottom of OpenGL's."""
+    across, down = camera.right - camera.left, camera.bottom - camera.top
+    # With depth Z = −z: ndc_x = 2·((x − x₀)/Z − left)/across − 1, times Z; y likewise, which OpenGL stores
+    # from −1 upwards: our top row comes first in memory without turning anything.
+    return np.array(
+        [
+            [2 / across, 0, 2 * camera.left / across + 1, -2 * camera.x / across],
+            [0, 2 / down, 2 * camera.top / down + 1, -2 * camera.y / down],
+            [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)],
+            [0, 0, -1, 0],
+        ]
+    )
+
+
+_VERTEX = """
+#version 330
+uniform mat4 clip_from_array;
+in vec3 position; in vec3 normal; in vec2 place; in vec4 colour;
+out vec3 at; out vec3 facing; out vec2 uv; out vec4 tint;
+void main() {
+    gl_Position = clip_from_array * vec4(position, 1.0);
+    at = position; facing = normal; uv = place; tint = colour;
+}
+"""
+_FRAGMENT = """
+#version 330
+uniform sampler2D image; uniform bool textured; uniform float cutoff; uniform bool two_sided; uniform vec3 eye;
+uniform vec3 ambient; uniform vec3 sun; uniform vec3 to_sun; uniform vec3 fill;
+in vec3 at; in vec3 facing; in vec2 uv; in vec4 tint;
+out vec4 radiance;
+void main() {
+    vec4 albedo = tint;
+    if (textured) albedo *= texture(image, uv);
+    if (albedo.a < cutoff) discard;
+    vec3 n = normalize(facing);
+    // the side that is seen, by the triangle itself: shading normals lean over at outlines
+    vec3 flat_normal = cross(dFdx(at), dFdy(at));
+    if (dot(flat_normal, eye - at) < 0.0) flat_normal = -flat_normal;
+    if (dot(flat_normal, n) < 0.0) n = -n;
+    vec3 light = ambient + fill * 0.5 * (1.0 - n.y) + sun * max(dot(n, to_sun), 0.0);
+    radiance = vec4(albedo.rgb * light, 1.0);
+}
+"""
+
+
+class _Drawing:
+    """An OpenGL context with the parts in its memory."""
+
+    def __init__(self, parts: Sequence[_Part], lighting: Lighting, multisampling: int) -> None:
+        self.context = _context()
+        most = self.context.max_samples
+        if multisampling > most:
+            self.release()
+            raise InputError(
+                f"multisampling is {multisampling}, and the OpenGL here has up to {most} samples; "
+                "supersampling has no such limit"
+            )
+        self.samples = multisampling if multisampling > 1 else 0
+        self.program = self.context.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
+        self._set("ambient", lighting.ambient)
+        self._set("sun", lighting.sun)
+        self._set("fill", lighting.fill)
+        length = math.hypot(*lighting.sun_from)
+        self._set("to_sun", tuple(part / length for part in lighting.sun_from))
+        self._set("image", 0)
+        self.parts = [(part, *self._loaded(part)) for part in parts]
+        self.size: tuple[int, int] | None = None
+        self.targets: list[Any] = []
+
+    def _set(self, name: str, value: Any) -> None:
+        if name in self.program:  # a compiler leaves out what it finds unused
+            self.program[name].value = value
+
+    def _loaded(self, part: _Part) -> tuple[Any, Any]:
+        buffer = self.context.buffer(part.corners.tobytes())
+        layout = (buffer, "3f 3f 2f 4f", "position", "normal", "place", "colour")
+        array = self.context.vertex_array(self.program, [layout])
+        if part.texture is None:
+            return array, None
+        rows, columns = part.texture.shape[:2]
+        limit = self.context.info["GL_MAX_TEXTURE_SIZE"]
+        if max(rows, columns) > limit:
+            raise InputError(
+                f"a texture of {columns}×{rows} pixels is larger than OpenGL's {limit} here: shrink it"
+            )
+        texture = self.context.texture((columns, rows), 4, part.texture.tobytes(), dtype="f2")
+        texture.build_mipmaps()
+        texture.anisotropy = self.context.max_anisotropy
+        return array, texture
+
+    def _resize(self, size: tuple[int, int]) -> None:
+        if size == self.size:
+            return
+        limit = self.context.info["GL_MAX_TEXTURE_SIZE"]
+        if max(size) > limit:
+            raise InputError(
+                f"a view is drawn with {size[1]}×{size[0]} pixels, and OpenGL here draws up to {limit} each way: "
+                "take less supersampling"
+            )
+        for target in self.targets:
+            target.release()
+        wide = size[::-1]
+        drawn = self.context.framebuffer(
+            self.context.renderbuffer(wide, 4, samples=self.samples, dtype="f4"),
+            self.context.depth_renderbuffer(wide, samples=self.samples),
+        )
+        kept = self.context.simple_framebuffer(wide, 4, dtype="f4") if self.samples else drawn
+        self.targets = [drawn, kept] if self.samples else [drawn]
+        self.size = size
+
+    def draw(
+        self,
+        projection: NDArray[np.float64],
+        camera: ViewCamera,
+        size: tuple[int, int],
+        background: Sequence[float],
+    ) -> NDArray[np.float32]:
+        import moderngl
+
+        self._resize(size)
+        target, kept = self.targets[0], self.targets[-1]
+        target.use()
+        target.viewport = (0, 0, size[1], size[0])
+        self.context.enable(moderngl.DEPTH_TEST)
+        target.clear(*background, 1.0)
+        self.program["clip_from_array"].write(projection.T.astype(np.float32).tobytes())
+        self._set("eye", (camera.x, camera.y, 0.0))
+        # The array's axes are left-handed (y is down), which mirrors: triangles that run anticlockwise as seen
+        # from outside run clockwise in the window.
+        self.context.front_face = "cw"
+        for part, array, texture in self.parts:
+            self._set("textured", texture is not None)
+            self._set("cutoff", part.cutoff)
+            if part.two_sided:
+                self.context.disable(moderngl.CULL_FACE)
+            else:
+                self.context.enable(moderngl.CULL_FACE)
+            if texture is not None:
+                texture.use(0)
+            array.render(moderngl.TRIANGLES)
+        if kept is not target:
+            self.context.copy_framebuffer(kept, target)
+        pixels = np.frombuffer(kept.read(components=3, dtype="f4", alignment=1), dtype=np.float32)
+        return pixels.reshape(*size, 3).copy()
+
+    def release(self) -> None:
+        self.context.release()
+
+
+def _context() -> Any:
+    try:
+        import moderngl
+    except ImportError:
+        raise InputError(
+            'drawing meshes needs the package moderngl: pip install "virtual-computational-camera[opengl]"'
+        ) from None
+    try:
+        create: Any = moderngl.create_context  # whose stubs leave out its options
+        return create(standalone=True, backend="egl", require=330)
+    except Exception as error:  # the loader of libEGL raises plain exceptions
+        raise InputError(
+            f"OpenGL cannot be opened without a screen, through EGL ({error}). Install EGL and Mesa's drivers, "
+            'which also draw without a graphics card: "apt install libegl1 libgl1-mesa-dri" on Debian and Ubuntu'
+        ) from None
+
+
+def _loaded(meshes: Any) -> tuple[list[str], list[Any]]:
+    """Names, and trimesh scenes with where they came from (file ending or "")."""
+    try:
+        import trimesh
+    except ImportError:
+        raise InputError(
+            "reading meshes needs the packages trimesh and pillow: "
+            'pip install "virtual-computational-camera[opengl]"'
+        ) from None
+    given = list(meshes) if isinstance(meshes, list | tuple) else [meshes]
+    if not given:
+        raise InputError("there are no meshes to draw: give at least one file")
+    names, scenes = [], []
+    for each in given:
+        if isinstance(each, trimesh.Scene):
+            scene = each
+        elif isinstance(each, trimesh.Trimesh):
+            scene = trimesh.Scene(each)
+        elif isinstance(each, str | Path):
+            scene = _read(Path(each))
+        else:
+            raise InputError(f"a mesh is a file or an object of trimesh, not {type(each).__name__}")
+        if not any(isinstance(part, trimesh.Trimesh) and len(part.faces) for part in scene.geometry.values()):
+            raise InputError(f"{each} holds no triangles: point clouds and lines are not drawn")
+        scenes.append(scene)
+        names.append(Path(each).name if isinstance(each, str | Path) else type(each).__name__)
+    return names, scenes
+
+
+def _read(path: Path) -> Any:
+    import trimesh
+
+    if path.suffix.lower() not in MESH_ENDINGS:
+        raise InputError(f'{path} has the ending "{path.suffix}"; meshes are read from {", ".join(MESH_ENDINGS)}')
+    if not path.is_file():
+        raise InputError(f"there is no mesh file {path}")
+    if path.suffix.lower() == ".obj":
+        _check_materials(path)
+    try:
+        scene = trimesh.load_scene(path)
+    except Exception as error:  # each of its readers has its own types for a damaged file
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{path} cannot be read as a mesh: it is damaged or incomplete ({reason})") from error
+    scene.metadata["ending"] = path.suffix.lower()
+    return scene
+
+
+def _check_materials(path: Path) -> None:
+    """Refuse an OBJ whose material file or pictures are missing: it would be drawn grey without a word."""
+    for library in _named_in(path, "mtllib"):
+        if not library.is_file():
+            raise InputError(f"{path} names the material file {library.name}, which is not beside it")
+        for picture in _named_in(library, "map_Kd"):
+            if not picture.is_file():
+                raise InputError(f"{library} names the picture {picture.name}, and there is no {picture}")
+
+
+def _named_in(path: Path, word: str) -> list[Path]:
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    rests = [
+        line.split(maxsplit=1)[1].strip() for line in lines if line.split()[:1] == [word] and len(line.split()) > 1
+    ]
+    # options of a map ("-s 1 1 1 wood.png") come before its name
+    return [
+        path.parent / (rest.split()[-1] if rest.startswith("-") else rest).replace("\\", "/") for rest in rests
+    ]
+
+
+def _parts(scenes: Sequence[Any], array_from_scene: NDArray[np.float64]) -> list[_Part]:
+    import trimesh
+
+    parts = []
+    for scene in scenes:
+        linear_colours = scene.metadata.get("ending") in (".glb", ".gltf")
+        for node in scene.graph.nodes_geometry:
+            placed, name = scene.graph[node]
+            mesh = scene.geometry[name]
+            if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+                parts.append(_part(mesh, array_from_scene @ placed, linear_colours))
+    return parts
+
+
+def _part(mesh: Any, to_array: NDArray[np.float64], linear_colours: bool) -> _Part:
+    faces = np.asarray(mesh.faces)
+    positions = np.asarray(mesh.vertices) @ to_array[:3, :3].T + to_array[:3, 3]
+    if "vertex_normals" in mesh._cache:  # the file states them
+        normals = np.asarray(mesh.vertex_normals) @ np.linalg.inv(to_array[:3, :3])
+        normals = (normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))[faces]
+    else:
+        normals = _normals_of_corners(positions, faces)
+    if np.linalg.det(to_array[:3, :3]) > 0:  # the array's axes are left-handed: the usual case is below 0
+        faces, normals = faces[:, ::-1], normals[:, ::-1]
+    corner, normals = faces.ravel(), normals.reshape(-1, 3)
+    places = np.zeros((len(positions), 2))
+    colours, texture, cutoff, two_sided = np.ones((len(positions), 4)), None, 0.5, True
+    visual = mesh.visual
+    if visual.kind == "texture":
+        if visual.uv is not None:
+            places = np.asarray(visual.uv, dtype=np.float64)
+        colours[:], texture, cutoff, two_sided = _material(visual.material, linear_colours)
+    elif visual.kind == "face":
+        by_face = _linear(np.asarray(visual.face_colors), linear_colours)
+        return _Part(
+            _interleaved(positions[corner], normals, places[corner], np.repeat(by_face, 3, axis=0)),
+            None,
+            cutoff,
+            two_sided,
+        )
+    else:
+        colours = _linear(np.asarray(visual.vertex_colors), linear_colours)
+    return _Part(
+        _interleaved(positions[corner], normals, places[corner], colours[corner]),
+        texture,
+        cutoff,
+        two_sided,
+    )
+
+
+def _normals_of_corners(positions: NDArray[np.float64], faces: NDArray[Any]) -> NDArray[np.float64]:
+    """Normals (triangles, 3, 3) of a surface that states none: smooth, but sharp at creases of 30° and more.
+
+    A corner has the mean normal, by area, of those triangles at its place that are within 30° of its own.
+    """
+    first, second, third = (positions[faces[:, n]] for n in range(3))
+    by_area = np.cross(second - first, third - first)
+    unit = by_area / np.maximum(np.linalg.norm(by_area, axis=1, keepdims=True), 1e-30)
+    # Vertices are doubled along seams of textures: what counts is the place.
+    place = np.unique(positions, axis=0, return_inverse=True)[1].ravel()[faces].ravel()
+    order = np.argsort(place, kind="stable")
+    counts = np.bincount(place)
+    starts = np.cumsum(counts) - counts
+    total = np.zeros((len(place), 3))
+    for turn in range(int(counts.max())):
+        there = order[counts[place[order]] > turn]  # each corner meets the turn-th corner at its place
+        other = order[starts[place[there]] + turn]
+        close = np.einsum("ij,ij->i", unit[there // 3], unit[other // 3]) > _COSINE_OF_CREASE
+        total[there[close]] += by_area[other[close] // 3]
+    total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-30)
+    return total.reshape(-1, 3, 3)
+
+
+def _interleaved(*columns: NDArray[np.float64]) -> NDArray[np.float32]:
+    return np.ascontiguousarray(np.concatenate(columns, axis=1), dtype=np.float32)
+
+
+def _linear(colours: NDArray[Any], already: bool) -> NDArray[np.float64]:
+    """Linear colour and opacity, 0 to 1, of 8-bit ones."""
+    from vcc.formats.transfer import to_linear
+
+    shares = colours.astype(np.float64) / 255
+    if not already:
+        shares[..., :3] = to_linear(shares[..., :3])
+    return shares
+
+
+def _material(
+    material: Any, linear_colours: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float16] | None, float, bool]:
+    """(colour and opacity, texture, least opacity, seen from both sides) of trimesh's materials."""
+    pbr = hasattr(material, "baseColorTexture")
+    image = material.baseColorTexture if pbr else getattr(material, "image", None)
+    colour = np.ones(4)
+    if pbr and material.baseColorFactor is not None:
+        colour = _linear(np.asarray(material.baseColorFactor), True)  # linear by glTF's definition
+    elif not pbr and image is None:
+        colour = _linear(np.asarray(material.main_color), linear_colours)
+    cutoff, two_sided = 0.5, True
+    if pbr:
+        two_sided = not linear_colours or bool(material.doubleSided)
+        if (material.alphaMode or "OPAQUE") == "OPAQUE":
+            cutoff = 0.0
+        elif material.alphaMode == "MASK" and material.alphaCutoff is not None:
+            cutoff = float(material.alphaCutoff)
+    if image is None:
+        return colour, None, cutoff, two_sided
+    samples = _linear(np.asarray(image.convert("RGBA")), False)
+    return colour, samples[::-1].astype(np.float16), cutoff, two_sided

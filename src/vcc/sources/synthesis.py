@@ -1,0 +1,208 @@
+"""Light fields from renderers: every view asked for in turn, written as it is done, gone on with after a stop."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import asdict
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from vcc.errors import InputError, ResultWarning
+from vcc.light_field import LightField
+from vcc.sources.views import CameraArray, ViewCamera
+
+if TYPE_CHECKING:
+    from vcc.store import StoredLightField
+
+DTYPES = ("float16", "float32", "uint8", "uint16")
+"""What the samples of a synthesized light field may be kept as."""
+
+Progress = Callable[[int, int], None]
+
+
+class Renderer(Protocol):
+    """What makes the picture of one view. A renderer that holds something open may also have ``close()``."""
+
+    def description(self) -> dict[str, Any]:
+        """All that a picture depends on except the camera, as JSON can hold it.
+
+        Pictures are kept together in a store only if their descriptions are equal.
+        """
+        ...
+
+    def render(self, camera: ViewCamera) -> NDArray[np.float32]:
+        """The picture that a camera takes: linear radiance, shape (rows, columns, 3), row 0 at the top.
+
+        Each sample is the mean over its pixel.
+        """
+        ...
+
+
+def synthesize(
+    renderer: Renderer,
+    cameras: CameraArray,
+    store: str | PathLike[str] | None = None,
+    *,
+    dtype: DTypeLike = "float16",
+    progress: Progress | None = None,
+) -> LightField | StoredLightField:
+    """The light field that an array of cameras takes of a renderer's scene, view by view.
+
+    With a store, each view is on the disk as soon as it is rendered: after a stop, the same call goes on with the
+    views that are missing. A store made from another description (scene, samples, cameras, dtype …) is refused.
+
+    Args:
+        renderer: what makes the pictures.
+        cameras: where the views are.
+        store: folder of a Zarr store (see `vcc.store`); None keeps the light field in memory.
+        dtype: ``"float16"`` (11 bits of precision, radiance up to 65504) or ``"float32"`` keep radiance as it is.
+            ``"uint8"`` and ``"uint16"`` are rounded, full scale is radiance 1, and what is brighter is cut off,
+            which a warning says.
+        progress: called with (done, total) in views, those found in the store included.
+
+    Returns:
+        A `vcc.LightField`, or with a store what `vcc.store.open_store` gives: shape (v, u, t, s, 3), linear.
+
+    Raises:
+        InputError: another dtype; a store of another description; a view that could not be rendered, is of another
+            shape than asked for, or holds values that are not finite, negative or too large for the dtype. The
+            views before it stay in the store.
+    """
+    kind = np.dtype(dtype)
+    if kind.name not in DTYPES:
+        raise InputError(f"the samples of a synthesized light field are {', '.join(DTYPES)}, not {kind}")
+    if store is None:
+        return _in_memory(renderer, cameras, kind, progress)
+    return _in_store(renderer, cameras, Path(fspath(store)), kind, progress)
+
+
+def _in_memory(
+    renderer: Renderer, cameras: CameraArray, kind: np.dtype[Any], progress: Progress | None
+) -> LightField:
+    values = np.empty((*cameras.shape, 3), kind)
+    order = list(np.ndindex(*cameras.views))
+    cut = _Cut(kind)
+    for done, (row, column) in enumerate(order):
+        if progress is not None:
+            progress(done, len(order))
+        hint = "Give store=… (a folder) to keep the views that are done and to go on where it stopped"
+        values[row, column] = _rendered(renderer, cameras, row, column, kind, done, cut, hint)
+    if progress is not None:
+        progress(len(order), len(order))
+    cut.warn()
+    return cameras.light_field(values)
+
+
+def _in_store(
+    renderer: Renderer, cameras: CameraArray, path: Path, kind: np.dtype[Any], progress: Progress | None
+) -> StoredLightField:
+    from vcc import __version__
+    from vcc.store import create_store
+
+    rendered = renderer.description()
+    description = {"renderer": rendered, "cameras": asdict(cameras), "dtype": kind.name}
+    provenance = {"made_by": f"vcc {__version__}, vcc.sources.synthesize", "renderer": rendered}
+    total = cameras.views[0] * cameras.views[1]
+    cut = _Cut(kind)
+    with create_store(
+        path,
+        cameras,
+        (*cameras.shape, 3),
+        kind,
+        provenance=provenance,
+        description=description,
+        channel_names=("R", "G", "B"),
+    ) as writer:
+        missing = writer.missing()
+        for done, (row, column) in enumerate(missing, total - len(missing)):
+            if progress is not None:
+                progress(done, total)
+            hint = f"{done} of {total} views are kept in {path}: the same call goes on with this one"
+            writer.write_view(row, column, _rendered(renderer, cameras, row, column, kind, done, cut, hint))
+        if progress is not None:
+            progress(total, total)
+        cut.warn()
+        return writer.finish()
+
+
+def _rendered(
+    renderer: Renderer,
+    cameras: CameraArray,
+    row: int,
+    column: int,
+    kind: np.dtype[Any],
+    done: int,
+    cut: _Cut,
+    hint: str,
+) -> NDArray[Any]:
+    """A view as it is kept.
+
+    Raises:
+        InputError: it could not be rendered or kept; the message says which view, why, and how to go on.
+    """
+    total = cameras.views[0] * cameras.views[1]
+    view = f"view ({row}, {column}), number {done + 1} of {total}"
+    try:
+        radiance = np.asarray(renderer.render(cameras.camera(row, column)))
+    except Exception as error:
+        name = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
+        raise InputError(f"{view} could not be rendered. {name}{error}\n{hint}") from error
+    try:
+        return cut.kept(radiance, (*cameras.pixels, 3))
+    except InputError as error:
+        raise InputError(f"{view} {error}\n{hint}") from None
+
+
+class _Cut:
+    """Radiance to samples of a dtype, counting what is cut off."""
+
+    def __init__(self, kind: np.dtype[Any]) -> None:
+        self._kind = kind
+        self._cut = 0
+        self._seen = 0
+
+    def kept(self, radiance: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+        """The samples of a picture.
+
+        Raises:
+            InputError: they are not radiance, or do not fit the dtype.
+        """
+        if radiance.shape != shape:
+            raise InputError(f"came as an array of shape {radiance.shape}, and {shape} was asked for")
+        if radiance.dtype.kind != "f":
+            raise InputError(f"came as {radiance.dtype}: a renderer returns linear radiance, as float32")
+        bad = ~(np.isfinite(radiance) & (radiance >= 0))
+        if bad.any():
+            place = tuple(int(n) for n in np.argwhere(bad)[0])
+            raise InputError(
+                f"holds {int(bad.sum())} values that are no radiance (NaN, infinite or negative), the first at "
+                f"(row, column, channel) {place}: {radiance[place]}. Look at the scene's materials and lights"
+            )
+        if self._kind.kind == "f":
+            largest = float(np.finfo(self._kind).max)
+            if radiance.max() > largest:
+                raise InputError(
+                    f"holds radiance of {radiance.max():g}, and {self._kind} ends at {largest:g}: "
+                    'take dtype="float32"'
+                )
+            return radiance.astype(self._kind)
+        self._cut += int((radiance > 1).sum())
+        self._seen += radiance.size
+        full = np.iinfo(self._kind).max
+        return np.asarray(np.rint(np.minimum(radiance, 1.0) * full), dtype=self._kind)
+
+    def warn(self) -> None:
+        """Say how much was cut off, if anything was."""
+        if self._cut:
+            warnings.warn(
+                ResultWarning(
+                    f"{100 * self._cut / self._seen:.2g} % of the samples were brighter than radiance 1 and were "
+                    f'cut off there: {self._kind} holds no more. dtype="float16" does'
+                ),
+                stacklevel=4,
+            )
