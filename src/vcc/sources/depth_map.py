@@ -163,7 +163,7 @@ class DepthMapScene:
             lowest = cameras.disparity(math.inf)
             raise InputError(
                 f"disparities go down to {np.nanmin(disparity):g} pixels a view, and infinitely far things have "
-                f"{lowest:g}: a nearer focus_distance of the array, or another spacing, makes them fit"
+                f"{lowest:g}: a nearer focus distance of the cameras, or a larger spacing, makes them fit"
             )
         with np.errstate(divide="ignore"):
             return cls.for_cameras(radiance, 1 / vergence, cameras, **options)
