@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vcc.errors import InputError
 from vcc.formats import transfer
-from vcc.formats.pictures import auto_exposure
+from vcc.formats.pictures import auto_exposure, checked_exposure
 from vcc.sampled import to_numpy
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Codes:
             raise InputError(f'transfer is "srgb" or "linear", not {curve!r}')
         self._light_field, self._bits, self._curve = light_field, bits, curve
         self._seen = self._beyond = 0
-        self.exposure = self._automatic() if exposure == "auto" else _number(exposure)
+        self.exposure = self._automatic() if exposure == "auto" else checked_exposure(exposure)
 
     @property
     def clipped(self) -> float:
@@ -78,13 +78,3 @@ def stored_view(light_field: LightField | StoredLightField, row: int, column: in
     piece = light_field[row : row + 1, column : column + 1]
     samples: NDArray[Any] = to_numpy(piece.values)[0, 0]
     return samples, piece.full_scale
-
-
-def _number(exposure: Any) -> float:
-    try:
-        factor = float(exposure)
-    except (TypeError, ValueError):
-        factor = float("nan")
-    if not (factor > 0 and np.isfinite(factor)):
-        raise InputError(f'exposure is "auto" or a finite number above 0, not {exposure!r}')
-    return factor

@@ -291,7 +291,7 @@ def _save_display(
             f"the image has {values[where]} at index {where}, which {ending} cannot hold; .npy and .exr can"
         )
     automatic = exposure == "auto"
-    factor = auto_exposure(values) if automatic else _checked_exposure(exposure)
+    factor = auto_exposure(values) if automatic else checked_exposure(exposure)
     exposed = values * np.float32(factor)
     clipped = _share_beyond(exposed > 1 + 0.5 / (2**bits - 1))  # what rounds to white is not lost
     negative = _share_beyond(exposed < 0)
@@ -312,7 +312,12 @@ def _save_display(
     return SavedPicture(path, factor, clipped, description)
 
 
-def _checked_exposure(exposure: Any) -> float:
+def checked_exposure(exposure: Any) -> float:
+    """An exposure given as a number.
+
+    Raises:
+        InputError: it is not a finite number above 0.
+    """
     try:
         factor = float(exposure)
     except (TypeError, ValueError):
