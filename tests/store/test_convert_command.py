@@ -173,3 +173,17 @@ def test_help_teaches():
     said = done("convert", "--help")
     assert "Example:" in said
     assert "--lossy" in said
+
+
+def test_the_order_of_numbered_views_can_be_told(codes, tmp_path):
+    (tmp_path / "numbered").mkdir()
+    walk = [(0, 0), (0, 1), (0, 2), (1, 2), (1, 1), (1, 0), (2, 0), (2, 1), (2, 2)]  # every other row backwards
+    for number, (row, column) in enumerate(walk):
+        picture = imagecodecs.png_encode(codes[row, column].copy())
+        (tmp_path / "numbered" / f"{number:02d}.png").write_bytes(picture)
+    told = ["--views", "3", "3", "--order", "serpentine", "--orientation", "as-is"]
+    done("convert", "numbered", "told.zarr", *KNOWN, *told)
+    assert np.array_equal(stored_codes("told.zarr"), codes)
+    assert "9 of 16 numbered views" in refused("convert", "numbered", "other.zarr", *KNOWN, "--views", "4", "4")
+    assert "leave out --order" in refused("convert", "told.zarr", "again.zarr", "--order", "serpentine")
+    assert "every= means nothing to a folder" in refused("convert", "views", "v.zarr", *KNOWN, "--every", "2")

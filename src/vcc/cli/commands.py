@@ -488,15 +488,43 @@ def convert(
     slope_per_pixel: given.SlopePerPixel = None,
     focus_distance: given.FocusDistance = None,
     orientation: given.Orientation = "auto",
+    views: Annotated[
+        tuple[int, int] | None,
+        typer.Option(
+            metavar="ROWS COLUMNS",
+            help="Of views, where file names only count on, or one picture holds all views. Default: found out.",
+            show_default=False,
+            rich_help_panel="Reading the light field",
+        ),
+    ] = None,
+    order: Annotated[
+        Literal["row-major", "column-major", "serpentine", "serpentine-columns"] | None,
+        typer.Option(
+            help="In which names that only count on go through the views. Default: found out by parallax.",
+            show_default=False,
+            rich_help_panel="Reading the light field",
+        ),
+    ] = None,
+    every: Annotated[
+        int | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="Of a video, take each so-many-th frame as a view. Default: all.",
+            show_default=False,
+            rich_help_panel="Reading the light field",
+        ),
+    ] = None,
 ) -> None:
     """Put a light field into a store (Zarr), or into files of another format.
 
     A store keeps samples bit for bit, with their cameras, opens at once and is read in parts: a camera takes a
     picture of it in whatever memory there is (--memory-limit). It appears when it is whole.
     """
-    from vcc.cli.convert import to_file, to_store
+    from vcc.cli.convert import Reading, to_file, to_store
 
-    reading = (transfer, spacing, slope_per_pixel, focus_distance, orientation)
+    layout = {"views": views, "order": order, "every": every}
+    layout = {name: value for name, value in layout.items() if value is not None}
+    reading = Reading(transfer, spacing, slope_per_pixel, focus_distance, orientation, layout)
     storing = {"--dtype": dtype, "--compression": compression, "--level": level, "--lossy": lossy}
     storing |= {"--quality": quality, "--chunks": chunks}
     if output.suffix.lower() != ".zarr":

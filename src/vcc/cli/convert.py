@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +12,41 @@ from vcc.cli.console import progress
 from vcc.errors import InputError
 
 if TYPE_CHECKING:
+    from vcc.light_field import LightField
     from vcc.store import StoredLightField
 
 
-Reading = tuple[str, str | None, float | None, str | None, str]
-"""Transfer, spacing, slope per pixel, focus distance and orientation, as on the command line."""
+@dataclass(frozen=True)
+class Reading:
+    """How to read a light field, as on the command line.
+
+    Args:
+        transfer: "auto", "srgb" or "linear".
+        spacing: with its unit, or None.
+        slope_per_pixel: or None.
+        focus_distance: with its unit, or None.
+        orientation: see `vcc.open_light_field`.
+        layout: what some formats need besides: views, order, every.
+    """
+
+    transfer: str
+    spacing: str | None
+    slope_per_pixel: float | None
+    focus_distance: str | None
+    orientation: str
+    layout: dict[str, Any]
+
+    def light_field(self, source: Path, transfer: str) -> LightField | StoredLightField:
+        """The light field, read or (a store) opened, its numbers taken by ``transfer``."""
+        return given.read_light_field(
+            source,
+            transfer,
+            self.spacing,
+            self.slope_per_pixel,
+            self.focus_distance,
+            self.orientation,
+            **self.layout,
+        )
 
 
 def to_file(source: Path, output: Path, *, kind: str | None, overwrite: bool, reading: Reading) -> str:
@@ -35,13 +66,7 @@ def to_file(source: Path, output: Path, *, kind: str | None, overwrite: bool, re
 
     output = _free(output, overwrite)
     told: Any = kind
-    transfer = reading[0]
-    if transfer == "auto":
-        from vcc.formats import read_geometry
-        from vcc.store import is_store
-
-        transfer = "linear" if is_store(source) else read_geometry(source).transfer
-    field = given.read_light_field(source, transfer, *reading[1:])
+    field = reading.light_field(source, reading.transfer)
     with progress("Writing views") as advance:
         return save_light_field(field, output, kind=told, progress=advance).description
 
@@ -78,9 +103,9 @@ def to_store(
     transfer: Any
     if is_store(source):
         transfer, provenance = "linear", None
-        field = given.read_light_field(source, *reading)
+        field = reading.light_field(source, reading.transfer)
     else:
-        field, transfer, assumed = _with_its_codes(source, *reading)
+        field, transfer, assumed = _with_its_codes(source, reading)
         provenance = _provenance(source, assumed)
     with progress("Writing views") as advance:
         made = convert(
@@ -155,24 +180,16 @@ def _free(output: Path, overwrite: bool) -> Path:
     return output
 
 
-def _with_its_codes(
-    source: Path,
-    transfer: str,
-    spacing: str | None,
-    slope_per_pixel: float | None,
-    focus_distance: str | None,
-    orientation: str,
-) -> tuple[Any, str, list[str]]:
+def _with_its_codes(source: Path, reading: Reading) -> tuple[Any, str, list[str]]:
     """A light field with its samples as the files have them, how they stand for light, and what was assumed."""
     from vcc.formats import read_geometry
 
-    facts = read_geometry(source)
-    told = {"spacing": spacing, "slope_per_pixel": slope_per_pixel, "focus_distance": focus_distance}
-    assumed = [name for name in facts.unknown if told[name] is None]
-    field: Any = given.read_light_field(source, "linear", spacing, slope_per_pixel, focus_distance, orientation)
+    facts = read_geometry(source, **reading.layout)
+    assumed = [name for name in facts.unknown if getattr(reading, name) is None]
+    field: Any = reading.light_field(source, "linear")
     if field.values.dtype.kind != "u":
         return field, "linear", assumed
-    return field, facts.transfer if transfer == "auto" else transfer, assumed
+    return field, facts.transfer if reading.transfer == "auto" else reading.transfer, assumed
 
 
 def _provenance(source: Path, assumed: list[str]) -> dict[str, Any]:

@@ -272,8 +272,11 @@ def read_light_field(
     slope_per_pixel: float | None,
     focus_distance: str | None,
     orientation: str,
+    **layout: Any,
 ) -> LightField | StoredLightField:
     """The light field that the options of a command ask for, with a progress bar; a store is opened, not read.
+
+    ``layout`` holds what some formats need besides, see `vcc.open_light_field`: views, order, every.
 
     Raises:
         InputError: what `vcc.open_light_field` and the lengths refuse; a store and cameras told beside it.
@@ -284,6 +287,7 @@ def read_light_field(
         told = {"--spacing": spacing, "--slope-per-pixel": slope_per_pixel, "--focus-distance": focus_distance}
         names = [name for name, value in told.items() if value is not None]
         names += ["--orientation"] if orientation != "auto" else []
+        names += [f"--{name}" for name in layout]
         if names:
             raise InputError(f"{folder} is a store, which states its cameras: leave out {', '.join(names)}")
         return open_store(folder)
@@ -293,6 +297,7 @@ def read_light_field(
         "spacing": spacing_of(spacing),
         "slope_per_pixel": slope_per_pixel,
         "focus_distance": length(focus_distance, "--focus-distance"),
+        **layout,
     }
     from vcc.cli.console import progress
     from vcc.formats import open_light_field
