@@ -1,6 +1,6 @@
 """What turns light on a pixel into a number: the linear camera model of EMVA 1288, as parameters.
 
-The model (EMVA Standard 1288, Release 4.0 Linear, its linear signal model and its noise model; symbols are the
+The model (EMVA Standard 1288, its linear signal model and its noise model; symbols are the
 standard's)::
 
     μ_p = E · A · t · λ / (h·c)                    photons on the sensitive area A of a pixel
