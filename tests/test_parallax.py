@@ -138,3 +138,8 @@ def test_bad_input_is_named() -> None:
         parallax.disparity_range(np.zeros((3, 3)))
     with pytest.raises(InputError, match="'s'"):
         parallax.block_disparities(np.zeros((2, 2, 20, 20)), "s")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("side", [6, 8, 9, 10, 12, 20])
+def test_even_pictures_of_any_size_show_no_parallax(side: int) -> None:
+    assert parallax.disparity_range(np.full((2, 2, side, side), 0.5, np.float32)) is None

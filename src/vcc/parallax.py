@@ -267,7 +267,8 @@ class _Sweep:
         residual = np.take_along_axis(cost, best[None], axis=0)[0]
         elsewhere = np.where(np.abs(np.arange(len(shifts))[:, None] - best) >= 2, cost, np.inf)
         rival = elsewhere.min(axis=0)
-        inside = (best > 0) & (best < len(shifts) - 1) & np.isfinite(residual)
+        # In small pictures no other shift may be possible: then nothing was compared, and nothing is known.
+        inside = (best > 0) & (best < len(shifts) - 1) & np.isfinite(residual) & np.isfinite(rival)
         step = self._farthest()
         if step > 1:
             fine, left = self._refine(step, disparity)

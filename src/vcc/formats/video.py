@@ -69,7 +69,7 @@ def read(
     """
     path = Path(path)
     _check_selection(every, first, last, moves)
-    av = _library()
+    av = library()
     frames: list[NDArray[Any]] = []
     remarks: list[str] = []
     try:
@@ -160,7 +160,7 @@ def save(
     rows, columns, height, width = light_field.shape[:4]
     way = _way(rows, columns, flight)
     numbers = Codes(light_field, 8, "srgb", exposure)
-    av = _library()
+    av = library()
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
         for row, column in way:
@@ -172,13 +172,18 @@ def save(
 
     with atomic_path(path) as temporary:
         try:
-            _encode(av, temporary, pictures(), frames_per_second, quality, lossless)
+            encode(av, temporary, pictures(), frames_per_second, quality, lossless)
         except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
             raise InputError(f"{path} could not be written as a video: {error}") from error
     return len(way), numbers.exposure, numbers.clipped
 
 
-def _library() -> Any:
+def library() -> Any:
+    """PyAV.
+
+    Raises:
+        InputError: it is not installed.
+    """
     try:
         import av
     except ImportError:
@@ -259,7 +264,7 @@ def _way(rows: int, columns: int, flight: str) -> list[tuple[int, int]]:
     raise InputError(f"flight is one of {', '.join(map(repr, get_args(Flight)))}, not {flight!r}")
 
 
-def _encode(
+def encode(
     av: Any,
     path: Path,
     pictures: Iterator[NDArray[np.uint8]],
@@ -267,6 +272,16 @@ def _encode(
     quality: int,
     lossless: bool,
 ) -> None:
+    """Write sRGB pictures, all of one even size, as an H.264 film.
+
+    Args:
+        av: from `library`.
+        path: where to.
+        pictures: (rows, columns, 3) each.
+        frames_per_second: how fast.
+        quality: H.264's constant rate factor, 0 (best) to 51.
+        lossless: keep every bit, as RGB; few players show it.
+    """
     with av.open(str(path), "w", options={"movflags": "+faststart"}) as container:
         stream: Any = None
         for picture in pictures:
