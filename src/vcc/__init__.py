@@ -68,7 +68,19 @@ _HOMES = {
     "open_light_field": "vcc.formats",
     "photon_transfer": "vcc.recording",
 }
-_MODULES = {"kernels", "patterns", "plot", "prescriptions", "sources", "store", "surfaces", "units"}
+_MODULES = {
+    "analysis",
+    "gallery",
+    "kernels",
+    "patterns",
+    "plot",
+    "prescriptions",
+    "recover",
+    "sources",
+    "store",
+    "surfaces",
+    "units",
+}
 
 __all__ = [*sorted(_HOMES), *sorted(_MODULES)]
 

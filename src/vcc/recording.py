@@ -161,26 +161,8 @@ class Recording:
             raise InputError(
                 "there is no colour filter to demosaic: every pixel recorded all that there is. Use image()"
             )
-        chosen = method or ("menon" if electronics.is_bayer else "bilinear")
-        if chosen not in get_args(Demosaicing):
-            raise InputError(f"there is no demosaicing {chosen!r}: choose {', '.join(get_args(Demosaicing))}")
-        tile = (len(electronics.tile), len(electronics.tile[0]))
-        if any(size < least for size, least in zip(self.sensor.shape, tile, strict=True)):
-            raise InputError(
-                f"a sensor of {self.sensor.shape[0]}×{self.sensor.shape[1]} pixels does not hold a whole tile of "
-                f"its colour filter ({tile[0]}×{tile[1]})"
-            )
-        mosaic = self.image().values
-        if chosen == "bilinear":
-            values = _bilinear(mosaic, electronics)
-        elif electronics.is_bayer:
-            values = _by_library(chosen, mosaic, electronics.bayer_name)
-        else:
-            raise InputError(
-                f'demosaicing by "{chosen}" is made for RGGB and its shifts, and this filter is '
-                f'{electronics.filter_in_words}: use method="bilinear"'
-            )
-        return Image(np.asarray(values, dtype=np.float32), self.frame, missing_rays=self.missing_rays)
+        values = demosaic(self.image().values, electronics, method)
+        return Image(values, self.frame, missing_rays=self.missing_rays)
 
     def save(self, path: str | PathLike[str]) -> SavedPicture:
         """Write the numbers untouched to a .tif, .png or .npy: linear, not scaled, upside down as recorded.
@@ -447,6 +429,42 @@ def _read_block(
 
 
 # --- demosaicing ---
+
+
+def demosaic(
+    mosaic: NDArray[np.float32], electronics: Electronics, method: Demosaicing | None = None
+) -> NDArray[np.float32]:
+    """All channels of a mosaic behind a colour filter; see `Recording.demosaiced`.
+
+    Args:
+        mosaic: linear irradiance, (rows, columns), in which grey light has one value in every channel.
+        electronics: whose colour filter it is.
+        method: see `Recording.demosaiced`.
+
+    Returns:
+        (rows, columns, channels), float32.
+
+    Raises:
+        InputError: an unknown method or one that the tile does not allow, a mosaic smaller than the tile, or a
+            package that is not installed.
+    """
+    chosen = method or ("menon" if electronics.is_bayer else "bilinear")
+    if chosen not in get_args(Demosaicing):
+        raise InputError(f"there is no demosaicing {chosen!r}: choose {', '.join(get_args(Demosaicing))}")
+    tile = (len(electronics.tile), len(electronics.tile[0]))
+    if any(size < least for size, least in zip(mosaic.shape, tile, strict=True)):
+        raise InputError(
+            f"a sensor of {mosaic.shape[0]}×{mosaic.shape[1]} pixels does not hold a whole tile of "
+            f"its colour filter ({tile[0]}×{tile[1]})"
+        )
+    if chosen == "bilinear":
+        return _bilinear(mosaic, electronics)
+    if electronics.is_bayer:
+        return np.asarray(_by_library(chosen, mosaic, electronics.bayer_name), dtype=np.float32)
+    raise InputError(
+        f'demosaicing by "{chosen}" is made for RGGB and its shifts, and this filter is '
+        f'{electronics.filter_in_words}: use method="bilinear"'
+    )
 
 
 def _by_library(method: str, mosaic: NDArray[np.float32], tile: str | None) -> NDArray[Any]:

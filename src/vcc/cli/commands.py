@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from vcc.cli import options as given
+from vcc.cli import refocus as refocusing
 from vcc.cli import synth_blender, synth_depth, synth_opengl  # noqa: F401
 from vcc.cli.console import Commands, check_output, make_folder, progress, show
+from vcc.cli.gallery import EPILOG as GALLERY_EPILOG
+from vcc.cli.gallery import gallery
+from vcc.cli.spectrum import EPILOG as SPECTRUM_EPILOG
+from vcc.cli.spectrum import spectrum
 from vcc.cli.synth import synth
 from vcc.errors import InputError
 
@@ -35,6 +40,9 @@ app = typer.Typer(
 
 
 app.add_typer(synth)
+app.command(epilog=SPECTRUM_EPILOG)(spectrum)
+app.command(epilog=GALLERY_EPILOG)(gallery)
+app.command(epilog=refocusing.EPILOG)(refocusing.refocus)
 
 
 def _show_version(wanted: bool) -> None:

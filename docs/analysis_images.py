@@ -1,0 +1,103 @@
+"""Draw the pictures of docs/analysis.md: python docs/analysis_images.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+import vcc
+from vcc.analysis import Refocuser, fft4, plot_spectrum, psf
+from vcc.formats.transfer import encode
+from vcc.kernels import TopHat
+from vcc.sources import PlanesScene, TexturedPlane
+from vcc.sources.textures import Waves
+from vcc.surfaces import Cubic
+from vcc.units import mm, um
+
+HERE = Path(__file__).parent / "images" / "analysis"
+CODE = np.array([[1, 0, 1, 1, 0], [0, 1, 1, 0, 1], [1, 1, 0, 1, 0], [0, 0, 0, 1, 1], [1, 0, 0, 0, 1]], float)
+
+
+def main(folder: Path = HERE) -> None:
+    """Draw all of them into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    draw_spectra(folder / "spectrum.png")
+    draw_refocused(folder / "refocus.png")
+    draw_points(folder / "points.png")
+
+
+def draw_spectra(path: Path) -> None:
+    """Two planes at the entrance, behind the lens, on the sensor: one row of a u–s plane each."""
+    near, far, f = 0.4, 1.2, 50 * mm
+    scene = PlanesScene(
+        [
+            TexturedPlane(Waves(3 * mm, seed=3), near, width=60 * mm, height=1.0, middle=(-30 * mm, 0.0)),
+            TexturedPlane(Waves(9 * mm, seed=5), far),
+        ]
+    )
+    field = scene.light_field(
+        (1, 48), (1, 128), spacing=0.5 * mm, slope_per_pixel=2e-3, focus_distance=0.6, dtype=np.float32
+    )
+    spectrum = fft4(field, [None, "hann", None, "hann"])
+    behind = spectrum.transformed(vcc.Affine.lens(f))
+    on_sensor = behind.transformed(vcc.Affine.propagation(1 / (1 / f - 1 / far)))
+    figure = Figure(figsize=(10, 3.4), dpi=100, layout="constrained")
+    titles = ("at the entrance", "behind the lens: sheared along fu", "on the sensor: sheared along fs")
+    for axes, stage, title in zip(figure.subplots(1, 3), (spectrum, behind, on_sensor), titles, strict=True):
+        plot_spectrum(stage, ("u", "s"), axes=axes)
+        axes.set_title(title, fontsize=11)
+    _save(figure, path)
+
+
+def draw_refocused(path: Path) -> None:
+    """The scene of the demo, focused near and far."""
+    from vcc.demo.scene import demo_scene
+
+    field = demo_scene().light_field(
+        (11, 11), (180, 250), spacing=2 * mm, slope_per_pixel=1.6e-3, focus_distance=1.3, dtype=np.float32
+    )
+    refocuser = Refocuser(field)
+    figure = Figure(figsize=(9, 3.4), dpi=100, layout="constrained")
+    for axes, distance in zip(figure.subplots(1, 2), (0.8, 3.0), strict=True):
+        axes.imshow(encode(refocuser.at(distance).values, 8))
+        axes.set_title(f"focused at {distance:.3g} m", fontsize=11)
+        axes.set_axis_off()
+    _save(figure, path)
+
+
+def draw_points(path: Path) -> None:
+    """Points at three distances through an open lens, a code, a cubic plate and a diffuser."""
+    sensor = vcc.Sensor(z=1 / (1 / (50 * mm) - 1), shape=(61, 61), pitch=8 * um)
+    lens = vcc.Lens(focal_length=50 * mm, diameter=10 * mm)
+    cameras = {
+        "open": [lens],
+        "coded aperture": [vcc.Lens(focal_length=50 * mm), vcc.Mask(CODE, width=10 * mm)],
+        "cubic plate": [lens, vcc.PhasePlate(Cubic(50.0))],
+        "diffuser": [lens, vcc.Diffuser(kernel=TopHat(3e-3))],
+    }
+    figure = Figure(figsize=(8, 5.6), dpi=100, layout="constrained")
+    grid = figure.subplots(3, len(cameras))
+    for column, (name, elements) in enumerate(cameras.items()):
+        for row, distance in enumerate((0.7, 1.0, 1.8)):
+            spread = psf(vcc.Camera(elements, sensor), distance, shape=(61, 61))
+            axes = grid[row, column]
+            axes.imshow(np.sqrt(spread.values), cmap="gray")
+            axes.set_xticks([])
+            axes.set_yticks([])
+            if row == 0:
+                axes.set_title(name, fontsize=11)
+            if column == 0:
+                axes.set_ylabel(f"{distance:g} m", fontsize=11)
+    _save(figure, path)
+
+
+def _save(figure: Figure, path: Path) -> None:
+    FigureCanvasAgg(figure)
+    figure.savefig(path)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,38 @@
+"""Tools that explain a design: 4-D Fourier transforms, refocusing by slices of them, point spread functions.
+
+Built on cameras and light fields; nothing below depends on it.
+"""
+
+from vcc.analysis.deblurring import expected_deblurring_error, natural_image_power
+from vcc.analysis.pictures import plot_plane_spectrum, plot_spectrum
+from vcc.analysis.plane_spectrum import (
+    PlaneSpectrum,
+    kernel_spectrum,
+    mask_spectrum,
+    picture_spectrum,
+    plane_spectrum,
+)
+from vcc.analysis.point_spread import PointSpread, mtf, otf, psf
+from vcc.analysis.refocus import Refocuser
+from vcc.analysis.spectrum import Spectrum, fft4, ifft4, samples_of
+
+__all__ = [
+    "PlaneSpectrum",
+    "PointSpread",
+    "Refocuser",
+    "Spectrum",
+    "expected_deblurring_error",
+    "fft4",
+    "ifft4",
+    "kernel_spectrum",
+    "mask_spectrum",
+    "mtf",
+    "natural_image_power",
+    "otf",
+    "picture_spectrum",
+    "plane_spectrum",
+    "plot_plane_spectrum",
+    "plot_spectrum",
+    "psf",
+    "samples_of",
+]

@@ -1,0 +1,88 @@
+"""How well a blur can be undone: Zhou and Nayar's figure of merit of aperture patterns."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def expected_deblurring_error(kernel: ArrayLike, noise: float, power: ArrayLike) -> float:
+    """R(K), the expected squared error of a picture deblurred as well as a linear filter can.
+
+    R(K) = Σ σ² / (|K|² + σ²/|F₀|²) over all frequencies (Zhou and Nayar, "What are good apertures for defocus
+    deblurring?", ICCP 2009, where it is minimised over K): what the Wiener filter leaves of a picture of expected
+    power |F₀|², blurred by K, with white noise of standard deviation σ. Divided by the number of frequencies it is
+    the expected mean squared error of a pixel; smaller is better.
+
+    Args:
+        kernel: the blur in pixels, 0 or more, shape (rows, columns). Its sum is the share of light that the
+            aperture passes: patterns are compared at one exposure by kernels that sum to their transmission.
+        noise: σ, in the units of the picture.
+        power: |F₀|² of pictures at the frequencies of a discrete transform, shape (rows, columns), zero frequency
+            first, as `natural_image_power` has it: for the unitary transform, so that white noise has σ²
+            everywhere.
+
+    Returns:
+        R(K), in squared units of the picture, summed over the frequencies.
+
+    Raises:
+        InputError: a kernel larger than the picture, negative, not finite or dark; a noise of zero or less; powers
+            that are negative or not finite.
+    """
+    blur = np.asarray(kernel, dtype=np.float64)
+    prior = np.asarray(power, dtype=np.float64)
+    if not (noise > 0 and math.isfinite(noise)):
+        raise InputError(f"noise is a standard deviation above 0, not {noise}")
+    if prior.ndim != 2 or not np.isfinite(prior).all() or prior.min(initial=0.0) < 0:
+        raise InputError("power is (rows, columns) of finite numbers of 0 or more, one for each frequency")
+    if blur.ndim != 2 or not np.isfinite(blur).all() or blur.min(initial=0.0) < 0 or not blur.any():
+        raise InputError("a blur kernel is (rows, columns) of finite numbers of 0 or more, not all 0")
+    if blur.shape[0] > prior.shape[0] or blur.shape[1] > prior.shape[1]:
+        raise InputError(
+            f"a blur of {blur.shape[0]}×{blur.shape[1]} pixels is larger than the picture of "
+            f"{prior.shape[0]}×{prior.shape[1]}: take a larger picture or a smaller blur"
+        )
+    transfer = np.abs(np.fft.fft2(blur, s=prior.shape)) ** 2
+    # σ²/(|K|² + σ²/|F₀|²), written so that a frequency without power brings no error.
+    return float(np.sum(noise**2 * prior / (transfer * prior + noise**2)))
+
+
+def natural_image_power(
+    shape: tuple[int, int], standard_deviation: float = 0.2, mean: float = 0.5, exponent: float = 2.0
+) -> Array:
+    """The expected power |F₀|² of natural pictures: falling as 1/frequency² (Field 1987; Zhou and Nayar 2009).
+
+    Args:
+        shape: (rows, columns) of the picture.
+        standard_deviation: of its pixels about their mean.
+        mean: of its pixels.
+        exponent: of the frequency in cycles per pixel.
+
+    Returns:
+        Shape (rows, columns), zero frequency first, for the unitary transform: the powers other than the mean's
+        have the mean ``standard_deviation``² over all frequencies.
+
+    Raises:
+        InputError: a shape of fewer than 2 pixels, or a standard deviation or mean that is not above 0.
+    """
+    if len(shape) != 2 or any(int(n) != n or n < 1 for n in shape) or shape[0] * shape[1] < 2:
+        raise InputError(f"shape is (rows, columns) of two pixels or more, not {shape}")
+    for name, value in (("standard_deviation", standard_deviation), ("mean", mean)):
+        if not (value > 0 and math.isfinite(value)):
+            raise InputError(f"{name} must be greater than 0, not {value}")
+    if not math.isfinite(exponent):
+        raise InputError(f"exponent must be finite, not {exponent}")
+    radius = np.hypot(np.fft.fftfreq(shape[0])[:, None], np.fft.fftfreq(shape[1]))
+    radius[0, 0] = 1.0
+    power = radius**-exponent
+    power[0, 0] = 0.0
+    count = shape[0] * shape[1]
+    power *= standard_deviation**2 * count / power.sum()
+    power[0, 0] = mean**2 * count
+    return np.asarray(power)

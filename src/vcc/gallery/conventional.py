@@ -1,0 +1,134 @@
+"""The conventional camera: one lens and a sensor (Zhou 2009, Example 1)."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+
+from vcc.affine import Affine
+from vcc.camera import Camera
+from vcc.demo import figures, story
+from vcc.demo.bench import Bench
+from vcc.errors import ResultWarning
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.light_field import LightField
+from vcc.sensor import Sensor
+from vcc.units import um
+
+POINT_VIEWS = 60
+"""Views a side of the light field of a point: a disc of so many cells has its second moment within 0.1 %."""
+POINT_PITCH = 4 * um
+
+
+def run(bench: Bench, progress: Progress) -> Result:
+    """Pictures focused on three distances, phase space on the way, and the blur of points by closed form."""
+    from vcc.plot import plot_phase_space_stages
+
+    distances = {"near": bench.near, "middle": bench.middle, "far": bench.far}
+    exposure = bench.exposure(bench.conventional(bench.middle), bench.diameter)
+    taken, pictures = {}, []
+    for done, (name, distance) in enumerate(distances.items()):
+        progress(done, 4)
+        image = bench.conventional(distance).capture(bench.light_field)
+        taken[name] = figures.shown(image, exposure)
+        caption = f"Sensor at {story.length(bench.image_distance(distance))}, focused {story.away(distance)}."
+        pictures.append(Picture(f"focused-{name}", f"Focused {name}", caption, taken[name]))
+    progress(3, 4)
+    points = plot_phase_space_stages(
+        bench.conventional(math.inf), figures.points_field(bench.focal_length, bench.diameter)
+    )
+    row = round(0.46 * bench.light_field.shape[2])
+    scene = plot_phase_space_stages(bench.conventional(bench.far), bench.light_field, pixel_row=row)
+    stages = (
+        Picture(
+            "phase-space-points",
+            "Phase space of points",
+            "At the entrance, behind the lens, on the sensor. Flight shears along u, the lens along s.",
+            points,
+        ),
+        Picture("phase-space-scene", "Phase space of the scene", "One row of pixels, focused far.", scene),
+    )
+    text = paragraphs(
+        [
+            f"A thin lens of f = {story.length(bench.focal_length)} and {story.length(bench.diameter)} "
+            "opening, and a "
+            "sensor at 1/d = 1/f − 1/Z. Lens and flight are matrices on the light field’s frame; the picture is "
+            "its integral over slopes. A thing in focus stands upright in phase space at the sensor: "
+            "all of its rays "
+            "have one u."
+        ]
+    )
+    numbers = (*_in_focus(bench, list(taken.values())), *_blurs(bench, distances))
+    return Result(text, (tuple(pictures), *((stage,) for stage in stages)), numbers, bench.assumed)
+
+
+def _in_focus(bench: Bench, taken: list[figures.Shown]) -> list[Finding]:
+    """For how many things the picture focused on them is the sharpest."""
+    if bench.scene is None:
+        return []  # nobody knows where in someone's own scene things are at which distance
+    rows, columns = bench.light_field.shape[2:4]
+    size = max(min(rows, columns) // 20, 8)  # small enough to lie on a leaf
+    right = 0
+    places = (story.CHECK_PLACES["leaf"], story.PLACES["the chart's star"], story.PLACES["lamps of the town"])
+    for place, (x, y, distance) in enumerate(places):
+        sensor = bench.sensor(distance)
+        column = (columns - 1) / 2 + x / distance * sensor.z / sensor.pitches[1]
+        row = (rows - 1) / 2 + y / distance * sensor.z / sensor.pitches[0]
+        crop = figures.Crop(round(row) - size // 2, round(column) - size // 2, size)
+        detail = [float(np.square(np.diff(crop.of(picture), axis=1)).mean()) for picture in taken]
+        right += int(np.argmax(detail)) == place
+    claim = "leaves, chart and town each in the picture focused there"
+    return [Finding("things that are sharpest where focused", claim, right, "of 3", right == 3)]
+
+
+def _blurs(bench: Bench, distances: dict[str, float]) -> list[Finding]:
+    """The spread of the picture of a point, focused in the middle, beside D·d·|1/Z − 1/F|/4 of geometry."""
+    found = []
+    distance_to_sensor = bench.image_distance(bench.middle)
+    for name in ("near", "far"):
+        defocus = 1 / distances[name] - 1 / bench.middle
+        expected = bench.diameter * distance_to_sensor * abs(defocus) / 4
+        pixels = 2 * math.ceil(2.3 * expected / POINT_PITCH) + 9
+        camera = Camera([bench.lens], Sensor(distance_to_sensor, (pixels, pixels), POINT_PITCH))
+        with warnings.catch_warnings():
+            # All that the light field holds is the point: the sensor looks past it, as it should.
+            warnings.simplefilter("ignore", ResultWarning)
+            image = camera.capture(_point(distances[name], bench.diameter), between_views="none").to_numpy()
+        x = camera.sensor.column_places
+        across = image.sum(axis=0, dtype=np.float64)
+        # A pixel and the point's own width add their variances.
+        extra = POINT_PITCH**2 / 12 + POINT_PITCH**2 / 6
+        spread = math.sqrt(max(float(across @ x**2 / across.sum()) - extra, 0.0))
+        found.append(
+            Finding(
+                f"blur of a point {story.away(distances[name])}, focused {story.away(bench.middle)}: σ",
+                f"D·d·|1/Z − 1/F|/4 = {expected / um:.1f} µm, within 1 %",
+                spread / um,
+                "µm",
+                abs(spread / expected - 1) < 0.01,
+            )
+        )
+    return found
+
+
+def _point(distance: float, width: float) -> LightField:
+    """A point of light on the axis: one pixel a view, all of which look at it."""
+    spacing = width / POINT_VIEWS
+    values = np.ones((POINT_VIEWS, POINT_VIEWS, 1, 1), np.float32)
+    middle = (POINT_VIEWS - 1) / 2
+    matrix = np.diag([spacing, spacing, -POINT_PITCH / 0.05, -POINT_PITCH / 0.05, 1.0])
+    matrix[2, 0] = matrix[3, 1] = spacing / distance
+    return LightField(values, Affine(matrix) @ Affine.translation(-middle, -middle, 0, 0))
+
+
+ENTRY = Entry(
+    "conventional",
+    "Conventional camera",
+    "C. Zhou, Virtual Computational Camera, 2009, Example 1",
+    "A lens and a sensor record one distance sharply; in phase space, flight and lens are shears, and "
+    "the sensor is a "
+    "projection along slopes.",
+    run,
+)

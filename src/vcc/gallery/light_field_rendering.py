@@ -1,0 +1,229 @@
+"""Novel views from two-plane data by matrix optics (Levoy and Hanrahan 1996; Ahrenberg and Magnor 2006)."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.camera import Camera
+from vcc.demo import figures, story
+from vcc.demo.bench import Bench
+from vcc.errors import InputError, ResultWarning
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.light_field import LightField
+from vcc.optics import Mask
+from vcc.patterns import Circle
+from vcc.sensor import Sensor
+from vcc.units import mm
+
+STEP = 20 * mm
+"""How far before and behind the plane of the views new pictures are taken."""
+INNER = 0.1
+"""Share of a picture at each side that comparisons leave out: there the views end."""
+POINT = 1e-3
+"""Fill factor of the pinhole cameras' pixels: samples are means over a pixel already, a second mean would blur."""
+POINTS = 4
+"""Points across a pixel at which the closed form is evaluated, each way."""
+
+
+def run(bench: Bench, progress: Progress) -> Result:
+    """Leave out every second view and predict it; look from places where no camera stood."""
+    light_field = bench.light_field
+    if min(light_field.shape[:2]) < 3:
+        raise InputError(
+            f"leaving out every second view takes 3×3 views or more, not {light_field.shape[0]}×"
+            f"{light_field.shape[1]}: give a light field with more"
+        )
+    kept = light_field[::2, ::2]
+    row, column = _left_out(light_field.shape[0]), _left_out(light_field.shape[1])
+    truth = _linear(light_field.values[row, column], light_field)
+    predicted = {}
+    for done, method in enumerate(("nearest", "linear")):
+        progress(done, 6)
+        predicted[method] = _resampled(kept, light_field, (row, column), method)
+    progress(2, 6)
+    predicted["along the parallax"] = _through_a_pinhole(kept, light_field, (row, column))
+    decibels = {name: _psnr(picture, truth) for name, picture in predicted.items()}
+    words = {
+        "nearest": "the nearest view",
+        "linear": "quadrilinear",
+        "along the parallax": "pinhole camera, blended along the parallax of the middle distance",
+    }
+    numbers = [
+        Finding(
+            f"left-out view, {words[name]}: PSNR",
+            "" if name == "nearest" else "better than the nearest view",
+            value,
+            "dB",
+            None if name == "nearest" else value > decibels["nearest"],
+        )
+        for name, value in decibels.items()
+    ]
+    progress(3, 6)
+    moved, found = _from_elsewhere(bench, progress)
+    shown = [("left out", _shown(truth))]
+    shown += [
+        (f"{words[name].split(',')[0]}, {decibels[name]:.1f} dB", _shown(p)) for name, p in predicted.items()
+    ]
+    size = max(min(truth.shape[:2]) * 22 // 100, 8)
+    wrong = np.abs(_shown(predicted["nearest"]) - _shown(truth))
+    close = figures.close_ups(shown, figures.detailed_crops([wrong], size), ["where they differ most"])
+    pictures = (
+        (Picture("left-out", "A view that was left out", "And as the other views predict it.", close),),
+        tuple(Picture(f"from-{name}", title, caption, content) for name, title, caption, content in moved),
+    )
+    text = paragraphs(
+        [
+            f"Of {light_field.shape[0]}×{light_field.shape[1]} views every second one each way is kept. "
+            "A new view is "
+            "a slice of the light field on another grid. Samples are interpolated in all four "
+            "dimensions between the plane of the cameras and the plane on which they converge "
+            "(quadrilinear, as Levoy "
+            "and Hanrahan do), or looked up by the rays of a pinhole camera, which blends views along "
+            "the parallax of "
+            "one distance.",
+            f"A view from {story.length(STEP)} before or behind the plane of the cameras is the same "
+            "light field after "
+            "a flight: one matrix on its frame, no sample touched. The reference is the left-out view "
+            "itself, and the "
+            "closed form of the built-in scene where that is known.",
+        ]
+    )
+    return Result(text, pictures, (*numbers, *found), bench.assumed)
+
+
+def _left_out(count: int) -> int:
+    """The odd index next to the middle that has kept views on both sides."""
+    index = count // 2 if count // 2 % 2 else count // 2 - 1
+    return min(max(index, 1), count - 2)
+
+
+def _linear(values: NDArray[np.generic], light_field: LightField) -> NDArray[np.float64]:
+    picture = np.asarray(values, np.float64) / light_field.full_scale
+    return picture if picture.ndim == 3 else picture[..., None]
+
+
+def _resampled(
+    kept: LightField, light_field: LightField, place: tuple[int, int], interpolation: str
+) -> NDArray[np.float64]:
+    row, column = place
+    frame = light_field.frame @ Affine.translation(column, row, 0, 0)
+    # Only the neighbours matter, and a resampling holds all four dimensions in memory.
+    near = kept[row // 2 : row // 2 + 2, column // 2 : column // 2 + 2]
+    # A hair to one side: half-way between two views the nearest one would be a matter of rounding.
+    frame = frame @ Affine.translation(-0.01, -0.01, 0, 0) if interpolation == "nearest" else frame
+    view = near.resampled(frame, (1, 1, light_field.shape[2], light_field.shape[3]), interpolation=interpolation)
+    return _linear(view.values[0, 0], view)
+
+
+def _through_a_pinhole(kept: LightField, light_field: LightField, place: tuple[int, int]) -> NDArray[np.float64]:
+    """What a pinhole camera at a view's place records, its pixels those of the view."""
+    row, column = place
+    nt, ns = light_field.shape[2:4]
+    u, v, s, t = light_field.frame([column, row, (ns - 1) / 2, (nt - 1) / 2])
+    return _pinhole_picture(kept, light_field, (float(u), float(v)), (float(s), float(t)), 0.0)
+
+
+def _pinhole_picture(
+    given: LightField, like: LightField, hole: tuple[float, float], middle: tuple[float, float], z: float
+) -> NDArray[np.float64]:
+    """A pinhole at (u, v), z behind the given light field, and a sensor that sees slopes as ``like`` does."""
+    linear = like.frame.linear
+    pitches = abs(float(linear[3, 3])), abs(float(linear[2, 2]))
+    distance = 50 * mm
+    diameter = 1e-3 * abs(float(linear[0, 0]))
+    sensor = Sensor(
+        z + distance,
+        (like.shape[2], like.shape[3]),
+        (pitches[0] * distance, pitches[1] * distance),
+        decentre=(hole[0] + distance * middle[0], hole[1] + distance * middle[1]),
+        fill_factor=POINT,
+    )
+    camera = Camera([Mask(Circle(diameter), z=z, decentre=hole, name="pinhole")], sensor)
+    with warnings.catch_warnings():
+        # At its border the picture looks past the views; comparisons leave the border out.
+        warnings.simplefilter("ignore", ResultWarning)
+        image = camera.capture(given, method="rays", samples=16).to_numpy()
+    values = image.astype(np.float64) * distance**2 / (math.pi / 4 * diameter**2)
+    # As it lands, slopes grow with rows and columns; the views' own rows and columns may run against them.
+    values = values[:: 1 if linear[3, 3] > 0 else -1, :: 1 if linear[2, 2] > 0 else -1]
+    return values if values.ndim == 3 else values[..., None]
+
+
+def _from_elsewhere(
+    bench: Bench, progress: Progress
+) -> tuple[list[tuple[str, str, str, figures.Shown]], list[Finding]]:
+    """Views from before and behind the plane of the cameras, beside the closed form where it is known."""
+    light_field = bench.light_field
+    nv, nu, nt, ns = light_field.shape[:4]
+    u, v, s, t = (float(x) for x in light_field.frame([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2]))
+    pictures, numbers = [], []
+    why = "samples interpolated linearly in all four dimensions"
+    for done, (name, title, way) in enumerate(
+        (("before", "From before the cameras", -STEP), ("behind", "From behind the cameras", STEP))
+    ):
+        progress(4 + done, 6)
+        # Nearer to the scene: the light field flies back first, and the pinhole stands in its new plane.
+        flown = light_field.transformed(Affine.propagation(way)) if way < 0 else light_field
+        picture = _pinhole_picture(flown, light_field, (u, v), (s, t), max(way, 0.0))
+        caption = f"{story.length(STEP)} from their plane, where no camera stood."
+        if bench.scene is not None:
+            closeness = _psnr(picture, _true_view(bench, (u, v), (s, t), way))
+            caption += f" {closeness:.1f} dB against the scene’s closed form."
+            numbers.append(
+                Finding(
+                    f"view from {story.length(STEP)} {name} the plane of cameras: PSNR",
+                    "",
+                    closeness,
+                    "dB",
+                    None,
+                    why,
+                )
+            )
+        pictures.append((name, title, caption, _shown(picture)))
+    return pictures, numbers
+
+
+def _true_view(
+    bench: Bench, hole: tuple[float, float], middle: tuple[float, float], z: float
+) -> NDArray[np.float64]:
+    """The scene's closed form along the rays of that pinhole, averaged over each pixel."""
+    assert bench.scene is not None
+    linear = bench.light_field.frame.linear
+    nt, ns = bench.light_field.shape[2:4]
+    inside = (np.arange(POINTS) + 0.5) / POINTS - 0.5
+    s = middle[0] + float(linear[2, 2]) * ((np.arange(ns) - (ns - 1) / 2)[:, None] + inside).ravel()
+    t = middle[1] + float(linear[3, 3]) * ((np.arange(nt) - (nt - 1) / 2)[:, None] + inside).ravel()
+    radiance = bench.scene.radiance_along(
+        hole[0] - z * s[None, :], hole[1] - z * t[:, None], s[None, :], t[:, None]
+    )
+    return np.asarray(radiance.reshape(nt, POINTS, ns, POINTS, 3).mean(axis=(1, 3)))
+
+
+def _psnr(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
+    """Peak signal-to-noise ratio in linear light inside the border, the peak being the truth's brightest."""
+    rows, columns = (max(int(INNER * n), 1) for n in truth.shape[:2])
+    inner = np.s_[rows:-rows, columns:-columns]
+    error = float(np.mean((picture[inner] - truth[inner]) ** 2))
+    return 10 * math.log10(float(truth[inner].max()) ** 2 / max(error, 1e-20))
+
+
+def _shown(picture: NDArray[np.float64]) -> figures.Shown:
+    from vcc.image import Image
+
+    return figures.shown(Image(picture.astype(np.float32), Affine.scaling(1, 1), inverted=False), 1.0)
+
+
+ENTRY = Entry(
+    "light-field-rendering",
+    "Light-field rendering by matrix optics",
+    "M. Levoy and P. Hanrahan, Light field rendering, SIGGRAPH 1996; L. Ahrenberg and M. Magnor, Light "
+    "field rendering "
+    "using matrix optics, WSCG 2006; T. Georgiev and C. Intwala, Adobe technical report, 2006",
+    "New views are slices of two-plane data, without depth or matching; moving through space is a matrix.",
+    run,
+)

@@ -1,0 +1,38 @@
+"""Which cameras there are; each is loaded when it is asked for."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+
+from vcc.errors import InputError
+from vcc.gallery.entry import Entry
+
+ENTRIES = (
+    "conventional",
+    "light-field-rendering",
+    "integral-lens-prism",
+    "biprism-stereo",
+    "wavefront-coding",
+)
+"""Names, in the gallery's order. ``a-name`` is the module ``vcc.gallery.a_name``, which holds an ``ENTRY``."""
+
+
+def entry(name: str) -> Entry:
+    """The camera of this name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name not in ENTRIES:
+        near = difflib.get_close_matches(name, ENTRIES, n=1)
+        hint = f'Did you mean "{near[0]}"? ' if near else ""
+        raise InputError(f'the gallery has no camera "{name}". {hint}It has {", ".join(ENTRIES)}')
+    module = importlib.import_module(f"vcc.gallery.{name.replace('-', '_')}")
+    found: Entry = module.ENTRY
+    return found
+
+
+def entries() -> list[Entry]:
+    """All of them."""
+    return [entry(name) for name in ENTRIES]

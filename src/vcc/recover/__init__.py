@@ -1,0 +1,45 @@
+"""From recordings and light fields back to pictures: refocusing, views between views, focal
+stacks, deblurring, decoding of plenoptic and mask-modulated recordings, depth.
+"""
+
+from __future__ import annotations
+
+from vcc.recover.deblur import Deblurred, blurred, richardson_lucy, sparse_gradients, wiener
+from vcc.recover.defocus_depth import DefocusDepth, defocus_kernels, depth_from_defocus
+from vcc.recover.depth import DepthMap, depth_by_plane_sweep, depth_by_structure_tensor, disparity_error
+from vcc.recover.focal_stack import AllInFocus, FocalStack, focal_stack, focus_distances
+from vcc.recover.heterodyne import HeterodyneGeometry, decode_heterodyne, heterodyne_calibration
+from vcc.recover.plenoptic import LensletGrid, decode_plenoptic, find_lenslets
+from vcc.recover.refocus import ideal_camera, novel_view, refocused
+from vcc.recover.stereo import BiprismStereo, StereoDepth, depth_by_biprism
+
+__all__ = [
+    "AllInFocus",
+    "BiprismStereo",
+    "Deblurred",
+    "DefocusDepth",
+    "DepthMap",
+    "FocalStack",
+    "HeterodyneGeometry",
+    "LensletGrid",
+    "StereoDepth",
+    "blurred",
+    "decode_heterodyne",
+    "decode_plenoptic",
+    "defocus_kernels",
+    "depth_by_biprism",
+    "depth_by_plane_sweep",
+    "depth_by_structure_tensor",
+    "depth_from_defocus",
+    "disparity_error",
+    "find_lenslets",
+    "focal_stack",
+    "focus_distances",
+    "heterodyne_calibration",
+    "ideal_camera",
+    "novel_view",
+    "refocused",
+    "richardson_lucy",
+    "sparse_gradients",
+    "wiener",
+]

@@ -1,0 +1,298 @@
+"""Focal stacks: one light field focused on many distances, what is sharp in any of them, and films of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.errors import InputError
+from vcc.image import Image
+from vcc.recover.refocus import refocused
+
+if TYPE_CHECKING:
+    from vcc.light_field import LightField
+    from vcc.store import StoredLightField
+
+Progress = Callable[[int, int], None]
+
+MEMORY_LIMIT = 2**31
+"""Bytes that a focal stack and the work on it may take together, unless told otherwise."""
+ENDINGS = (".mp4", ".gif")
+_NOTHING_SHARP = 1e-12
+"""Sharpness relative to the picture's power below which there is no detail to choose by: all pictures count."""
+
+
+@dataclass(frozen=True, eq=False)
+class AllInFocus:
+    """What is sharp in any picture of a focal stack.
+
+    Args:
+        image: the picture, linear radiance, upright.
+        distance: where each pixel was found sharp, metres, (rows, columns): the mean of 1/Z over the pictures
+            taken for it, inverted. A by-product without confidence, which means little where there is no detail.
+        sharpness: the local contrast by which it was chosen, (pictures, rows, columns), in squared
+            units of the picture.
+    """
+
+    image: Image
+    distance: NDArray[np.float32]
+    sharpness: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class FocalStack:
+    """Pictures of one scene from one place, each focused on another distance.
+
+    Args:
+        pictures: linear, upright, float32, (pictures, rows, columns[, channels]), pixel on pixel.
+        distances: what each is focused on, metres, one for each picture.
+        frame: of each picture, see `vcc.Image`.
+
+    Raises:
+        InputError: another number of distances than of pictures, a distance of zero or less, or samples that are
+            not finite.
+    """
+
+    pictures: NDArray[np.float32]
+    distances: tuple[float, ...]
+    frame: Affine
+
+    def __post_init__(self) -> None:
+        if self.pictures.ndim not in (3, 4) or 0 in self.pictures.shape:
+            raise InputError(
+                "a focal stack has the axes (pictures, rows, columns[, channels]), not the shape "
+                f"{self.pictures.shape}"
+            )
+        if len(self.distances) != len(self.pictures):
+            raise InputError(
+                f"{len(self.pictures)} pictures have {len(self.distances)} distances: give one for each"
+            )
+        _check_distances(self.distances)
+        if not np.isfinite(self.pictures).all():
+            bad = tuple(int(n) for n in np.argwhere(~np.isfinite(self.pictures))[0])
+            raise InputError(f"a focal stack has finite samples; at index {bad} it has {self.pictures[bad]}")
+
+    def image(self, number: int) -> Image:
+        """One picture of the stack, upright.
+
+        Args:
+            number: which, from 0; negative counts from the end.
+        """
+        return Image(self.pictures[number], self.frame, inverted=False)
+
+    def all_in_focus(
+        self, *, window: float = 1.5, selectivity: float = 8.0, memory_limit: int | None = None
+    ) -> AllInFocus:
+        """Extended depth of field: each pixel from the pictures that are sharp there.
+
+        Sharpness S is the squared Laplacian, summed over a Gaussian window (energy of the Laplacian: Subbarao,
+        Choi & Nikzad, *Focusing Techniques*, 1993; compared by Pertuz et al., *Analysis of focus measure operators
+        for shape-from-focus*, 2013). Pictures are averaged with weights S^selectivity, so that the choice changes
+        smoothly from pixel to pixel and shows no seams.
+
+        Args:
+            window: standard deviation of the Gaussian, pixels: wider ones are safer against noise, and smear the
+                choice over edges in depth.
+            selectivity: 0 averages all pictures; infinite takes the sharpest alone.
+            memory_limit: bytes that the work may take; None takes `MEMORY_LIMIT`.
+
+        Raises:
+            InputError: a window of zero or less, a negative selectivity, or more memory needed than allowed.
+        """
+        from scipy import ndimage
+
+        if not (window > 0 and math.isfinite(window)):
+            raise InputError(f"the window must be above 0 pixels, not {window}")
+        if not selectivity >= 0:
+            raise InputError(f"the selectivity is 0 or more, not {selectivity}")
+        count, rows, columns = self.pictures.shape[:3]
+        _check_memory(3 * 8 * count * rows * columns + 2 * self.pictures[0].size * 8, memory_limit)
+        sharpness = np.empty((count, rows, columns))
+        for picture, out in zip(self.pictures, sharpness, strict=True):
+            channels = picture.reshape(rows, columns, -1).astype(np.float64)
+            out[...] = sum(ndimage.laplace(channels[..., c]) ** 2 for c in range(channels.shape[2]))
+            out[...] = ndimage.gaussian_filter(out, window)
+        floor = _NOTHING_SHARP * float(np.mean(self.pictures.astype(np.float64) ** 2))
+        relative = (sharpness + floor) / np.maximum(sharpness.max(axis=0) + floor, np.finfo(float).tiny)
+        weights = (relative >= 1).astype(np.float64) if math.isinf(selectivity) else relative**selectivity
+        if floor == 0:  # a black stack
+            weights[...] = 1
+        weights /= weights.sum(axis=0)
+        picture = np.zeros(self.pictures.shape[1:])
+        vergence = np.zeros((rows, columns))
+        for weight, each, distance in zip(weights, self.pictures, self.distances, strict=True):
+            picture += (weight if each.ndim == 2 else weight[..., None]) * each
+            vergence += weight / distance
+        with np.errstate(divide="ignore"):
+            found = (1 / vergence).astype(np.float32)  # infinite where only the picture at infinity counts
+        return AllInFocus(
+            Image(picture.astype(np.float32), self.frame, inverted=False), found, sharpness.astype(np.float32)
+        )
+
+    def save(
+        self,
+        path: str | PathLike[str],
+        *,
+        frames_per_second: float = 8,
+        exposure: float | Literal["auto"] = "auto",
+        there_and_back: bool = True,
+    ) -> str:
+        """Write the stack as a film for people: MP4 (H.264) or GIF, sRGB.
+
+        Args:
+            path: where to; ends in ``.mp4`` or ``.gif``. A GIF has 256 colours a frame, and plays over and over.
+            frames_per_second: pictures a second, at most 50 in a GIF, whose clock counts hundredths of a second.
+            exposure: factor before the sRGB curve, the same for all pictures; "auto" brings the 99.5th percentile
+                of the stack's luminance to white.
+            there_and_back: append the pictures in reverse order, so that the film can be played over and over.
+
+        Returns:
+            A line for people: what was written, with which exposure, and how much of it clipped.
+
+        Raises:
+            InputError: another ending, an impossible rate, pictures of neither 1 nor 3 channels, no PyAV for an
+                MP4, or a place that cannot be written to.
+        """
+        from vcc.formats import transfer, video
+        from vcc.formats.atomic import atomic_path
+        from vcc.formats.pictures import auto_exposure, checked_exposure
+
+        path = Path(path).expanduser()
+        ending = path.suffix.lower()
+        if ending not in ENDINGS:
+            raise InputError(f'a focal stack is written to a name that ends in .mp4 or .gif, not "{path.name}"')
+        if not 0 < frames_per_second <= (50 if ending == ".gif" else math.inf) or math.isinf(frames_per_second):
+            raise InputError(
+                f"frames_per_second is a number above 0{' and up to 50' if ending == '.gif' else ''}, not "
+                f"{frames_per_second}"
+            )
+        count, rows, columns = self.pictures.shape[:3]
+        channels = self.pictures.reshape(count, rows, columns, -1)
+        if channels.shape[3] not in (1, 3):
+            raise InputError(f"a film has 1 or 3 channels, and this focal stack has {channels.shape[3]}")
+        flat = channels.reshape(count * rows, columns, -1)
+        factor = (
+            auto_exposure(flat if flat.shape[2] == 3 else flat[..., 0])
+            if exposure == "auto"
+            else checked_exposure(exposure)
+        )
+        clipped = float((channels * factor > 1 + 0.5 / 255).any(axis=3).mean())
+        way = [*range(count), *(range(count - 2, 0, -1) if there_and_back else ())]
+
+        def codes(number: int) -> NDArray[np.uint8]:
+            encoded = transfer.encode(channels[number] * np.float32(factor), 8)
+            return np.ascontiguousarray(np.broadcast_to(encoded, (rows, columns, 3)))
+
+        with atomic_path(path) as temporary:
+            if ending == ".gif":
+                _write_gif(temporary, [codes(number) for number in way], frames_per_second)
+            else:
+                av = video.library()
+                # The common chroma of H.264 goes by pairs of pixels.
+                even = ((0, rows % 2), (0, columns % 2), (0, 0))
+                frames = (np.pad(codes(number), even, mode="edge") for number in way)
+                try:
+                    video.encode(av, temporary, frames, frames_per_second, quality=18, lossless=False)
+                except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
+                    raise InputError(f"{path} could not be written as a video: {error}") from error
+        return (
+            f"{path}: {count} pictures of {columns}×{rows} pixels in {len(way)} frames, {frames_per_second:g} a "
+            f"second, exposure {factor:.6g}, {clipped:.2%} of the pixels clipped"
+        )
+
+
+def focus_distances(nearest: float, farthest: float, count: int) -> tuple[float, ...]:
+    """Distances from near to far in equal steps of 1/Z, hence of disparity and of blur.
+
+    Args:
+        nearest: metres.
+        farthest: metres; may be infinite.
+        count: how many, 1 or more (1 gives the middle one).
+
+    Raises:
+        InputError: a distance of zero or less, the farther one nearer, or a count below 1.
+    """
+    _check_distances((nearest, farthest))
+    if nearest > farthest:
+        raise InputError(
+            f"the nearest distance, {nearest} m, lies beyond the farthest, {farthest} m: exchange them"
+        )
+    if int(count) != count or count < 1:
+        raise InputError(f"a focal stack has a whole number of pictures, 1 or more, not {count}")
+    vergences = (
+        np.linspace(1 / nearest, 1 / farthest, int(count)) if count > 1 else [(1 / nearest + 1 / farthest) / 2]
+    )
+    return tuple(math.inf if each == 0 else float(1 / each) for each in vergences)
+
+
+def focal_stack(
+    light_field: LightField | StoredLightField,
+    distances: Sequence[float],
+    *,
+    memory_limit: int | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> FocalStack:
+    """The light field focused on each of some distances by the ideal lens, see `vcc.recover.refocus.refocused`.
+
+    Args:
+        light_field: in memory or on disk.
+        distances: metres before its plane; see `focus_distances`.
+        memory_limit: bytes that the stack may take; None takes `MEMORY_LIMIT`.
+        progress: called with (pictures done, pictures).
+        options: diameter, centre, interpolation and between_views, as `refocused` has them.
+
+    Raises:
+        InputError: no distances, one of zero or less, more memory needed than allowed, or what `refocused`
+        refuses.
+    """
+    distances = tuple(float(distance) for distance in distances)
+    if not distances:
+        raise InputError("a focal stack needs at least one distance to focus on")
+    _check_distances(distances)
+    rows, columns = light_field.shape[2:4]
+    shape = (len(distances), rows, columns, *((light_field.channels,) if light_field.channels else ()))
+    _check_memory(4 * math.prod(shape), memory_limit)
+    pictures = np.empty(shape, np.float32)
+    frame = Affine.identity(2)
+    for number, distance in enumerate(distances):
+        image = refocused(light_field, distance, **options)
+        pictures[number], frame = image.values, image.frame
+        if progress is not None:
+            progress(number + 1, len(distances))
+    return FocalStack(pictures, distances, frame)
+
+
+def _write_gif(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: float) -> None:
+    """An animated GIF by Pillow, which Matplotlib brings; it takes 256 colours for each frame, without FFmpeg."""
+    from PIL import Image as Picture
+
+    pictures = [Picture.fromarray(frame).quantize(256, dither=Picture.Dither.FLOYDSTEINBERG) for frame in frames]
+    pictures[0].save(
+        path, save_all=True, append_images=pictures[1:], duration=1000 / frames_per_second, loop=0, optimize=False
+    )
+
+
+def _check_distances(distances: Sequence[float]) -> None:
+    for distance in distances:
+        if not distance > 0:  # NaN too
+            raise InputError(
+                f"a distance to focus on must be greater than 0 m (infinite is allowed), not {distance}"
+            )
+
+
+def _check_memory(needed: int, memory_limit: int | None) -> None:
+    limit = MEMORY_LIMIT if memory_limit is None else memory_limit
+    if needed > limit:
+        raise InputError(
+            f"the focal stack needs {needed / 2**20:.0f} MiB, more than memory_limit = {limit / 2**20:.0f} MiB: "
+            "take fewer distances or smaller views, or raise memory_limit="
+        )

@@ -1,0 +1,351 @@
+"""Pictures from light fields: focused elsewhere by the ideal lens, and seen from places between the views."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc import patterns
+from vcc.affine import Affine
+from vcc.camera import Camera
+from vcc.errors import InputError, ResultWarning
+from vcc.image import Image
+from vcc.light_field import LightField
+from vcc.optics import Element, Lens, Mask
+from vcc.sensor import Sensor
+
+if TYPE_CHECKING:
+    from vcc.store import StoredLightField
+
+Progress = Callable[[int, int], None]
+
+IMAGE_DISTANCE = 50e-3
+"""How far behind the lens the sensor of the ideal camera stands, metres. Pictures do not depend on it: pixels and
+irradiance scale with it, and both are divided out."""
+SWEEP_STEP = 0.25
+"""By how much a plane sweep moves the views against each other from plane to plane, at most, pixels."""
+SWEEP_WINDOW = 2.5
+"""Standard deviation of the Gaussian over which a plane sweep compares views, pixels."""
+MOST_PLANES = 512
+_UNSEEN = 1e-6
+"""Pixels on which less than this share of the aperture falls were seen by no view: rounding of float32."""
+
+
+def ideal_camera(
+    light_field: LightField | StoredLightField,
+    distance: float,
+    *,
+    diameter: float | None = None,
+    centre: tuple[float, float] = (0.0, 0.0),
+) -> Camera:
+    """The perfect thin lens that focuses on a distance, before a sensor of the views' resolution.
+
+    The lens stands where the light field is given. The sensor stays `IMAGE_DISTANCE` d behind it, and the focal
+    length follows the thin-lens equation, 1/f = 1/d + 1/Z, so that all distances Z give pictures of the same
+    scale: a pixel is the step of one pixel of a view, and what stands at Z is found where the middle view sees it.
+    Capturing with it is the shift-and-add refocusing of Ng et al., *Light Field Photography with a Hand-held
+    Plenoptic Camera* (2005), with the footprints of samples in place of shifted points.
+
+    Args:
+        light_field: in memory or on disk.
+        distance: Z before the light field's plane, metres; may be infinite.
+        diameter: of the round aperture, metres; None takes all views.
+        centre: (u, v) of that aperture's middle, metres.
+
+    Raises:
+        InputError: a distance or diameter of zero or less, a centre without a diameter, or a light field given in
+            the plane of that distance, where all pixels of a view show the same place.
+    """
+    _check_distance(distance, "distance")
+    if diameter is not None and not diameter > 0:
+        raise InputError(f"the diameter of the aperture must be greater than 0 m, not {diameter}")
+    if diameter is None and tuple(centre) != (0.0, 0.0):
+        raise InputError(f"centre = {centre} m is the middle of a round aperture: give its diameter too")
+    d = IMAGE_DISTANCE
+    # A ray meets the sensor at x = u + d·(s − u/f) = d·(s − u/Z), linear in the sample's index.
+    focal_length = 1 / (1 / d + 1 / distance)
+    rays = Affine.propagation(d) @ Affine.lens(focal_length) @ light_field.frame
+    pitch = math.hypot(rays.linear[1, 2], rays.linear[1, 3]), math.hypot(rays.linear[0, 2], rays.linear[0, 3])
+    if min(pitch) < 1e-9 * d * max(abs(light_field.frame.linear[2:, 2:]).max(), 1e-300):
+        raise InputError(
+            f"at a distance of {distance} m all pixels of a view of this light field show one place: nothing can "
+            "be focused there"
+        )
+    nv, nu, nt, ns = light_field.shape[:4]
+    x, y, _, _ = rays([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2])
+    sensor = Sensor(z=d, shape=(nt, ns), pitch=pitch, decentre=(float(x), float(y)))
+    elements: list[Element] = [Lens(focal_length=focal_length)]
+    if diameter is not None:  # a mask rather than the lens's rim: the lens stays on the axis wherever the hole is
+        elements.append(Mask(patterns.Circle(diameter), decentre=centre, name="aperture"))
+    return Camera(elements, sensor)
+
+
+def refocused(
+    light_field: LightField | StoredLightField,
+    distance: float,
+    *,
+    diameter: float | None = None,
+    centre: tuple[float, float] = (0.0, 0.0),
+    interpolation: str = "cubic",
+    between_views: str = "auto",
+    memory_limit: int | None = None,
+    progress: Progress | None = None,
+) -> Image:
+    """The picture focused on a distance, upright, as large as a view: the mean radiance over the aperture.
+
+    Made by `ideal_camera`. Uniform radiance 1 gives 1 everywhere: each pixel is divided by the share of the
+    aperture that the given views cover there, which falls towards the borders of a picture out of focus.
+
+    Args:
+        light_field: in memory, or on disk and then read in pieces.
+        distance: metres before the light field's plane; may be infinite.
+        diameter: of the round aperture, metres; None takes all views. Smaller ones have more depth of field.
+        centre: (u, v) of the aperture's middle, metres.
+        interpolation: within a view, see `vcc.Camera.capture`. Cubic keeps detail that linear blurs.
+        between_views: whether ghosts of views too far apart are filled, see `vcc.Camera.capture`.
+        memory_limit: for a light field on disk, see `vcc.Camera.capture`.
+        progress: called with (done, total).
+
+    Returns:
+        Linear radiance, float32, (rows, columns[, channels]); the frame is where pixels of the middle view look,
+        as `vcc.LightField.view` has it.
+
+    Warns:
+        ResultWarning: pixels that no view saw, which are 0.
+
+    Raises:
+        InputError: what `ideal_camera` and `vcc.Camera.capture` refuse, or an aperture that holds no view.
+    """
+    camera = ideal_camera(light_field, distance, diameter=diameter, centre=centre)
+    options: dict[str, Any] = {
+        "method": "footprints",
+        "interpolation": interpolation,
+        "between_views": between_views,
+    }
+    outline = light_field if isinstance(light_field, LightField) else light_field.outline
+    with warnings.catch_warnings():
+        # "rays are missing; the picture is darker there": it is not, once divided by the coverage.
+        warnings.filterwarnings("ignore", message=".*of the rays that this camera asks for.*")
+        taken = camera.capture(light_field, **options, memory_limit=memory_limit, progress=progress)
+        covered = _coverage(camera, outline, options)
+    most = float(covered.max())
+    if not most > 0:
+        raise InputError(
+            f"an aperture of {diameter} m around {centre} m lies beside all views: the picture would be black"
+        )
+    seen = covered > _UNSEEN * most
+    if not seen.all():
+        warnings.warn(
+            f"{1 - seen.mean():.1%} of the pixels are seen by no view and are 0", ResultWarning, stacklevel=2
+        )
+    share = np.where(seen, covered, np.inf)
+    values = taken.to_numpy().astype(np.float64)
+    values /= share if values.ndim == 2 else share[..., None]
+    nv, nu, nt, ns = light_field.shape[:4]
+    s, t = light_field.frame([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2])[2:]
+    on_sensor = Affine.translation(-camera.sensor.decentre[0], -camera.sensor.decentre[1]) @ taken.frame
+    looks_at = Affine.translation(-s, -t) @ Affine.scaling(-1 / IMAGE_DISTANCE, -1 / IMAGE_DISTANCE) @ on_sensor
+    return Image(values.astype(np.float32), looks_at).upright()
+
+
+def _coverage(camera: Camera, outline: LightField, options: dict[str, Any]) -> NDArray[np.float64]:
+    """The picture of uniform radiance 1, (rows, columns), made row of views by row, without reading samples.
+
+    Pieces of a light field are treated as the whole would be (its range of disparities is theirs too), and
+    their pictures add up.
+    """
+    total = np.zeros(camera.sensor.shape)
+    for row in range(outline.shape[0]):
+        piece = outline[row : row + 1]
+        ones = piece.replaced(np.ones(piece.shape[:4], np.float32))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResultWarning)
+            total += camera.capture(ones, **options).to_numpy()
+    return total
+
+
+def novel_view(
+    light_field: LightField,
+    u: float,
+    v: float,
+    *,
+    scene_distance: float | None = None,
+    progress: Progress | None = None,
+) -> Image:
+    """What a camera between the views would see, interpolated along the scene's parallax.
+
+    The four views around the place (two, or one, on the grid's lines) are moved to it by the parallax of a
+    distance and averaged with bilinear weights, as Levoy & Hanrahan, *Light Field Rendering* (1996), blend rays of
+    neighbouring cameras, with the depth correction of Gortler et al., *The Lumigraph* (1996). Where the
+    distance is not given, each pixel takes the one at which these views agree best within a Gaussian window
+    (plane sweep: Collins, *A Space-Sweep Approach to True Multi-Image Matching*, 1996), among planes in equal
+    steps of disparity over the light field's range. A place that has a view gives exactly that view.
+
+    Args:
+        light_field: in memory, of a grid of parallel cameras (places by view, slopes by pixel and view, axes not
+            mixed).
+        u: where the camera stands, metres to the right, inside the grid of views.
+        v: likewise downwards.
+        scene_distance: one distance of the whole scene, metres; None finds one for each pixel.
+        progress: called with (planes done, planes).
+
+    Returns:
+        Linear radiance, float32, as `vcc.LightField.view` gives it, upright.
+
+    Raises:
+        InputError: a place outside the views, a frame that mixes axes, a distance of zero or less, or a range of
+            disparities that is not known and cannot be measured.
+    """
+    i, j = _view_index(light_field, u, v)
+    if scene_distance is not None:
+        _check_distance(scene_distance, "scene_distance")
+    around = _views_around(light_field, i, j)
+    farthest = max(max(abs(near.column - i), abs(near.row - j)) for near in around)
+    if scene_distance is not None or farthest == 0:
+        vergences = np.array([1 / scene_distance if scene_distance is not None else 0.0])
+    else:
+        vergences = _sweep(light_field)
+    sizes = light_field.shape[2:4]
+    best = np.full(sizes, np.inf)
+    picture = np.zeros((*sizes, light_field.channels or 1))
+    for done, vergence in enumerate(vergences):
+        mean, cost = _blend(light_field, around, (i, j), float(vergence))
+        if len(vergences) == 1:
+            picture = mean
+        else:
+            better = cost < best
+            best = np.where(better, cost, best)
+            picture[better] = mean[better]
+        if progress is not None:
+            progress(done + 1, len(vergences))
+    at_view = light_field.frame @ Affine.translation(i, j, 0, 0)
+    looks_at = Affine.from_parts(-at_view.linear[2:, 2:], -at_view.offset[2:])
+    if light_field.channels is None:
+        picture = picture[..., 0]
+    return Image(picture.astype(np.float32), looks_at, inverted=False)
+
+
+class _Near:
+    """A view around a place: its index, its share, and its samples as splines."""
+
+    def __init__(self, light_field: LightField, row: int, column: int, share: float) -> None:
+        from scipy import ndimage
+
+        self.row, self.column, self.share = row, column, share
+        picture = light_field.view(row, column).to_numpy().astype(np.float64)
+        self.samples = picture if picture.ndim == 3 else picture[..., None]
+        # Splines with mirrored borders, as `ndimage.shift` expects them in this mode.
+        self.splines = np.stack(
+            [ndimage.spline_filter(self.samples[..., c], 3, mode="mirror") for c in range(self.samples.shape[2])]
+        )
+
+    def moved(self, down: float, right: float) -> NDArray[np.float64]:
+        """The picture moved by so many pixels, (rows, columns, channels), its borders mirrored."""
+        from scipy import ndimage
+
+        if down == 0 and right == 0:
+            return self.samples
+        channels = [
+            ndimage.shift(each, (down, right), order=3, mode="mirror", prefilter=False) for each in self.splines
+        ]
+        return np.stack(channels, axis=-1)
+
+
+def _views_around(light_field: LightField, i: float, j: float) -> list[_Near]:
+    """The views whose bilinear weight at (i, j) is above 0."""
+    found = []
+    for row in {math.floor(j), math.ceil(j)}:
+        for column in {math.floor(i), math.ceil(i)}:
+            share = (1 - abs(i - column)) * (1 - abs(j - row))
+            found.append(_Near(light_field, row, column, share))
+    return found
+
+
+def _blend(
+    light_field: LightField, around: list[_Near], place: tuple[float, float], vergence: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The mean of the views at a place by the parallax of a plane, and how much they differ there, by pixel."""
+    from scipy import ndimage
+
+    linear = light_field.frame.linear
+    # A point at 1/Z is seen at pixel k − D·i in view i: D = (∂s/∂i − ∂u/∂i/Z)/(∂s/∂k), likewise down.
+    right = (linear[2, 0] - linear[0, 0] * vergence) / linear[2, 2]
+    down = (linear[3, 1] - linear[1, 1] * vergence) / linear[3, 3]
+    rows, columns = np.arange(light_field.shape[2]), np.arange(light_field.shape[3])
+    moved, weights = [], []
+    for near in around:
+        shift = down * (near.row - place[1]), right * (near.column - place[0])
+        moved.append(near.moved(*shift))
+        inside = [
+            (index - by >= -1e-9) & (index - by <= len(index) - 1 + 1e-9)
+            for index, by in zip((rows, columns), shift, strict=True)
+        ]
+        # Views that do not reach a pixel count for next to nothing there, and for all where no other does.
+        weights.append(near.share * np.where(inside[0][:, None] & inside[1], 1.0, 1e-9))
+    pictures, shares = np.stack(moved), np.stack(weights)[..., None]
+    mean = (shares * pictures).sum(axis=0) / shares.sum(axis=0)
+    cost = ((pictures - pictures.mean(axis=0)) ** 2).mean(axis=(0, 3))
+    return mean, ndimage.gaussian_filter(cost, SWEEP_WINDOW, mode="mirror")
+
+
+def _sweep(light_field: LightField) -> NDArray[np.float64]:
+    """The planes of a sweep, 1/metre, over the light field's range of disparities."""
+    found = light_field.measured_disparity_range()
+    if found is None:
+        raise InputError(
+            "how far the scene is away cannot be measured from this light field (too few views, or no texture): "
+            "give scene_distance="
+        )
+    ends = np.array([1 / light_field.distance_of(each) for each in found])
+    linear = light_field.frame.linear
+    # A little farther at both ends: measured ranges are percentiles.
+    per_vergence = max(abs(linear[0, 0] / linear[2, 2]), abs(linear[1, 1] / linear[3, 3]))
+    margin = SWEEP_STEP / per_vergence
+    low, high = ends.min() - margin, ends.max() + margin
+    planes = math.ceil((high - low) * per_vergence / SWEEP_STEP) + 1
+    if planes > MOST_PLANES:
+        raise InputError(
+            f"the scene's disparities, {found[0]:.3g} to {found[1]:.3g} pixels per view, would take a sweep of "
+            f"{planes} planes, more than {MOST_PLANES}: give scene_distance=, or views that stand closer"
+        )
+    return np.linspace(low, high, planes)
+
+
+def _view_index(light_field: LightField, u: float, v: float) -> tuple[float, float]:
+    """(i, j) of a place on the grid of views."""
+    linear, offset = light_field.frame.linear, light_field.frame.offset
+    mixed = [
+        linear[a, b] for a, b in ((0, 1), (1, 0), (0, 2), (0, 3), (1, 2), (1, 3), (2, 1), (3, 0), (2, 3), (3, 2))
+    ]
+    size = np.abs(linear).max(axis=1)
+    if np.abs(mixed).max() > 1e-9 * size.min():
+        raise InputError(
+            "views are interpolated in light fields of parallel cameras, whose frame does not mix its axes; this "
+            f"one's does:\n{light_field.frame!r}\nResample it first (LightField.resampled)"
+        )
+    index = []
+    for name, place, axis, count in (("u", u, 0, light_field.shape[1]), ("v", v, 1, light_field.shape[0])):
+        step = linear[axis, axis]
+        start = light_field.frame([0, 0, 0, 0])[axis]
+        found = (place - start) / step
+        nearest = round(found) if math.isfinite(found) else 0
+        if abs(found - nearest) < 1e-9:
+            found = float(nearest)
+        if not -1e-9 <= found <= count - 1 + 1e-9:
+            ends = sorted((float(offset[axis]), float(offset[axis] + step * (count - 1))))
+            raise InputError(
+                f"{name} = {place} m lies outside the views, which stand from {ends[0]:.6g} m to {ends[1]:.6g} m: "
+                "a view can be interpolated between others, not beyond them"
+            )
+        index.append(found)
+    return index[0], index[1]
+
+
+def _check_distance(distance: float, name: str) -> None:
+    if not distance > 0:  # NaN too
+        raise InputError(f"{name} must be greater than 0 m (infinite is allowed), not {distance}")

@@ -1,0 +1,300 @@
+"""Depth from one picture through a biprism, by matching its two halves (Lee, Kweon and Cipolla 1999).
+
+Seen through either half of a biprism that bends light towards its ridge, a point seems to lie a way δ·Z to the
+side. The lens behind puts the two pictures of it on the two halves of the sensor, Δ = 2·δ·Z·d/(Z + a) apart, where
+Z is its distance before the biprism, a the way from there to the lens and d from the lens to the sensor. Other
+than blur, Δ grows with Z throughout: there are no two distances with one separation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.camera import Camera
+from vcc.errors import InputError
+from vcc.image import Image
+from vcc.optics import Biprism, Lens
+from vcc.sampled import to_numpy
+
+Array = NDArray[np.float64]
+
+_FLOOR = 2e-3  # of the brightest pixel: contrast below is no texture
+_REFINEMENTS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class StereoDepth:
+    """The distances of blocks of the half picture on the right of the sensor (x > 0, as light lands).
+
+    Args:
+        separation: of the block's two pictures, pixels, shape (block rows, block columns); NaN where a block could
+            not be matched inside the picture.
+        distance: metres before the entrance plane, likewise; infinite where a separation is at or beyond that of
+            infinity.
+        confidence: 0 (no texture, or no match) to 1, likewise.
+        rows: the row of each block's middle, pixels, shape (block rows,).
+        columns: likewise the column, shape (block columns,).
+    """
+
+    separation: Array
+    distance: Array
+    confidence: Array
+    rows: Array
+    columns: Array
+
+
+@dataclass(frozen=True)
+class BiprismStereo:
+    """A biprism before a lens as a stereo camera: separations and distances in closed form.
+
+    Args:
+        deflection: δ of each half, a slope, greater than 0 (towards the ridge).
+        place: z of the biprism behind the entrance plane, metres.
+        ahead: a, from the biprism to the lens, metres.
+        behind: d, from the lens to the sensor, metres.
+
+    Raises:
+        InputError: a deflection of 0 or less, or a biprism that is not before the lens.
+    """
+
+    deflection: float
+    place: float
+    ahead: float
+    behind: float
+
+    def __post_init__(self) -> None:
+        if not self.deflection > 0:
+            raise InputError(
+                f"the biprism bends by {self.deflection:g}: only with a deflection greater than 0, towards the "
+                "ridge, do both halves see the same things"
+            )
+        if not (self.ahead > 0 and self.behind > 0):
+            raise InputError(
+                f"the biprism stands {self.ahead * 1e3:g} mm before the lens, and the sensor "
+                f"{self.behind * 1e3:g} mm behind it: both must be greater than 0. "
+                "With no way between biprism and lens there is no baseline"
+            )
+
+    @classmethod
+    def of(cls, camera: Camera) -> BiprismStereo:
+        """The stereo camera that a biprism and a lens make.
+
+        Raises:
+            InputError: other elements than one biprism and one lens behind it, a biprism turned or elements off
+                the axis, or what `BiprismStereo` refuses.
+        """
+        return _parts(camera)[0]
+
+    @property
+    def baseline(self) -> float:
+        """2·δ·a, metres: the distance of the two cameras that this one stands for."""
+        return 2 * self.deflection * self.ahead
+
+    def separation_of(self, distance: float) -> float:
+        """Δ on the sensor, metres, for a distance before the entrance plane, metres (infinity allowed)."""
+        away = distance + self.place
+        return 2 * self.deflection * self.behind / (1 + self.ahead / away)
+
+    def distance_of(self, separation: float) -> float:
+        """The distance before the entrance plane, metres: `separation_of` undone.
+
+        Infinite at the separation of infinity, 2·δ·d, and beyond.
+        """
+        rest = 2 * self.deflection * self.behind - separation
+        return math.inf if rest <= 0 else self.ahead * separation / rest - self.place
+
+
+def depth_by_biprism(
+    image: Image, camera: Camera, distance_range: tuple[float, float], *, block: int = 21, step: int | None = None
+) -> StereoDepth:
+    """Depth from a recording through a biprism and a lens.
+
+    Blocks of the right half picture are found in the left one by normalised correlation over the separations of
+    the range, then to a fraction of a pixel by least squares over separation, gain and offset (Lucas and Kanade
+    1981, with cubic splines between pixels). Left out is the strip in the middle of the sensor where light of both
+    halves arrives.
+
+    Args:
+        image: as the camera captured it (not turned upright).
+        camera: one `vcc.Biprism` at rotation 0 and one `vcc.Lens` with a diameter, on the axis.
+        distance_range: (nearest, farthest) before the entrance plane, metres; infinity is allowed.
+        block: side of the blocks, pixels, an odd number.
+        step: from block to block, pixels; None takes half a block.
+
+    Raises:
+        InputError: a camera that is no such stereo camera, a picture of another size than its sensor's, turned
+            upright or with NaNs, a range that is none, or a picture that holds no block and its partner.
+    """
+    stereo, lens = _parts(camera)
+    values = _checked(image, camera)
+    near, far = distance_range
+    if not 0 < near <= far:
+        raise InputError(f"distance_range is (nearest, farthest) in metres, greater than 0, not {distance_range}")
+    if not (block >= 5 and block % 2 == 1):
+        raise InputError(f"block is an odd number of pixels, 5 or more, not {block}")
+    step = max(1, block // 2) if step is None else step
+    pitch = camera.sensor.pitches[1]
+    # One pixel further to either side, so that the best one has neighbours.
+    lowest = math.floor(stereo.separation_of(near) / pitch) - 1
+    highest = math.ceil(stereo.separation_of(far) / pitch) + 1
+    rows, columns, half = _blocks(camera, stereo, lens, block, step, lowest)
+    shifts = np.arange(lowest, highest + 1)
+    correlation = _correlations(values, rows, columns, shifts, half, _mixed(stereo, lens), camera)
+    best = correlation.argmax(axis=0)
+    found = np.isfinite(correlation.max(axis=0))
+    separation, confidence = _refined(values, rows, columns, shifts[best].astype(np.float64), half)
+    at_end = (best == 0) | (best == len(shifts) - 1)
+    lost = ~found | at_end | (np.abs(separation - shifts[best]) > 1.5)
+    confidence[lost] = 0
+    separation[~found] = np.nan
+    separation[found & lost] = shifts[best][found & lost]
+    distance = np.array([math.nan if math.isnan(s) else stereo.distance_of(s * pitch) for s in separation.ravel()])
+    return StereoDepth(
+        separation, distance.reshape(separation.shape), confidence, rows.astype(float), columns.astype(float)
+    )
+
+
+def _parts(camera: Camera) -> tuple[BiprismStereo, Lens]:
+    elements = camera.elements
+    prism, lens = (*elements, None, None)[:2]
+    if len(elements) != 2 or not isinstance(prism, Biprism) or not isinstance(lens, Lens):
+        names = ", ".join(element.label for element in elements) or "none"
+        raise InputError(
+            f"biprism stereo needs one biprism and one lens behind it; this camera's elements: {names}"
+        )
+    for element in (prism, lens):
+        if element.decentre != (0.0, 0.0):
+            raise InputError(f"{element.label} is off the axis: biprism stereo needs it at (0, 0)")
+    if prism.rotation != 0:
+        raise InputError(
+            f"{prism.label} is turned by {prism.rotation:g} rad: biprism stereo needs its ridge upright, "
+            "rotation 0"
+        )
+    stereo = BiprismStereo(prism.deflection, prism.z, lens.z - prism.z, camera.sensor.z - lens.z)
+    return stereo, lens
+
+
+def _checked(image: Image, camera: Camera) -> Array:
+    if image.shape[:2] != camera.sensor.shape:
+        raise InputError(
+            f"the picture has {image.shape[0]}×{image.shape[1]} pixels, and the camera's sensor "
+            f"{camera.sensor.shape[0]}×{camera.sensor.shape[1]}: give what this camera captured"
+        )
+    if not image.inverted:
+        raise InputError("the picture is turned upright: give it as the camera captured it")
+    values = to_numpy(image.values).astype(np.float64)
+    values = values if values.ndim == 2 else values.mean(axis=2)
+    if not np.isfinite(values).all():
+        raise InputError("the picture holds NaN or infinite values: replace them first")
+    return np.asarray(values)
+
+
+def _mixed(stereo: BiprismStereo, lens: Lens) -> float:
+    """Half the width of the strip on the sensor that light of both halves reaches, metres.
+
+    A ray from the sensor's x through the lens's p meets the biprism at p·(1 + a/d − a/f) − x·a/d: both signs of it
+    occur where |x| is less than what this returns.
+    """
+    if lens.diameter is None:
+        raise InputError(f"{lens.label} has no diameter: then light of both halves of the biprism is everywhere")
+    a, d = stereo.ahead, stereo.behind
+    return abs(1 + a / d - a / lens.focal_length) * lens.diameter / 2 * d / a
+
+
+def _blocks(
+    camera: Camera, stereo: BiprismStereo, lens: Lens, block: int, step: int, lowest: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
+    """Middles of blocks that lie in the right half picture with a partner that may lie in the left one."""
+    half = block // 2
+    places = camera.sensor.column_places
+    pitch = camera.sensor.pitches[1]
+    mixed = _mixed(stereo, lens) + (half + 1) * pitch
+    widest = 2 * stereo.deflection * stereo.behind
+    columns = np.flatnonzero((places > mixed) & (places < widest - mixed))
+    columns = columns[(columns >= half) & (columns < len(places) - half) & (columns - lowest - half >= 0)]
+    rows = np.arange(half, camera.sensor.shape[0] - half)
+    if not (rows.size and columns.size):
+        raise InputError(
+            f"no block of {block} pixels and its partner lie on the sensor: the two pictures are up to "
+            f"{widest / pitch:.0f} pixels apart, the strip between them where both mix is "
+            f"{2 * _mixed(stereo, lens) / pitch:.0f} pixels wide, and the sensor has {camera.sensor.shape[0]}×"
+            f"{camera.sensor.shape[1]}. A narrower lens, a larger sensor or a stronger biprism would do"
+        )
+    return rows[::step], columns[::step], half
+
+
+def _correlations(
+    values: Array,
+    rows: NDArray[np.intp],
+    columns: NDArray[np.intp],
+    shifts: NDArray[np.intp],
+    half: int,
+    mixed: float,
+    camera: Camera,
+) -> Array:
+    """Normalised correlation of each block with its partner at each separation; −∞ where there is none."""
+    windows = np.lib.stride_tricks.sliding_window_view(values, (2 * half + 1, 2 * half + 1))
+    floor = (_FLOOR * values.max()) ** 2
+    own = _standard(windows[np.ix_(rows - half, columns - half)], floor)
+    places = camera.sensor.column_places
+    reach = (half + 1) * camera.sensor.pitches[1]
+    result = np.full((len(shifts), len(rows), len(columns)), -np.inf)
+    for n, shift in enumerate(shifts):
+        partner = columns - shift
+        # Room for cubic interpolation on both sides.
+        there = (partner - half >= 2) & (partner + half < values.shape[1] - 2)
+        there &= places[np.clip(partner, 0, len(places) - 1)] < -(mixed + reach)
+        if there.any():
+            other = _standard(windows[np.ix_(rows - half, partner[there] - half)], floor)
+            result[n][:, there] = np.einsum("rcij,rcij->rc", own[:, there], other)
+    return result
+
+
+def _standard(blocks: Array, floor: float) -> Array:
+    """Blocks less their mean, of norm 1 where they have texture and less where they have none."""
+    centred = blocks - blocks.mean(axis=(2, 3), keepdims=True)
+    return np.asarray(centred / np.sqrt((centred**2).sum(axis=(2, 3), keepdims=True) + floor * centred[0, 0].size))
+
+
+def _refined(
+    values: Array, rows: NDArray[np.intp], columns: NDArray[np.intp], separation: Array, half: int
+) -> tuple[Array, Array]:
+    """Separations to a fraction of a pixel, and how much of the blocks they explain."""
+    from scipy.ndimage import map_coordinates, spline_filter
+
+    window = np.arange(-half, half + 1)
+    down = (rows[:, None, None, None] + window[:, None]).astype(np.float64)
+    across = (columns[:, None, None] + window).astype(np.float64)
+    shape = (len(rows), len(columns), window.size, window.size)
+    down, across = np.broadcast_to(down, shape), np.broadcast_to(across, shape)
+    own = map_coordinates(values, [down, across], order=0).reshape(*shape[:2], -1)
+    own = own - own.mean(axis=2, keepdims=True)
+    spline = spline_filter(values, order=3, mode="mirror")
+
+    def partner(shift: Array) -> Array:
+        places = [down, across - shift[..., None, None]]
+        read = map_coordinates(spline, places, order=3, prefilter=False, mode="mirror").reshape(*shape[:2], -1)
+        return np.asarray(read - read.mean(axis=2, keepdims=True))
+
+    shift = separation.copy()
+    variance = (own**2).mean(axis=2) + (_FLOOR * values.max()) ** 2
+    explained = np.zeros_like(shift)
+    for _ in range(_REFINEMENTS):
+        other = partner(shift)
+        change = (partner(shift + 0.25) - partner(shift - 0.25)) / 0.5
+        # own ≈ gain·(other + ε·change): least squares in gain and gain·ε.
+        oo, cc, oc = (other**2).sum(2), (change**2).sum(2), (other * change).sum(2)
+        yo, yc = (own * other).sum(2), (own * change).sum(2)
+        determinant = oo * cc - oc**2
+        solvable = determinant > 1e-9 * np.maximum(oo * cc, 1e-300)
+        safe = np.where(solvable, determinant, 1)
+        gain, gain_step = (yo * cc - yc * oc) / safe, (yc * oo - yo * oc) / safe
+        move = np.where(solvable & (gain > 0), gain_step / np.where(gain > 0, gain, 1), 0)
+        left = ((own - gain[..., None] * other - gain_step[..., None] * change) ** 2).mean(2)
+        explained = np.where(solvable & (gain > 0), 1 - (left + variance - (own**2).mean(2)) / variance, 0)
+        shift = shift + np.clip(move, -0.5, 0.5)
+    return shift, np.clip(explained, 0, 1)

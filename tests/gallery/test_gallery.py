@@ -1,0 +1,254 @@
+"""The gallery: its frame, and each camera against closed forms of scenes that are known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import vcc
+from vcc.cli import commands
+from vcc.formats.pictures import read_picture
+from vcc.formats.writing import save_light_field
+from vcc.gallery import ENTRIES, Entry, Finding, Picture, Result, entries, entry, write_entry
+from vcc.gallery import biprism_stereo as biprism
+from vcc.gallery import integral_lens_prism as integral
+from vcc.gallery import light_field_rendering as rendering
+from vcc.gallery import wavefront_coding as wavefront
+from vcc.gallery.entry import bench_for
+from vcc.sources import PlanesScene, TexturedPlane
+from vcc.sources.textures import Waves
+from vcc.units import mm
+
+NEAR, FAR = 0.8, 2.0
+SPACING, SLOPE, CONVERGENCE = 20 * mm / 9, 0.4 / 96, 1.2
+SCENE = PlanesScene([TexturedPlane(Waves(0.03), NEAR, width=0.16), TexturedPlane(Waves(0.07, seed=1), FAR)])
+
+
+def seen_by_views(scene: PlanesScene) -> vcc.LightField:
+    return scene.light_field(
+        (9, 9), (96, 96), spacing=SPACING, slope_per_pixel=SLOPE, focus_distance=CONVERGENCE, dtype="float32"
+    )
+
+
+@pytest.fixture(scope="module")
+def light_field() -> vcc.LightField:
+    return seen_by_views(SCENE)
+
+
+def psnr(picture: np.ndarray, truth: np.ndarray) -> float:
+    return -10 * math.log10(float(np.mean((picture - truth) ** 2)))
+
+
+# --- the frame ---
+
+
+def test_every_entry_says_what_it_is():
+    for name, each in zip(ENTRIES, entries(), strict=True):
+        assert each.name == name
+        assert all((each.title, each.citation, each.claim))
+
+
+def test_an_unknown_name_is_refused_with_the_nearest_one():
+    with pytest.raises(vcc.InputError, match='Did you mean "biprism-stereo"'):
+        entry("biprism")
+
+
+def test_the_page_says_what_was_measured_and_whether_the_claim_was_reached(tmp_path):
+    numbers = (
+        Finding("gain <of it>", "5 dB or more", 4.72, "dB", False, "little to gain"),
+        Finding("contrast", "", 0.123456),
+    )
+    grey = np.linspace(0, 1, 48, dtype=np.float32).reshape(4, 4, 3)
+    result = Result("<p>How.</p>", ((Picture("grey", "Grey", "", grey),),), numbers, "Assumed so")
+    made = Entry("some", "Some camera", "Someone & others, 1999", "It sees.", lambda bench, progress: result)
+    page = write_entry(made, result, tmp_path / "new" / "folder").read_text(encoding="utf-8")
+    for words in ("gain &lt;of it&gt;", "4.72 dB", "not reached", "little to gain", "0.123", "Assumed so."):
+        assert words in page
+    assert "Someone &amp; others" in page
+    assert 'src="grey.png"' in page
+    written = read_picture(tmp_path / "new" / "folder" / "grey.png")[0]
+    np.testing.assert_allclose(written / 255, grey, atol=0.5 / 255 + 1e-6)  # half a step of 8 bits
+    assert not result.reached
+
+
+def test_a_folder_that_is_a_file_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    result = Result("", (), ())
+    with pytest.raises(vcc.InputError, match="cannot write"):
+        write_entry(entry("conventional"), result, tmp_path / "file")
+
+
+def test_command_lists_and_runs(tmp_path, light_field):
+    save_light_field(light_field, tmp_path / "field.npz")
+    runner = CliRunner()
+    listed = runner.invoke(commands.app, ["gallery"])
+    assert all(name in listed.output for name in ENTRIES)
+    refused = runner.invoke(commands.app, ["gallery", "pinhole"])
+    assert refused.exit_code == 2
+    ran = runner.invoke(
+        commands.app,
+        ["gallery", "conventional", "--light-field", str(tmp_path / "field.npz"), "-o", str(tmp_path / "page")],
+    )
+    assert ran.exit_code == 0, ran.output
+    assert "blur of a point" in ran.output
+    for picture in (tmp_path / "page").glob("*.png"):
+        assert f'src="{picture.name}"' in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
+
+
+# --- conventional ---
+
+
+def test_points_blur_as_geometry_says(light_field):
+    result = entry("conventional").run(light_field)
+    assert len(result.numbers) == 2
+    assert result.reached
+    assert len(result.pictures[0]) == 3
+
+
+# --- light-field rendering ---
+
+
+def test_what_lies_where_the_views_converge_is_predicted_to_rounding():
+    plane = PlanesScene([TexturedPlane(Waves(0.05), CONVERGENCE)])
+    flat = seen_by_views(plane)
+    like = flat.view(3, 3).to_numpy()
+    found = rendering._resampled(flat[::2, ::2], flat, (3, 3), "linear")
+    # All views are the same picture; float32 samples are weighted.
+    np.testing.assert_allclose(found, like, atol=1e-5)
+
+
+def test_views_where_no_camera_stood_are_the_closed_form(light_field):
+    (u, v), z = (1.3 * mm, -2.1 * mm), 15 * mm
+    _, _, s0, t0 = light_field.frame([4, 4, 47.5, 47.5])
+    picture = rendering._pinhole_picture(light_field, light_field, (u, v), (float(s0), float(t0)), z)
+    s = t = (47.5 - np.arange(96)) * SLOPE
+    truth = SCENE.radiance_along(u - z * s[None, :], v - z * t[:, None], s[None, :], t[:, None])
+    inner = np.s_[14:-14, 14:-14]
+    # Half-way between pixels, linear interpolation takes 1 − cos(π/9) = 6 % off waves of 9 pixels: 0.0075 of 0.125
+    # root mean square, 42 dB; the border of the near plane costs the rest.
+    assert psnr(picture[inner], truth[inner]) > 33
+    assert psnr(picture[inner], np.roll(truth, 1, axis=1)[inner]) < 28
+
+
+def test_too_few_views_are_refused(light_field):
+    with pytest.raises(vcc.InputError, match="3×3 views"):
+        entry("light-field-rendering").run(light_field[::8, ::8])
+
+
+# --- integral camera ---
+
+
+def test_each_decoded_view_is_what_a_pinhole_sees_from_where_matrices_say(light_field):
+    bench = bench_for(light_field)
+    camera = integral.designed(bench)
+    values = camera.camera.capture(light_field, samples=32).to_numpy()
+    radiance = values * (camera.camera.sensor.z - integral.TO_LENS) ** 2 / (math.pi / 4 * integral.OPENING**2)
+    decoded = integral.cut(camera, radiance)
+    # By hand: a ray leaves the pair at c, at the place c + ξ, towards the lens's middle: slope −(c + ξ)/L; before
+    # the pair −(c + ξ)/L + ξ/f + c/L + c/F, so all pass 1/κ behind the array at c·(1 + 1/(κF)).
+    kappa = 1 / integral.TO_LENS + 1 / abs(camera.focal_length)
+    for row, column in ((0, 0), (1, 2), (2, 1)):
+        c, r = (column - 1) * 20 * mm / 3, (row - 1) * 20 * mm / 3
+        u, v = c * (1 + 1 / (kappa * CONVERGENCE)), r * (1 + 1 / (kappa * CONVERGENCE))
+        count = decoded.shape[2]
+        away = ((count - 1) / 2 - np.arange(count)) * camera.slope
+        s, t = c / CONVERGENCE + away, r / CONVERGENCE + away
+        truth = SCENE.radiance_along(u - s[None, :] / kappa, v - t[:, None] / kappa, s[None, :], t[:, None])
+        np.testing.assert_allclose(decoded.frame([column, row, 0, 0]), [u, v, s[0], t[0]], atol=1e-12)
+        # As above, and an opening of 2 mm.
+        inner = np.s_[8:-8, 8:-8]
+        assert psnr(np.asarray(decoded.values[row, column])[inner], truth[inner]) > 28
+        assert psnr(np.asarray(decoded.values[row, column])[inner], np.roll(truth, 2, axis=1)[inner]) < 24
+
+
+# --- biprism ---
+
+
+@pytest.mark.parametrize("shift", [3.0, 4.37, 5.5])
+def test_blocks_are_found_to_a_hundredth_of_a_pixel(shift):
+    y, x = np.mgrid[:60, :80].astype(float)
+    texture = Waves(7.0)
+    first, second = texture(x, y)[..., 0], texture(x - shift, y)[..., 0]
+    found, trusted = biprism.match(first, second, (0, 9))
+    inner = np.s_[12:-12, 12:-24]
+    assert trusted[inner].mean() > 0.9
+    # Up to 1/8 pixel is left of the steps tried, divided by a gradient from differences, which is low by
+    # 1 − sin(2π/7)/(2π/7) = 13 % for waves of 7 pixels: 0.019 pixel too far.
+    assert np.abs(found - shift)[inner][trusted[inner]].max() < 0.02
+
+
+def test_a_point_s_two_pictures_are_as_far_apart_as_virtual_points(light_field):
+    stereo = biprism.designed(bench_for(light_field))
+    for distance in (NEAR, FAR):
+        # Two virtual points δ·Z to both sides, through the middle of the lens.
+        apart = 2 * stereo.deflection * distance * stereo.to_sensor / (distance + stereo.to_lens)
+        assert stereo.disparity(distance) * stereo.pitch == pytest.approx(apart, rel=1e-12)
+        assert stereo.distance(stereo.disparity(distance)) == pytest.approx(distance, rel=1e-9)
+
+
+def test_distance_from_one_recording():
+    """A wall at 1 m: disparity within 0.1 pixel of the closed form, distance within 2 %."""
+    wall = seen_by_views(PlanesScene([TexturedPlane(Waves(0.03), 1.0), TexturedPlane(Waves(0.02), NEAR, 0.05)]))
+    stereo = biprism.designed(bench_for(wall))
+    image = stereo.camera.capture(wall, samples=256)
+    right, left = biprism.halves(image.to_numpy())
+    width = right.shape[1]
+    ends = (math.floor(stereo.disparity(0.6)) - width, math.ceil(stereo.disparity(math.inf)) - width)
+    disparity, trusted = biprism.match(right, left, ends)
+    trusted &= biprism._away_from_the_ridge(stereo, width, disparity + width)
+    found = float(np.median((disparity + width)[trusted]))
+    assert trusted.sum() > 200
+    assert found == pytest.approx(float(stereo.disparity(1.0)), abs=0.1)
+    assert stereo.distance(np.array(found)) == pytest.approx(1.0, rel=0.02)
+
+
+# --- wavefront coding ---
+
+
+def test_the_filter_undoes_a_known_blur():
+    y, x = np.mgrid[:90, :90].astype(float)
+    picture = Waves(12.0)(x, y)[..., 0]
+    spread = np.zeros((5, 5))
+    spread[1, 2:] = 1 / 3  # off its middle, so that a mirrored or shifted filter fails
+    blurred = sum(Waves(12.0)(x - across, y + 1)[..., 0] for across in (0, 1, 2)) / 3
+    inner = np.s_[15:-15, 15:-15]
+    assert psnr(wavefront.wiener(blurred, [spread], 0.01)[inner], picture[inner]) > 45
+    assert psnr(blurred[inner], picture[inner]) < 35
+
+
+def test_a_cubic_plate_spreads_a_point_as_far_as_its_parabola(light_field):
+    bench = bench_for(light_field)
+    pair = wavefront.designed(bench)
+    spread = wavefront._spread(bench, pair.coded, pair.focus, pair.focus)
+    assert spread.sum() == pytest.approx(1)
+    # α·x³ bends by 3αλ/(2πR)·x² at most, hence a spot that wide times d, from the axis to one side (of an upright
+    # picture: the other).
+    sensor_z = bench.image_distance(pair.focus)
+    width = 3 * pair.alpha * wavefront.WAVELENGTH / (math.pi * wavefront.PUPIL) * sensor_z
+    pixels = width / (SLOPE * sensor_z)
+    across = np.flatnonzero(spread.sum(axis=0) > 1e-9)
+    middle = spread.shape[1] // 2
+    assert across[-1] == middle
+    assert middle - across[0] == pytest.approx(pixels, abs=1)  # whole pixels
+
+
+def test_a_scene_without_depth_is_refused(light_field):
+    bench = bench_for(light_field)
+    with pytest.raises(vcc.InputError, match="nothing is out of focus"):
+        wavefront.designed(replace(bench, near=1.0, far=1.01))
+
+
+def test_wavefront_coding_runs_on_a_light_field_of_one_s_own(monkeypatch):
+    fine = SCENE.light_field(
+        (5, 5), (320, 320), spacing=4 * mm, slope_per_pixel=0.00125, focus_distance=CONVERGENCE, dtype="float32"
+    )
+    for name, value in (("DEPTHS", 3), ("RAYS", 200), ("TARGET", 80)):
+        monkeypatch.setattr(wavefront, name, value)
+    result = entry("wavefront-coding").run(fine)
+    with_plate, without = result.numbers[:2]
+    assert with_plate.value > 0.9 > without.value
+    assert all(math.isfinite(number.value) for number in result.numbers)
