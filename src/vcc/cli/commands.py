@@ -39,12 +39,6 @@ app = typer.Typer(
 )
 
 
-app.add_typer(synth)
-app.command(epilog=SPECTRUM_EPILOG)(spectrum)
-app.command(epilog=GALLERY_EPILOG)(gallery)
-app.command(epilog=refocusing.EPILOG)(refocusing.refocus)
-
-
 def _show_version(wanted: bool) -> None:
     if wanted:
         from vcc import __version__
@@ -564,3 +558,10 @@ def convert(
             reading=reading,
         )
     )
+
+
+# In the order in which --help shows them.
+app.command(epilog=refocusing.EPILOG)(refocusing.refocus)
+app.command(epilog=SPECTRUM_EPILOG)(spectrum)
+app.command(epilog=GALLERY_EPILOG)(gallery)
+app.add_typer(synth)
