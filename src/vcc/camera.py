@@ -65,6 +65,16 @@ class Stage:
         with self.named():
             return bending(x - self.element.decentre[0], y - self.element.decentre[1])
 
+    def deflected(self, rays: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rays (..., 4) of the camera just behind the deflection, affine or not; errors name the element."""
+        if self.centred is not None:
+            return np.asarray(self.centred(rays))
+        if self.faces.bending is None:
+            return rays
+        slopes = self.bent(rays[..., 0], rays[..., 1])
+        still = np.zeros_like(slopes[0])
+        return np.asarray(rays + np.stack([still, still, *slopes], axis=-1))
+
     @contextmanager
     def named(self) -> Iterator[None]:
         """Errors raised within name the element."""

@@ -336,7 +336,7 @@ def _traced_cells(
         rays = stage.approach(rays)
         if stage.faces.pattern is not None:
             share = share * _mean_transmission(stage, rays)
-        rays = _bent(stage, rays)
+        rays = stage.deflected(rays)
     rays = camera.approach_to_sensor(rays)
     return _Spot(rays[0, :, :2], _box(rays), share)
 
@@ -359,15 +359,6 @@ def _mean_transmission(stage: Stage, rays: Array) -> Array:
             mean = np.asarray(pattern.mean(x, y, float(widths[0, 0]), float(widths[0, 1])), dtype=np.float64)
             return np.where(mean > NO_LIGHT, mean, 0.0)
         return np.asarray(pattern(x, y), dtype=np.float64)
-
-
-def _bent(stage: Stage, rays: Array) -> Array:
-    if stage.centred is not None:
-        return np.asarray(stage.centred(rays))
-    if stage.faces.bending is None:
-        return rays
-    slopes = stage.bent(rays[..., 0], rays[..., 1])
-    return np.asarray(rays + np.stack([np.zeros_like(slopes[0]), np.zeros_like(slopes[0]), *slopes], axis=-1))
 
 
 def _scattered(
@@ -396,7 +387,7 @@ def _scattered(
         if stage.faces.pattern is not None:
             with stage.named():
                 share = share * np.asarray(stage.faces.pattern(x, y), dtype=np.float64)
-        bundle = _bent(stage, bundle)
+        bundle = stage.deflected(bundle)
         if stage.faces.spread is not None:
             spread = stage.faces.spread
             numbers = [points[:, next(column)] for _ in range(2 + (len(spread.kernels) > 1))]

@@ -63,15 +63,12 @@ def record(
     Raises:
         InputError: what `run_plan` refuses, or a tolerance that is not a number above 0 or not for rays.
     """
-    if isinstance(plan, Plan):
-        if tolerance is not None:
-            raise InputError("tolerance is for pictures made by rays; footprints have no sampling error")
-        picture = run_plan(plan, values, engine=engine, progress=progress)
-        return Recorded(picture, plan.missing_rays, plan.missing_reason)
-    if tolerance is not None and not tolerance > 0:
-        raise InputError(f"tolerance is a share of the picture's mean, greater than 0, not {tolerance}")
     from vcc.engines import rays
 
+    rays.check_tolerance(tolerance, by_rays=isinstance(plan, RayPlan))
+    if isinstance(plan, Plan):
+        picture = run_plan(plan, values, engine=engine, progress=progress)
+        return Recorded(picture, plan.missing_rays, plan.missing_reason)
     traced = rays.run(plan, values, chosen(engine, values), tolerance, progress)
     return Recorded(
         traced.values,

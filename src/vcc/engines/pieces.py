@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -20,7 +19,8 @@ from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.engines import EngineName, Progress, Recorded, record
-from vcc.errors import InputError, ResultWarning
+from vcc.engines.rays import check_tolerance, warn_of_error
+from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.plan.explain import Explanation, expected_memory, explain
 from vcc.plan.explain_rays import expected_memory as expected_ray_memory
@@ -147,10 +147,7 @@ def record_pieces(
         InputError: a limit that a single row of pixels does not fit, or that is more than there is; views that
             are missing or cannot be read; what `vcc.engines.record` refuses.
     """
-    if isinstance(plan, Plan) and tolerance is not None:
-        raise InputError("tolerance is for pictures made by rays; footprints have no sampling error")
-    if tolerance is not None and not tolerance > 0:
-        raise InputError(f"tolerance is a share of the picture's mean, greater than 0, not {tolerance}")
+    check_tolerance(tolerance, by_rays=isinstance(plan, RayPlan))
     light_field.check_complete()
     blocks = cut(plan, light_field, engine, memory_limit)
     try:
@@ -398,12 +395,7 @@ def _traced(
     samples, rays = plan.samples, whole.rays
     while tolerance is not None and error > tolerance * abs(float(picture.mean())):
         if samples * 2 > TABLE:
-            warnings.warn(
-                f"the sampling error is {error / abs(float(picture.mean())):.2g} of the picture's mean after "
-                f"{samples} rays a pixel, the most there are; {tolerance:g} was asked for",
-                ResultWarning,
-                stacklevel=4,
-            )
+            warn_of_error(error / abs(float(picture.mean())), samples, tolerance, 5)
             break
         (more,) = _summed([_beside(replace(plan, samples=samples))], light_field, blocks, engine, progress)
         error = _root_mean_square(picture - more) / 2

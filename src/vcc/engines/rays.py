@@ -6,6 +6,7 @@ All three trace the same rays. The plain way is the plan's own (`RayPlan.looked_
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.errors import InputError, ResultWarning
 from vcc.plan.rays import TABLE, CellWindows, RayPlan, Window
 from vcc.sampled import to_dtype
 
@@ -70,16 +72,7 @@ def run(
     round_number = 0
     while tolerance is not None and traced.sampling_error > tolerance * abs(_mean(traced.values)):
         if traced.samples * 2 > TABLE:
-            import warnings
-
-            from vcc.errors import ResultWarning
-
-            warnings.warn(
-                f"the sampling error is {traced.sampling_error / abs(_mean(traced.values)):.2g} of the picture's "
-                f"mean after {traced.samples} rays a pixel, the most there are; {tolerance:g} was asked for",
-                ResultWarning,
-                stacklevel=4,
-            )
+            warn_of_error(traced.sampling_error / abs(_mean(traced.values)), traced.samples, tolerance, 5)
             break
         round_number += 1
         # As many rays again, from the block beside the ones taken: together they are one larger even set.
@@ -93,6 +86,30 @@ def run(
             samples=2 * traced.samples,
         )
     return traced
+
+
+def check_tolerance(tolerance: float | None, by_rays: bool) -> None:
+    """Refuse a tolerance that is not one.
+
+    Raises:
+        InputError: it is for pictures by rays only, and a number above 0.
+    """
+    if tolerance is None:
+        return
+    if not by_rays:
+        raise InputError("tolerance is for pictures made by rays; footprints have no sampling error")
+    if not tolerance > 0:
+        raise InputError(f"tolerance is a share of the picture's mean, greater than 0, not {tolerance}")
+
+
+def warn_of_error(error: float, samples: int, tolerance: float, stacklevel: int) -> None:
+    """Say that the most rays that there are do not reach a tolerance; the error is a share of the mean."""
+    warnings.warn(
+        f"the sampling error is {error:.2g} of the picture's mean after {samples} rays a pixel, the most there "
+        f"are; {tolerance:g} was asked for",
+        ResultWarning,
+        stacklevel=stacklevel,
+    )
 
 
 def _doubled(plan: RayPlan, round_number: int) -> RayPlan:

@@ -137,11 +137,7 @@ class _Bundle:
         x, y = (self.rays[:, :2] - stage.element.decentre).T
         if stage.faces.pattern is not None:
             self.share = self.share * stage.faces.pattern(x, y)
-        if stage.centred is not None:
-            self.rays = stage.centred(self.rays)
-        elif stage.faces.bending is not None:
-            slopes = stage.bent(*self.rays[:, :2].T)
-            self.rays = self.rays + np.column_stack([np.zeros((len(self.rays), 2)), *slopes])
+        self.rays = stage.deflected(self.rays)
         if stage.faces.spread is not None and split_along is not None:
             with stage.named():
                 scattered = branches(stage.faces.spread, split_along, x, y)
