@@ -7,10 +7,9 @@ import warnings
 import imagecodecs
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import vcc
-from vcc.cli.commands import app
+from command_line import KNOWN, refused, run, write_views
 from vcc.cli.console import as_options
 
 CAMERA = """
@@ -24,7 +23,6 @@ z = "52 mm"
 shape = [12, 16]
 pitch = "1 mm"
 """
-KNOWN = ["--spacing", "1 mm", "--slope-per-pixel", "0.02", "--focus-distance", "1.3 m"]
 
 
 @pytest.fixture
@@ -32,24 +30,8 @@ def folder(tmp_path, monkeypatch):
     """A folder to work in, with a camera file and a light field of 3 × 3 views."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "camera.toml").write_text(CAMERA)
-    (tmp_path / "views").mkdir()
-    texture = np.random.default_rng(1).integers(40, 255, (24, 28, 3), np.uint8)
-    for row, column in np.ndindex(3, 3):
-        view = np.ascontiguousarray(texture[2 - row : 22 - row, 2 - column : 26 - column])
-        (tmp_path / "views" / f"view_{row}_{column}.png").write_bytes(imagecodecs.png_encode(view))
+    write_views(tmp_path / "views")
     return tmp_path
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-
-def refused(*arguments):
-    """What is said of bad input."""
-    result = run(*arguments)
-    assert result.exit_code == 2, result.output
-    assert "Traceback" not in result.output
-    return result.stderr
 
 
 def test_capture_writes_a_picture_and_says_how(folder):

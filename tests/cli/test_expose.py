@@ -4,10 +4,9 @@ import imagecodecs
 import numpy as np
 import pytest
 import tifffile
-from typer.testing import CliRunner
 
 import vcc
-from vcc.cli.commands import app
+from command_line import KNOWN, refused, run, write_views
 
 CAMERA = """
 [[elements]]
@@ -20,7 +19,6 @@ z = "52 mm"
 shape = [12, 16]
 pitch = "1 mm"
 """
-KNOWN = ["--spacing", "1 mm", "--slope-per-pixel", "0.02", "--focus-distance", "1.3 m"]
 
 
 @pytest.fixture
@@ -28,11 +26,7 @@ def folder(tmp_path, monkeypatch):
     """A folder to work in, with a camera file and a light field of 3 × 3 views."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "camera.toml").write_text(CAMERA)
-    (tmp_path / "views").mkdir()
-    texture = np.random.default_rng(1).integers(40, 255, (24, 28, 3), np.uint8)
-    for row, column in np.ndindex(3, 3):
-        view = np.ascontiguousarray(texture[2 - row : 22 - row, 2 - column : 26 - column])
-        (tmp_path / "views" / f"view_{row}_{column}.png").write_bytes(imagecodecs.png_encode(view))
+    write_views(tmp_path / "views")
     return tmp_path
 
 
@@ -41,17 +35,6 @@ def electronics(folder):
     """The camera of the file, with electronics behind a colour filter."""
     with (folder / "camera.toml").open("a") as file:
         file.write('[sensor.electronics]\ncolor_filter = "RGGB"\n')
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-
-def refused(*arguments):
-    result = run(*arguments)
-    assert result.exit_code == 2, result.output
-    assert "Traceback" not in result.output
-    return result.stderr
 
 
 @pytest.mark.usefixtures("folder", "electronics")

@@ -7,10 +7,9 @@ import warnings
 import imagecodecs
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import vcc
-from vcc.cli.commands import app
+from command_line import KNOWN, refused, run, write_views
 from vcc.cli.options import memory_size
 from vcc.store import create_store, open_store
 
@@ -25,7 +24,6 @@ z = "52 mm"
 shape = [12, 16]
 pitch = "1 mm"
 """
-KNOWN = ["--spacing", "1 mm", "--slope-per-pixel", "0.02", "--focus-distance", "1.3 m"]
 
 
 @pytest.fixture
@@ -33,32 +31,13 @@ def codes(tmp_path, monkeypatch):
     """The views of a folder, 3 × 3 pictures of 8 bits; this is the folder to work in."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "camera.toml").write_text(CAMERA)
-    (tmp_path / "views").mkdir()
-    texture = np.random.default_rng(1).integers(40, 255, (24, 28, 3), np.uint8)
-    views = np.empty((3, 3, 20, 24, 3), np.uint8)
-    for row, column in np.ndindex(3, 3):
-        views[row, column] = texture[2 - row : 22 - row, 2 - column : 26 - column]
-        (tmp_path / "views" / f"view_{row}_{column}.png").write_bytes(
-            imagecodecs.png_encode(views[row, column].copy())
-        )
-    return views
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+    return write_views(tmp_path / "views")
 
 
 def done(*arguments):
     result = run(*arguments)
     assert result.exit_code == 0, result.output
     return result.stdout
-
-
-def refused(*arguments):
-    result = run(*arguments)
-    assert result.exit_code == 2, result.output
-    assert "Traceback" not in result.output
-    return result.stderr
 
 
 def stored_codes(name):
