@@ -255,7 +255,9 @@ def _depth_figure(
     far, near = 1 / ends[1], 1 / ends[0]
     margin = 0.1 * (near - far)
     axes.set_facecolor("#bbbbbb")
-    shown = figures.put(axes, vergence, "distance", vmin=max(far - margin, 0), vmax=near + margin, cmap="viridis")
+    shown = figures.put(
+        axes, vergence, "1/distance of what is seen", vmin=max(far - margin, 0), vmax=near + margin, cmap="viridis"
+    )
     bar = figure.colorbar(shown, ax=axes, shrink=0.8)
     bar.set_label("1/distance [1/m]", fontsize=figures.LABEL)
     return figure
