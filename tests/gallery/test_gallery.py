@@ -70,6 +70,7 @@ def test_the_page_says_what_was_measured_and_whether_the_claim_was_reached(tmp_p
         assert words in page
     assert "Someone &amp; others" in page
     assert 'src="grey.png"' in page
+    assert page.count("<tr>") == 1 + len(numbers)  # the head, and a row a finding
     written = read_picture(tmp_path / "new" / "folder" / "grey.png")[0]
     np.testing.assert_allclose(written / 255, grey, atol=0.5 / 255 + 1e-6)  # half a step of 8 bits
     assert not result.reached

@@ -54,8 +54,6 @@ def numbers_table(numbers: Sequence[Finding]) -> str:
     rows = "\n".join(
         f"<tr><td>{escape(number.what)}</td><td>{escape(number.claim) or '–'}</td>"
         f"<td>{escape(number.measured)}</td>"
-        f"<tr><td>{escape(number.what)}</td><td>{escape(number.claim) or '–'}</td>"
-        f"<td>{escape(number.measured)}</td>"
         f"<td>{VERDICTS[number.reached]}</td><td class=note>{escape(number.why)}</td></tr>"
         for number in numbers
     )
