@@ -58,6 +58,22 @@ def test_no_texture_no_confidence() -> None:
     assert depth_by_biprism(recording(0.7, contrast=0), CAMERA, (0.3, 4)).confidence.max() < 0.3
 
 
+def test_what_repeats_is_not_trusted() -> None:
+    """Bars 12 pixels apart match at 5 separations of the range alike; one bar among them matches at one only."""
+    bars = 1 + 0.5 * np.cos(2 * np.pi * np.arange(540) / 12)
+    image = vcc.Image(np.broadcast_to(bars, (41, 540)).astype(np.float32), SENSOR.frame)
+    found = depth_by_biprism(image, CAMERA, (0.3, math.inf))
+    # Partners of blocks further out lie on the sensor's left half at one separation only.
+    assert found.confidence[:, found.columns < 480].max() < 1e-6
+    middle = 540 // 2
+    bars[middle + 110 : middle + 114] = bars[middle + 110 - 228 : middle + 114 - 228] = 2
+    image = vcc.Image(np.broadcast_to(bars, (41, 540)).astype(np.float32), SENSOR.frame)
+    found = depth_by_biprism(image, CAMERA, (0.3, math.inf))
+    holds_it = np.abs(found.columns - (middle + 112)) < 7
+    np.testing.assert_allclose(found.separation[:, holds_it], 228, atol=1e-6)  # 19 bars, and the mark
+    assert found.confidence[:, holds_it].min() > 0.95
+
+
 def test_outside_the_range_nothing_is_trusted() -> None:
     found = depth_by_biprism(recording(0.4), CAMERA, (1.0, 4.0))
     assert np.median(found.confidence) == 0

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 _FLOOR = 2e-3  # of the brightest pixel: contrast below is no texture
 _REFINEMENTS = 6
+_AHEAD = 0.05  # correlation by which the best match leads the next one, where it is trusted in full
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class StereoDepth:
             not be matched inside the picture.
         distance: metres before the entrance plane, likewise; infinite where a separation is at or beyond that of
             infinity.
-        confidence: 0 (no texture, or no match) to 1, likewise.
+        confidence: 0 (no texture, no match, or several alike) to 1, likewise.
         rows: the row of each block's middle, pixels, shape (block rows,).
         columns: likewise the column, shape (block columns,).
     """
@@ -149,6 +150,7 @@ def depth_by_biprism(
     separation, confidence = _refined(values, rows, columns, shifts[best].astype(np.float64), half)
     at_end = (best == 0) | (best == len(shifts) - 1)
     lost = ~found | at_end | (np.abs(separation - shifts[best]) > 1.5)
+    confidence *= _distinct(correlation)
     confidence[lost] = 0
     separation[~found] = np.nan
     separation[found & lost] = shifts[best][found & lost]
@@ -252,6 +254,15 @@ def _correlations(
             other = _standard(windows[np.ix_(rows - half, partner[there] - half)], floor)
             result[n][:, there] = np.einsum("rcij,rcij->rc", own[:, there], other)
     return result
+
+
+def _distinct(correlation: Array) -> Array:
+    """0 where another separation matches as well as the best one (repeated patterns), to 1 where none does."""
+    padded = np.pad(correlation, ((1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
+    peaks = (correlation >= padded[:-2]) & (correlation >= padded[2:]) & np.isfinite(correlation)
+    heights = np.sort(np.where(peaks, correlation, 0.0), axis=0)
+    ahead = heights[-1] - heights[-2]
+    return np.asarray(np.clip(ahead / _AHEAD, 0, 1))
 
 
 def _standard(blocks: Array, floor: float) -> Array:
