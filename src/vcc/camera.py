@@ -396,7 +396,7 @@ class Camera:
             light_field: given at the entrance plane.
             z: the plane, metres behind the entrance plane.
             before: whether to stop before the elements that stand exactly at z.
-            memory_limit: bytes that new samples may take; None takes `vcc.operators.MEMORY_LIMIT`.
+            memory_limit: bytes that new samples may take; None takes `vcc.memory.MEMORY_LIMIT`.
                 Without a mask or a diffuser on the way nothing is allocated.
 
         Raises:

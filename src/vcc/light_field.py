@@ -240,7 +240,7 @@ class LightField:
 
         Args:
             mask: its z is not looked at: it lies where the light field is.
-            memory_limit: bytes that the new samples may take; None takes `vcc.operators.MEMORY_LIMIT`.
+            memory_limit: bytes that the new samples may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
         Raises:
             InputError: more memory needed than allowed.
@@ -261,7 +261,7 @@ class LightField:
         Args:
             diffuser: a `vcc.Diffuser`, a `vcc.CodedDiffuser` or any element that scatters and does not bend. Its z
                 is not looked at: it lies where the light field is. Its rim absorbs.
-            memory_limit: bytes that the new samples may take; None takes `vcc.operators.MEMORY_LIMIT`.
+            memory_limit: bytes that the new samples may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
         Raises:
             InputError: an element that does not scatter or that bends rays, a frame in which places depend on the
@@ -289,7 +289,7 @@ class LightField:
             frame: 5×5, from the new grid's indices to rays at this plane.
             shape: (v, u, t, s) of the new grid.
             interpolation: ``"nearest"``, ``"linear"`` (4-D) or ``"cubic"`` (4-D cubic spline, cut at zero).
-            memory_limit: bytes that the new samples may take; None takes `vcc.operators.MEMORY_LIMIT`.
+            memory_limit: bytes that the new samples may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
         Raises:
             InputError: more memory needed than allowed, an unknown interpolation or a wrong shape.

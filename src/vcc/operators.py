@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.errors import InputError
+from vcc.memory import check_samples
 from vcc.patterns import Pattern
 from vcc.plan.planes import Plane, depends_on_view_only, mask_lookup
 from vcc.sampled import LIGHT_FIELD_AXES, to_numpy
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     from vcc.light_field import LightField
     from vcc.optics import Element, Mask, Scatter
     from vcc.sensor import Sensor
-
-MEMORY_LIMIT = 4 * 2**30
-"""Bytes that an operator may allocate for new samples where the caller sets no limit of their own."""
 
 SPLINE_ORDER = {"nearest": 0, "linear": 1, "cubic": 3}
 
@@ -44,14 +42,14 @@ def masked_at(
         light_field: at some plane.
         planes: for each pattern: the pattern, the place (x, y) of its middle in metres, and the map of rays
             from the light field's plane to the pattern's.
-        memory_limit: bytes; None takes `MEMORY_LIMIT`.
+        memory_limit: bytes; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Raises:
         InputError: more memory needed than allowed.
     """
     if not planes:
         return light_field
-    check_memory(light_field.shape, memory_limit, "the masked light field")
+    check_samples(light_field.shape, memory_limit, "the masked light field")
     values = to_numpy(light_field.values)
     result = np.empty(values.shape, dtype=np.float32)
     tables = [_weight_table(light_field, *plane) for plane in planes]
@@ -131,7 +129,7 @@ def scattered_by(light_field: LightField, stage: Stage, memory_limit: int | None
     Args:
         light_field: at the stage's plane.
         stage: with a scatter face.
-        memory_limit: bytes; None takes `MEMORY_LIMIT`.
+        memory_limit: bytes; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Raises:
         InputError: places of rays that depend on the pixel, not on the view alone; a kernel over too many samples;
@@ -154,7 +152,7 @@ def scattered_by(light_field: LightField, stage: Stage, memory_limit: int | None
         weights = _view_weights(scatter, light_field, stage.element.decentre)
     high, wide = (max(one.shape[axis] // 2 for row in weights for one in row) for axis in (0, 1))
     shape = (nv, nu, nt + 2 * high, ns + 2 * wide, *light_field.shape[4:])
-    check_memory(shape, memory_limit, f"the light field behind {label}")
+    check_samples(shape, memory_limit, f"the light field behind {label}")
     values = to_numpy(light_field.values)
     result = np.zeros(shape, dtype=np.float32)
     for j, i in np.ndindex(nv, nu):
@@ -211,7 +209,7 @@ def resampled(
         raise InputError(f"interpolation is one of {', '.join(map(repr, SPLINE_ORDER))}, not {interpolation!r}")
     if len(shape) != 4 or min(shape) < 1:
         raise InputError(f"a grid has the shape (v, u, t, s), each at least 1, not {shape}")
-    check_memory((*shape, light_field.channels or 1), memory_limit, "the resampled light field")
+    check_samples((*shape, light_field.channels or 1), memory_limit, "the resampled light field")
     old_from_new = light_field.frame.inverse() @ frame
     axes = list(np.argsort(LIGHT_FIELD_AXES))
     matrix, offset = old_from_new.linear[np.ix_(axes, axes)], old_from_new.offset[axes]
@@ -247,26 +245,3 @@ def projected(light_field: LightField, sensor: Sensor) -> Image:
     from vcc.camera import Camera
 
     return Camera([], replace(sensor, z=0.0)).capture(light_field)
-
-
-def check_memory(shape: tuple[int, ...], limit: int | None, what: str) -> None:
-    """Refuse to allocate float32 samples of this shape above a limit.
-
-    Raises:
-        InputError: with the bytes needed, the bytes allowed and what to do.
-    """
-    allowed = MEMORY_LIMIT if limit is None else limit
-    needed = 4 * int(np.prod([int(n) for n in shape], dtype=object))
-    if needed > allowed:
-        raise InputError(
-            f"{what} of shape {'×'.join(map(str, shape))} needs {_bytes(needed)}, and {_bytes(allowed)} are "
-            "allowed: work on a piece (lf[:, :, ::4, ::4]), choose a coarser grid, or pass memory_limit= in bytes"
-        )
-
-
-def _bytes(number: float) -> str:
-    for unit in ("bytes", "KiB", "MiB"):
-        if number < 1024:
-            return f"{number:.4g} {unit}"
-        number /= 1024
-    return f"{number:.4g} GiB"

@@ -2,7 +2,7 @@
 
 Layers, lowest first; a module may import from its own layer and from those below::
 
-    errors < units < describe, electronics < affine < sampled < light_field, image, sensor
+    errors < units, memory < describe, electronics < affine < sampled < light_field, image, sensor
     < patterns, kernels, surfaces < optics < camera < plan < engines < operators, formats, sources, parallax, plot,
     cli, demo, ...
 
@@ -24,7 +24,7 @@ ROOT = Path(vcc.__file__).parent
 
 LAYERS: list[set[str]] = [
     {"errors"},
-    {"units"},
+    {"units", "memory"},
     {"describe", "electronics"},
     {"affine"},
     {"sampled"},

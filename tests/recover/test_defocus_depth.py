@@ -137,7 +137,7 @@ K = [np.full((n, n), 1 / n**2) for n in (3, 5)]
         (np.ones((90, 90)), K, {"noise": 0}, "noise must be greater than 0"),
         (np.ones((90, 90)), K, {"block": 2}, "block is 4 pixels or more"),
         (np.ones((90, 90)), K, {"block": 4}, "largest kernel has 5 pixels"),
-        (np.ones((90, 90)), K, {"memory_limit": 1000}, "MiB.*memory_limit"),
+        (np.ones((90, 90)), K, {"memory_limit": 1000}, "1000 bytes are allowed.*memory_limit"),
     ],
 )
 def test_bad_input_is_refused(image, kernels, options, message) -> None:

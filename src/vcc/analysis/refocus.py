@@ -96,7 +96,7 @@ class Refocuser:
             None weighs all alike.
         border: pixels added on each side of the pictures, in which one border fades into the opposite one: what a
             transform takes to lie beyond a border is there, and not at the opposite end of the picture.
-        memory_limit: bytes that the transform may take; None takes `vcc.operators.MEMORY_LIMIT`.
+        memory_limit: bytes that the transform may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Raises:
         InputError: a light field on disk, weights of another shape, negative or all zero, a negative border, or

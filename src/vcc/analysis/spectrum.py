@@ -26,7 +26,7 @@ from vcc.affine import Affine
 from vcc.analysis.plane_spectrum import PlaneSpectrum, transformed_along
 from vcc.errors import InputError
 from vcc.light_field import LightField
-from vcc.operators import MEMORY_LIMIT
+from vcc.memory import check_samples
 from vcc.sampled import LIGHT_FIELD_AXES, to_numpy
 
 Array = NDArray[np.float64]
@@ -216,7 +216,7 @@ def fft4(
         window: by which samples are weighted towards the borders, which otherwise show as crosses: the name of
             one of `scipy.signal.get_window` such as ``"hann"``, or a tuple of a name and numbers, for all four
             axes; or a list of four, for (v, u, t, s), with None for an axis left as it is.
-        memory_limit: bytes that the spectrum may take; None takes `vcc.operators.MEMORY_LIMIT`.
+        memory_limit: bytes that the spectrum may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Raises:
         InputError: a light field on disk, an unknown window, or more memory needed than allowed (said before
@@ -247,7 +247,7 @@ def ifft4(spectrum: Spectrum, *, memory_limit: int | None = None) -> LightField:
 
     Args:
         spectrum: see `fft4`; of a real light field, F(−f) is the conjugate of F(f).
-        memory_limit: bytes that the work may take; None takes `vcc.operators.MEMORY_LIMIT`.
+        memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Returns:
         Float32 samples on the frame `spectrum.light_field_frame`.
@@ -273,7 +273,7 @@ def samples_of(spectrum: Spectrum, *, memory_limit: int | None = None) -> NDArra
 
     Args:
         spectrum: see `ifft4`.
-        memory_limit: bytes; None takes `vcc.operators.MEMORY_LIMIT`.
+        memory_limit: bytes; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Raises:
         InputError: samples that are not real by more than rounding, or more memory needed than allowed.
@@ -298,14 +298,8 @@ def check_size(shape: Sequence[int], limit: int | None, what: str) -> None:
     Raises:
         InputError: with the size, the limit and what to do.
     """
-    allowed = MEMORY_LIMIT if limit is None else limit
-    needed = 8 * int(np.prod([int(n) for n in shape], dtype=object))
-    if needed > allowed:
-        raise InputError(
-            f"{what} of shape {'×'.join(map(str, shape))} needs {needed / 2**20:.4g} MiB, and "
-            f"{allowed / 2**20:.4g} MiB are allowed: transform a piece (lf[:, :, :256, :256], or lf[..., :1] for "
-            "one channel), or pass memory_limit= in bytes"
-        )
+    piece = "transform a piece (lf[:, :, :256, :256], or lf[..., :1] for one channel)"
+    check_samples(shape, limit, what, piece, each=8)
 
 
 def _coordinate(name: str) -> int:

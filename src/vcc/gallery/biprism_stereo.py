@@ -69,9 +69,9 @@ def run(bench: Bench, progress: Progress) -> Result:
     )
     text = paragraphs(
         [
-            f"A biprism of δ = {stereo.deflection:.3f} for each face stands {story.length(stereo.ahead)} before a "
-            f"lens of f = {story.length(bench.focal_length)} and {story.length(OPENING)} opening. Each half of the "
-            "sensor looks through one face: two cameras with a baseline of 2·δ·a = "
+            f"A biprism of δ = {stereo.deflection:.3f} for each face stands {story.length(stereo.ahead)} before "
+            f"a lens of f = {story.length(bench.focal_length)} and {story.length(OPENING)} opening. Each half of "
+            "the sensor looks through one face: two cameras with a baseline of 2·δ·a = "
             f"{story.length(stereo.baseline)}, turned towards each other by 2·δ.",
             "A point’s two pictures are 2·δ·d·Z/(Z + a) apart. Blocks of one half are looked for in the other by "
             "normalised correlation, then to a fraction of a pixel along the gradient (Lucas and Kanade), and "

@@ -21,13 +21,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.errors import InputError
+from vcc.memory import check_memory
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 Borders = Literal["unknown", "periodic"]
 
-MEMORY_LIMIT = 2**32
-"""Bytes that a solver may take, unless told otherwise."""
 SUM_TOLERANCE = 1e-6
 """How far from 1 a PSF, or the masks of a pixel, may sum to."""
 _PRESENT = 1e-9
@@ -261,7 +260,7 @@ def richardson_lucy(
         iterations: at most.
         tolerance: stop once a step changes the picture by no more than this share, ‖Δx‖ ≤ tolerance·‖x‖.
         borders: see `blurred`.
-        memory_limit: bytes; None takes `MEMORY_LIMIT`.
+        memory_limit: bytes; None takes `vcc.memory.MEMORY_LIMIT`.
         progress: called with (steps done, most steps).
 
     Raises:
@@ -344,7 +343,7 @@ def sparse_gradients(
         iterations: at most.
         tolerance: stop once a step lowers the objective by no more than this share.
         borders: see `blurred`.
-        memory_limit: bytes; None takes `MEMORY_LIMIT`.
+        memory_limit: bytes; None takes `vcc.memory.MEMORY_LIMIT`.
         progress: called with (steps done, most steps).
 
     Raises:
@@ -548,11 +547,6 @@ def _check_steps(iterations: int, tolerance: float) -> None:
 
 
 def _check_memory(blur: _Blur, channels: int, copies: int, memory_limit: int | None) -> None:
-    limit = MEMORY_LIMIT if memory_limit is None else memory_limit
     needed = 8 * blur.domain[0] * blur.domain[1] * (copies * channels + 5 * len(blur.psfs))
-    if needed > limit:
-        raise InputError(
-            f"deblurring {channels} channels of {blur.domain[0]}×{blur.domain[1]} samples takes "
-            f"{needed / 2**20:.0f} MiB, more than memory_limit = {limit / 2**20:.0f} MiB: deblur channel by "
-            "channel, or raise memory_limit="
-        )
+    what = f"deblurring {channels} channels of {blur.domain[0]}×{blur.domain[1]} samples"
+    check_memory(needed, memory_limit, what, "deblur channel by channel")

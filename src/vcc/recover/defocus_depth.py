@@ -20,12 +20,10 @@ from vcc.camera import Camera
 from vcc.errors import InputError, ResultWarning
 from vcc.image import Image
 from vcc.light_field import LightField
+from vcc.memory import check_memory
 from vcc.sampled import to_numpy
 
 Array = NDArray[np.float64]
-
-MEMORY_LIMIT = 2**30
-"""Bytes that the work may take, unless asked otherwise."""
 
 _VIEWS_PER_PIXEL = 4  # of a kernel's width: a hole's edge is right to a share of a quarter pixel
 _FEWEST_VIEWS = 32
@@ -141,7 +139,7 @@ def depth_from_defocus(
         noise: standard deviation of the noise of a pixel (of the mean of its channels), in the picture's units.
         block: side of the blocks, pixels, no smaller than the kernels. The window gives weight to its middle half.
         step: from block to block, pixels; None takes half a block.
-        memory_limit: bytes that the work may take; None takes `MEMORY_LIMIT`.
+        memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Returns:
         The distances of blocks side by side from the upper left corner on.
@@ -172,12 +170,7 @@ def depth_from_defocus(
             "smaller block"
         )
     needed = 8 * starts[0].size * starts[1].size * (3 * block**2 + len(spreads)) + 8 * 4 * (_FINER * block) ** 2
-    limit = MEMORY_LIMIT if memory_limit is None else memory_limit
-    if needed > limit:
-        raise InputError(
-            f"depth from defocus takes {needed / 2**20:.0f} MiB for this picture, and memory_limit is "
-            f"{limit / 2**20:.0f} MiB: give a part of the picture, or a higher memory_limit"
-        )
+    check_memory(needed, memory_limit, "depth from defocus", "give a part of the picture")
     profile = np.sin(np.pi * (np.arange(block) + 0.5) / block) ** 2
     window = np.outer(profile, profile)
     spectra = _spectra(values, starts, window)

@@ -22,17 +22,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.errors import InputError
 from vcc.light_field import LightField
+from vcc.memory import check_memory
 from vcc.sampled import to_numpy
 
 Array = NDArray[np.float32]
-
-MEMORY_LIMIT = 2**30
-"""Bytes that a depth map may take while it is made, unless asked otherwise."""
 
 _NOISE = 0.006  # of full scale, on the square-root scale: what 8 bits and JPEG leave
 _TRUNCATION = 0.02  # of full scale, likewise: a difference that is no match, whatever its size
 _FARTHEST_TILT = 0.75  # pixels per view from the nearest whole shear: beyond, the next shear sees it better
 _PIXELS = {"u": 2, "v": 1}
+_PART = "give a part of the light field"
 """The axis of a picture, (channel, t, s), along which it moves from view to view."""
 _SOFTNESSES = 9  # fractions of a pixel in sixteenths, up to a half
 _SMOOTHING = (3 / 16, 10 / 16, 3 / 16)
@@ -143,7 +142,7 @@ def depth_by_structure_tensor(
             `vcc.LightField.measured_disparity_range`, widened by 0.3 if it was measured.
         inner_scale: σ of the Gaussian under which derivatives are taken, pixels and views.
         outer_scale: σ of the Gaussian over which their products are summed, pixels and views.
-        memory_limit: bytes that the work may take; None takes `MEMORY_LIMIT`.
+        memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Returns:
         Depth of the middle view (row (n − 1) // 2, likewise column). Disparities are not held to the range to
@@ -159,7 +158,7 @@ def depth_by_structure_tensor(
     crosses = _crosses(light_field, geometry)
     samples = max(views.size for views, _ in crosses)
     # Beside the samples of one cross: its shear, two derivatives, a product and its smoothed copy.
-    _check_memory("depth by the structure tensor", 6 * 4 * samples, memory_limit)
+    check_memory(6 * 4 * samples, memory_limit, "depth by the structure tensor", _PART)
     best = np.zeros((2, *light_field.shape[2:4]), np.float32)  # disparity, confidence
     for views, along in crosses:
         disparity, clarity, left = np.full((3, *light_field.shape[2:4]), np.inf, np.float32)
@@ -203,7 +202,7 @@ def depth_by_plane_sweep(
             `vcc.LightField.measured_disparity_range`, widened by 0.3 if it was measured.
         step: between the disparities tried, pixels per view.
         window: side of the window, pixels, an odd number.
-        memory_limit: bytes that the costs and the work may take; None takes `MEMORY_LIMIT`.
+        memory_limit: bytes that the costs and the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
         progress: called with (done, total) as the sweep advances.
 
     Returns:
@@ -223,7 +222,8 @@ def depth_by_plane_sweep(
     crosses = _crosses(light_field, geometry)
     rows, columns = light_field.shape[2:4]
     needed = 4 * (rows * columns * (len(tried) + 24) + 3 * sum(views.size for views, _ in crosses))
-    _check_memory(f"a sweep of {len(tried)} disparities over {rows}×{columns} pixels", needed, memory_limit)
+    what = f"a sweep of {len(tried)} disparities over {rows}×{columns} pixels"
+    check_memory(needed, memory_limit, what, _PART)
     own = [views[geometry.view[1] if along == "u" else geometry.view[0]] for views, along in crosses]
     middles = [_as_if_moved(view, _PIXELS[along]) for view, (_, along) in zip(own, crosses, strict=True)]
     gather = _GuidedFilter(own[0].mean(axis=0), window)
@@ -350,15 +350,6 @@ def _check_scales(**scales: float) -> None:
     for name, value in scales.items():
         if not (value > 0 and math.isfinite(value)):
             raise InputError(f"{name} must be greater than 0, not {value}")
-
-
-def _check_memory(what: str, needed: int, limit: int | None) -> None:
-    limit = MEMORY_LIMIT if limit is None else limit
-    if needed > limit:
-        raise InputError(
-            f"{what} takes {needed / 2**20:.0f} MiB, and memory_limit is {limit / 2**20:.0f} MiB: give a part "
-            "of the light field, or a higher memory_limit"
-        )
 
 
 def _depth_map(geometry: _Geometry, disparity: Array, confidence: NDArray[np.floating]) -> DepthMap:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.image import Image
+from vcc.memory import check_memory, check_samples
 from vcc.recover.refocus import refocused
 
 if TYPE_CHECKING:
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 
-MEMORY_LIMIT = 2**31
-"""Bytes that a focal stack and the work on it may take together, unless told otherwise."""
 ENDINGS = (".mp4", ".gif")
 _NOTHING_SHARP = 1e-12
 """Sharpness relative to the picture's power below which there is no detail to choose by: all pictures count."""
@@ -102,7 +101,7 @@ class FocalStack:
             window: standard deviation of the Gaussian, pixels: wider ones are safer against noise, and smear the
                 choice over edges in depth.
             selectivity: 0 averages all pictures; infinite takes the sharpest alone.
-            memory_limit: bytes that the work may take; None takes `MEMORY_LIMIT`.
+            memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
         Raises:
             InputError: a window of zero or less, a negative selectivity, or more memory needed than allowed.
@@ -114,7 +113,8 @@ class FocalStack:
         if not selectivity >= 0:
             raise InputError(f"the selectivity is 0 or more, not {selectivity}")
         count, rows, columns = self.pictures.shape[:3]
-        _check_memory(3 * 8 * count * rows * columns + 2 * self.pictures[0].size * 8, memory_limit)
+        needed = 3 * 8 * count * rows * columns + 2 * self.pictures[0].size * 8
+        check_memory(needed, memory_limit, "an all-in-focus picture", "take fewer distances or smaller views")
         sharpness = np.empty((count, rows, columns))
         for picture, out in zip(self.pictures, sharpness, strict=True):
             channels = picture.reshape(rows, columns, -1).astype(np.float64)
@@ -246,7 +246,7 @@ def focal_stack(
     Args:
         light_field: in memory or on disk.
         distances: metres before its plane; see `focus_distances`.
-        memory_limit: bytes that the stack may take; None takes `MEMORY_LIMIT`.
+        memory_limit: bytes that the stack may take; None takes `vcc.memory.MEMORY_LIMIT`.
         progress: called with (pictures done, pictures).
         options: diameter, centre, interpolation and between_views, as `refocused` has them.
 
@@ -260,7 +260,7 @@ def focal_stack(
     _check_distances(distances)
     rows, columns = light_field.shape[2:4]
     shape = (len(distances), rows, columns, *((light_field.channels,) if light_field.channels else ()))
-    _check_memory(4 * math.prod(shape), memory_limit)
+    check_samples(shape, memory_limit, "the focal stack", "take fewer distances or smaller views")
     pictures = np.empty(shape, np.float32)
     frame = Affine.identity(2)
     for number, distance in enumerate(distances):
@@ -287,12 +287,3 @@ def _check_distances(distances: Sequence[float]) -> None:
             raise InputError(
                 f"a distance to focus on must be greater than 0 m (infinite is allowed), not {distance}"
             )
-
-
-def _check_memory(needed: int, memory_limit: int | None) -> None:
-    limit = MEMORY_LIMIT if memory_limit is None else memory_limit
-    if needed > limit:
-        raise InputError(
-            f"the focal stack needs {needed / 2**20:.0f} MiB, more than memory_limit = {limit / 2**20:.0f} MiB: "
-            "take fewer distances or smaller views, or raise memory_limit="
-        )

@@ -335,7 +335,7 @@ def decode_heterodyne(
             that is cut off the views. A Fourier transform takes what is beyond one edge for what is at the other;
             0 is for scenes that are alike there, as black ones are, and carriers that fit a whole number of times.
         memory_limit: bytes that the tiles and what is made of them may take; None takes
-            `vcc.operators.MEMORY_LIMIT`.
+            `vcc.memory.MEMORY_LIMIT`.
 
     Returns:
         float32 radiance, shape (v, u, t, s[, channels]), at the entrance plane, upright; 0 where ringing
@@ -358,11 +358,11 @@ def decode_heterodyne(
         white = white.mean(axis=2)
     if not white.mean() > 0:
         raise InputError("the calibration is dark: it must show a white scene through a pinhole")
-    from vcc.operators import check_memory
+    from vcc.memory import check_samples
 
     channels = raw[..., None] if raw.ndim == 2 else raw
     numbers = _WORKING_NUMBERS + channels.shape[2]  # of float32, for each sample
-    check_memory((geometry.views, geometry.views, *geometry.shape, numbers), memory_limit, "the stack of tiles")
+    check_samples((geometry.views, geometry.views, *geometry.shape, numbers), memory_limit, "the stack of tiles")
     fade = np.multiply.outer(*(_fade(size, border) for size in raw.shape[:2]))
     strengths = _tiles(white * fade, setup)
     _check_carriers(strengths)

@@ -619,7 +619,7 @@ def decode_plenoptic(
             lattices its √(√3/2), which keeps the number of samples.
         inverted: whether the recording is as light lands on the sensor, upside down, which is then turned. Views
             are upright either way.
-        memory_limit: bytes that the light field may take; None takes `vcc.operators.MEMORY_LIMIT`.
+        memory_limit: bytes that the light field may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Returns:
         float32, shape (v, u, t, s[, channels]), upright; 0 where the white image is dark, and where noise went
@@ -646,9 +646,9 @@ def decode_plenoptic(
     channels = raw.shape[2] if raw.ndim == 3 else None
     result = (*counts, *resampling.shape)
 
-    from vcc.operators import check_memory
+    from vcc.memory import check_samples
 
-    check_memory((*result, channels or 1), memory_limit, "the decoded light field")
+    check_samples((*result, channels or 1), memory_limit, "the decoded light field")
     planes = np.moveaxis(np.atleast_3d(raw), 2, 0).astype(np.float32)
     values = np.zeros((*result, channels or 1), np.float32)
     dark_samples = 0
