@@ -1,5 +1,12 @@
-"""What the pages show runs: their Python, their camera files, their links, and the example of an own element."""
+"""What the pages show runs: their Python, their camera files, their links, and the example of an own element.
 
+The reference names all that is public, and the gallery's pages are those of its cameras as they are now.
+"""
+
+import importlib
+import inspect
+import pkgutil
+import pydoc
 import re
 import runpy
 import warnings
@@ -12,6 +19,7 @@ import pytest
 
 import vcc
 from vcc.camera_file import ELEMENT_KINDS
+from vcc.gallery.page import plain
 from vcc.sources import PlanesScene, TexturedPlane
 
 ROOT = Path(__file__).parents[1]
@@ -161,3 +169,68 @@ def test_own_element_makes_rings_of_its_closed_form():
     ring = (radius > inner - margin) & (radius < outer + margin)
     assert image[near & ring].sum() > 0.999 * image[near].sum()
     assert image[radius < inner - margin].max() == 0
+
+
+def public_names():
+    """Each name in the ``__all__`` of a public package, with what it stands for."""
+    for info in pkgutil.walk_packages(vcc.__path__, "vcc."):
+        if not info.name.startswith(("vcc.cli", "vcc.engines", "vcc.plan", "vcc.__main__")):
+            module = importlib.import_module(info.name)
+            for name in getattr(module, "__all__", ()):
+                yield f"{info.name}.{name}", getattr(module, name)
+    for name in vcc.__all__:
+        yield f"vcc.{name}", getattr(vcc, name)
+
+
+def test_the_reference_has_every_public_name():
+    pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "reference").glob("*.md"))
+    shown = re.findall(r"^::: (\S+)$", pages, re.M)
+    assert len(shown) == len(set(shown))
+    documented = {name: pydoc.locate(name) for name in shown}
+    assert [name for name, found in documented.items() if found is None] == []
+    things = {id(found) for found in documented.values()}
+    missing = {
+        name
+        for name, thing in public_names()
+        if id(thing) not in things
+        and name not in documented
+        # A module is there with all that it holds, or name by name.
+        and not (inspect.ismodule(thing) and any(each.startswith(f"{thing.__name__}.") for each in shown))
+        and not inspect.ismodule(documented.get(getattr(thing, "__module__", "")))
+    }
+    assert missing == set(), "name them in docs/reference"
+
+
+@pytest.mark.parametrize("module", ["patterns", "kernels", "surfaces"])
+def test_the_reference_has_every_pattern_kernel_and_surface(module):
+    page = (ROOT / "docs" / "reference" / "patterns.md").read_text(encoding="utf-8")
+    members = re.search(rf"^::: vcc\.{module}\n.*?members: \[(.*?)\]", page, re.M | re.S)[1].split(", ")
+    home = getattr(vcc, module)
+    classes = {name for name, found in vars(home).items() if getattr(found, "__module__", "") == home.__name__}
+    public = {name for name in classes if inspect.isclass(getattr(home, name)) and not name.startswith("_")}
+    assert public <= set(members)
+    assert all(hasattr(home, name) for name in members)
+
+
+@pytest.mark.parametrize("name", vcc.gallery.ENTRIES)
+def test_every_camera_of_the_gallery_has_a_page_of_its_own_run(name):
+    pages = runpy.run_path(str(ROOT / "docs" / "gallery_pages.py"))
+    again = f"run: python docs/gallery_pages.py {name}"
+    page = ROOT / "docs" / "gallery" / f"{name}.md"
+    assert page.exists(), again
+    text = page.read_text(encoding="utf-8")
+    made = vcc.gallery.entry(name)
+    for words in (made.title, made.citation, made.claim):
+        assert plain(words) in text, again
+    assert f"source {pages['fingerprint'](name)}," in text, f"the camera's code has changed since; {again}"
+    assert f"]({name}.md)" in (page.parent / "index.md").read_text(encoding="utf-8"), again
+
+
+def test_no_page_or_picture_of_the_gallery_is_left_over():
+    names = {*vcc.gallery.ENTRIES}
+    assert {page.stem for page in (ROOT / "docs" / "gallery").iterdir()} - names == {"index"}
+    pictures = ROOT / "docs" / "images" / "gallery"
+    assert {folder.name for folder in pictures.iterdir()} <= names
+    shown = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "gallery").glob("*.md"))
+    for picture in pictures.rglob("*.*"):
+        assert f"../images/gallery/{picture.relative_to(pictures).as_posix()})" in shown

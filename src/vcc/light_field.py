@@ -250,7 +250,7 @@ class LightField:
         return masked(self, mask, memory_limit)
 
     def scattered(self, diffuser: Element, *, memory_limit: int | None = None) -> LightField:
-        """The light field just behind a diffuser that lies in its plane: the paper's convolution (section 3.2.2).
+        """The light field just behind a diffuser that lies in its plane: the paper’s convolution (equation 6).
 
         L'(u, v, s, t) = ∫ D(δs, δt | u, v) L(u, v, s − δs, t − δt) dδ, within each view, with samples interpolated
         linearly along the slopes. Each view gets as many more samples on each side as the kernel reaches, so that

@@ -46,8 +46,10 @@ class FolderInfo:
 
     Args:
         format: what its files follow, for people.
-        rows, columns: how many rows and columns of views.
-        height, width: pixels of a view.
+        rows: how many rows of views.
+        columns: how many columns of views.
+        height: of a view, pixels.
+        width: of a view, pixels.
         channels: colour channels; None for grey pictures.
         bits: bits per stored sample: 8, 16 or 32 (floating point).
         spacing: distance (dv, du) between neighbouring views, metres.
@@ -56,8 +58,8 @@ class FolderInfo:
         disparity_range: (lowest, highest), pixels per view; None if not stated.
         unknown: which of spacing, slope_per_pixel and focus_distance the folder does not state (or
             not with a unit), so that a default stands above.
-        files: files[row][column], row 0 at the top, column 0 at the left; None for a missing view; empty for a
-            light field in one file.
+        files: ``files[row][column]``, row 0 at the top, column 0 at the left; None for a missing view; empty for
+            a light field in one file.
         directions: +1 or −1 for rows and columns of views: whether the camera positions that the
             format states grow from one to the next; None if it states none.
         missing: (row, column) of the views that there are not.

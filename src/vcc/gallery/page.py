@@ -1,10 +1,12 @@
-"""The page of an entry: pictures, and a table of what was measured beside what was claimed."""
+"""The page of an entry, as HTML or Markdown: pictures, and what was measured beside what was claimed."""
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Sequence
 from html import escape
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import numpy as np
 
@@ -15,6 +17,8 @@ from vcc.formats.atomic import atomic_path
 from vcc.gallery.entry import Entry, Finding, Picture, Result
 
 VERDICTS = {True: "reached", False: "not reached", None: "–"}
+JPEG_QUALITY = 88
+"""Of photographs on Markdown pages: below it, noise and fine print begin to suffer."""
 
 
 def write_entry(entry: Entry, result: Result, folder: Path) -> Path:
@@ -31,11 +35,7 @@ def write_entry(entry: Entry, result: Result, folder: Path) -> Path:
     Raises:
         InputError: the folder cannot be made.
     """
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"the gallery cannot write to {folder}: {error.strerror or error}") from error
+    folder = _made(folder)
     rows = [[_written(picture, folder) for picture in row] for row in result.pictures]
     introduction = f"<p><i>{escape(entry.citation)}</i></p><p>{escape(entry.claim)}</p>"
     if result.assumed:
@@ -47,6 +47,56 @@ def write_entry(entry: Entry, result: Result, folder: Path) -> Path:
     page = folder / "index.html"
     write_page(page, entry.title, introduction, sections)
     return page
+
+
+def write_entry_markdown(
+    entry: Entry, result: Result, folder: Path, *, pictures: Path | None = None, note: str = ""
+) -> Path:
+    """Write an entry's page as Markdown, ``NAME.md``, for a site or a repository.
+
+    Photographs are JPEG, unless PNG is smaller; figures are PNG.
+
+    Args:
+        entry: whose run it was.
+        result: what came of it.
+        folder: where to write the page; made if missing.
+        pictures: folder for the pictures, to which the page has relative links; None for ``folder/NAME``.
+        note: Markdown at the end of the page, such as how it was made.
+
+    Returns:
+        The page.
+
+    Raises:
+        InputError: a folder cannot be made.
+    """
+    folder = _made(folder)
+    pictures = _made(folder / entry.name if pictures is None else pictures)
+    there = PurePath(os.path.relpath(pictures, folder)).as_posix()
+    parts = [f"# {plain(entry.title)}", f"*{plain(entry.citation)}*", plain(entry.claim)]
+    if result.assumed:
+        parts.append(f"{plain(result.assumed)}.")
+    if result.numbers:
+        parts += ["## Measured in this run", numbers_markdown(result.numbers)]
+    parts += ["## How", result.text]
+    parts += [
+        _row_markdown([(picture, _compact(picture, pictures)) for picture in row], there)
+        for row in result.pictures
+    ]
+    if note:
+        parts.append(note)
+    page = folder / f"{entry.name}.md"
+    with atomic_path(page) as temporary:
+        temporary.write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
+    return page
+
+
+def numbers_markdown(numbers: Sequence[Finding]) -> str:
+    """The numbers as a table in Markdown."""
+    lines = ["| what | claim | measured | verdict | why |", "|---|---|---|---|---|"]
+    for number in numbers:
+        cells = (number.what, number.claim or "–", number.measured, VERDICTS[number.reached], number.why)
+        lines.append("| " + " | ".join(plain(cell) for cell in cells) + " |")
+    return "\n".join(lines)
 
 
 def numbers_table(numbers: Sequence[Finding]) -> str:
@@ -64,14 +114,60 @@ def numbers_table(numbers: Sequence[Finding]) -> str:
     )
 
 
+def plain(text: str) -> str:
+    """Text for Markdown, in which nothing is markup, not even between the bars of a table."""
+    return re.sub(r"([\\`*_\[\]|])", r"\\\1", escape(" ".join(text.split()), quote=False))
+
+
+def _made(folder: Path) -> Path:
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"the gallery cannot write to {folder}: {error.strerror or error}") from error
+    return folder
+
+
+def _row_markdown(row: Sequence[tuple[Picture, str]], there: str) -> str:
+    """Pictures side by side; where the ``div`` is not understood, one below the other."""
+    figures = [
+        f"<figure markdown>\n\n![{plain(picture.title)}]({there}/{file})\n\n"
+        f"<figcaption><b>{escape(picture.title)}.</b> {picture.caption}</figcaption>\n\n</figure>"
+        for picture, file in row
+    ]
+    return "\n\n".join(['<div class="pictures" markdown>', *figures, "</div>"])
+
+
+def _compact(picture: Picture, folder: Path) -> str:
+    """Write a picture small enough for a site; returns its file's name."""
+    if not isinstance(picture.content, np.ndarray):
+        write_figure(picture.content, folder / f"{picture.name}.png")
+        return f"{picture.name}.png"
+    from imagecodecs import jpeg8_encode, png_encode
+
+    codes = _codes(picture.content)
+    encoded = {
+        "png": png_encode(codes, level=9),
+        "jpg": jpeg8_encode(codes, level=JPEG_QUALITY, subsampling="444"),
+    }
+    ending = min(encoded, key=lambda name: len(encoded[name]))
+    with atomic_path(folder / f"{picture.name}.{ending}") as temporary:
+        temporary.write_bytes(encoded[ending])
+    return f"{picture.name}.{ending}"
+
+
 def _written(picture: Picture, folder: Path) -> Panel:
     path = folder / f"{picture.name}.png"
     if isinstance(picture.content, np.ndarray):
         from imagecodecs import png_encode
 
-        codes = np.ascontiguousarray(np.rint(255 * np.clip(picture.content, 0, 1)).astype(np.uint8))
         with atomic_path(path) as temporary:
-            temporary.write_bytes(png_encode(codes))
+            temporary.write_bytes(png_encode(_codes(picture.content)))
     else:
         write_figure(picture.content, path)
     return Panel(path.name, picture.title, picture.caption)
+
+
+def _codes(values: np.ndarray) -> np.ndarray:
+    """8-bit codes of what screens are to show."""
+    return np.ascontiguousarray(np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8))

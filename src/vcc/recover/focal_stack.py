@@ -252,7 +252,7 @@ def focal_stack(
 
     Raises:
         InputError: no distances, one of zero or less, more memory needed than allowed, or what `refocused`
-        refuses.
+            refuses.
     """
     distances = tuple(float(distance) for distance in distances)
     if not distances:

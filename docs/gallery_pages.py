@@ -1,0 +1,107 @@
+"""Run cameras of the gallery and write their pages: python docs/gallery_pages.py [NAME…].
+
+Without a name, all of them; each takes up to two minutes. Writes docs/gallery/NAME.md with the pictures in
+docs/images/gallery/NAME, and the table of docs/gallery/index.md, which reads what the pages hold.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import hashlib
+import re
+import shutil
+from pathlib import Path
+
+import vcc
+from vcc.gallery import ENTRIES, Entry, Result, entry, write_entry_markdown
+from vcc.gallery.page import plain
+
+HERE = Path(__file__).parent
+PAGES = HERE / "gallery"
+PICTURES = HERE / "images" / "gallery"
+MODULES = HERE.parent / "src" / "vcc" / "gallery"
+FRAME = {"entry", "listing", "page"}
+"""Modules that hold no camera: a change of theirs does not change what was measured."""
+THUMBNAIL = 200
+"""Pixels that a thumbnail is high, at most."""
+_MARK = re.compile(r"<!-- run of ([\w-]+), source ([0-9a-f]+), claims reached (\d+) of (\d+) -->")
+_TABLE = re.compile(r"(<!-- table of the cameras -->\n).*?(<!-- end of the table -->)", re.S)
+
+
+def main() -> None:
+    """Run those named and write their pages, then the table."""
+    parser = argparse.ArgumentParser(description="Run cameras of the gallery and write their pages.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(ENTRIES))
+    for name in parser.parse_args().names or ENTRIES:
+        print(name)
+        made = entry(name)
+        write_page(made, made.run())
+    write_table()
+
+
+def fingerprint(name: str) -> str:
+    """A short hash of an entry's source and of the gallery's modules that it imports; layout does not count."""
+    waiting, sources = [name.replace("-", "_")], {}
+    while waiting:
+        module = waiting.pop()
+        sources[module] = (MODULES / f"{module}.py").read_text(encoding="utf-8")
+        for imported in ast.walk(ast.parse(sources[module])):
+            if isinstance(imported, ast.ImportFrom) and (imported.module or "").startswith("vcc.gallery"):
+                inside = imported.module.removeprefix("vcc.gallery").lstrip(".")
+                others = [inside] if inside else [alias.name for alias in imported.names]
+                waiting += [each for each in others if (MODULES / f"{each}.py").exists() and each not in sources]
+        waiting = [each for each in waiting if each not in FRAME]
+    text = "".join("".join(sources[module].split()) for module in sorted(sources))
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def write_page(made: Entry, result: Result) -> None:
+    """Write the page of a run and its pictures, and remove pictures of runs before."""
+    claims = [number.reached for number in result.numbers if number.reached is not None]
+    reached = f"claims reached {sum(claims)} of {len(claims)}"
+    note = (
+        f"---\n\nMade by `python docs/gallery_pages.py {made.name}` with vcc {vcc.__version__} on the built-in "
+        f"scene. `vcc gallery {made.name}` makes such a page as HTML, on a light field of your own too. The "
+        f"camera is [one file](../../src/vcc/gallery/{made.name.replace('-', '_')}.py).\n\n"
+        f"<!-- run of {made.name}, source {fingerprint(made.name)}, {reached} -->"
+    )
+    folder = PICTURES / made.name
+    shutil.rmtree(folder, ignore_errors=True)
+    write_entry_markdown(made, result, PAGES, pictures=folder, note=note)
+    _write_thumbnail(folder / f"{result.pictures[0][0].name}", folder / "thumbnail.jpg")
+
+
+def _write_thumbnail(picture: Path, path: Path) -> None:
+    from PIL import Image, ImageOps
+
+    (found,) = picture.parent.glob(f"{picture.name}.*")
+    with Image.open(found) as image:
+        side = min(image.size)  # the middle of what is much wider than high, or higher than wide
+        size = (min(image.width, 3 * side // 2), min(image.height, 3 * side // 2))
+        small = ImageOps.fit(image.convert("RGB"), size)
+    small.thumbnail((2 * THUMBNAIL, THUMBNAIL), Image.Resampling.LANCZOS)
+    small.save(path, quality=88)
+
+
+def write_table() -> None:
+    """Write the table of the gallery's front page from the pages that there are."""
+    lines = ["| | camera | published by | claims reached |", "|---|---|---|---|"]
+    for name in ENTRIES:
+        page = PAGES / f"{name}.md"
+        if not page.exists():
+            continue
+        made, mark = entry(name), _MARK.search(page.read_text(encoding="utf-8"))
+        if mark is None:
+            raise SystemExit(f"{page} was not written by this script: run it with the name {name}")
+        lines.append(
+            f"| [![](../images/gallery/{name}/thumbnail.jpg)]({name}.md) | [{plain(made.title)}]({name}.md) "
+            f"| {plain(made.citation)} | {mark[3]} of {mark[4]} |"
+        )
+    index = PAGES / "index.md"
+    text = index.read_text(encoding="utf-8")
+    index.write_text(_TABLE.sub(lambda m: m[1] + "\n" + "\n".join(lines) + "\n\n" + m[2], text), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
