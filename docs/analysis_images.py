@@ -9,9 +9,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import vcc
-from vcc.analysis import Refocuser, fft4, plot_spectrum, psf
+from vcc.analysis import Refocuser, fft4, plot_spectrum, psf, sampling_advice
 from vcc.formats.transfer import encode
 from vcc.kernels import TopHat
+from vcc.patterns import CosineSum
+from vcc.plot import plot_phase_space_stages
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
 from vcc.surfaces import Cubic
@@ -27,6 +29,8 @@ def main(folder: Path = HERE) -> None:
     draw_spectra(folder / "spectrum.png")
     draw_refocused(folder / "refocus.png")
     draw_points(folder / "points.png")
+    draw_phase_space(folder / "phase_space.png")
+    draw_sampling(folder / "sampling.png")
 
 
 def draw_spectra(path: Path) -> None:
@@ -92,6 +96,32 @@ def draw_points(path: Path) -> None:
             if column == 0:
                 axes.set_ylabel(f"{distance:g} m", fontsize=11)
     _save(figure, path)
+
+
+def draw_phase_space(path: Path) -> None:
+    """A row of pixels of the demo's scene on its way through a plenoptic camera of few, large lenslets."""
+    from vcc.demo.scene import demo_scene
+
+    field = demo_scene().light_field(
+        (1, 40), (180, 250), spacing=0.4 * mm, slope_per_pixel=1.2e-3, focus_distance=1.3, dtype=np.float32
+    )
+    image = 1 / (1 / (50 * mm) - 1 / 1.3)
+    lens = vcc.Lens(focal_length=50 * mm, diameter=16 * mm)
+    lenslets = vcc.LensArray(pitch=1 * mm, focal_length=3 * mm, z=image)
+    camera = vcc.Camera([lens, lenslets], vcc.Sensor(z=image + 3 * mm, shape=(300, 400), pitch=50 * um))
+    _save(plot_phase_space_stages(camera, field, pixel_row=110), path)
+
+
+def draw_sampling(path: Path) -> None:
+    """A coded camera and a light field of too few views for its nearest and farthest depths."""
+    image = 1 / (1 / (50 * mm) - 1)
+    code = vcc.Mask(CosineSum(period=0.4 * mm, harmonics=4), width=30 * mm, z=image - 2 * mm, name="code")
+    lens = vcc.Lens(focal_length=50 * mm, diameter=20 * mm)
+    camera = vcc.Camera([lens, code], vcc.Sensor(z=image, shape=(400, 600), pitch=20 * um))
+    field = vcc.LightField.from_views(
+        np.broadcast_to(np.uint8(0), (20, 20, 400, 600)), spacing=1 * mm, slope_per_pixel=4e-4
+    )
+    _save(sampling_advice(camera, field, depths=(0.5, 3.0)).plot(), path)
 
 
 def _save(figure: Figure, path: Path) -> None:

@@ -69,3 +69,19 @@ def test_divided_samples_cost_their_number():
     assert divided.samples_touched == 16 * plain.samples_touched
     assert camera(vcc.Lens(50 * mm), fine).compile(light_field()).refine > 1
     assert "samples divided" in camera(vcc.Lens(50 * mm), fine).explain(light_field())
+
+
+def test_it_says_what_the_samples_can_carry():
+    """In focus at 1.3 m; neighbouring views lie 52 mm · 1 mm · |1/Z − 1/1.3 m| apart, pixels are 0.52 mm."""
+    in_focus = camera(vcc.Lens(50 * mm), z=52 * mm)
+    text = " ".join(in_focus.explain(light_field(disparity_range=(-0.5, 0.5))).split())
+    assert "What the samples can carry scene from 173 mm" in text  # 1/Z = 1/1.3 + 0.5·0.01/0.001
+    assert "in focus at 1.3 m; free of ghosts from 92.9 mm to infinity" in text  # 1/Z = 1/1.3 + 10
+    assert "watch out" not in text
+    far = " ".join(in_focus.explain(light_field(disparity_range=(-3.0, 0.0))).split())
+    assert "watch out: views across: 6 (at least 18). 18 views over the same width" in far
+    assert far.count("watch out") == 1  # both axes in one line
+    array = vcc.LensArray(1 * mm, 2 * mm, z=50 * mm, name="micro")
+    behind = " ".join(camera(vcc.Lens(50 * mm), array).explain(light_field(), samples=2).split())
+    assert 'are not given behind lens array "micro"' in behind
+    assert 'a sample of a view at lens array "micro" is 500 um wide, of 1 mm' in behind

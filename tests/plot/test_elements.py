@@ -309,17 +309,6 @@ def test_rays_fill_the_stop_of_a_thick_lens():
     assert (min(heights), max(heights)) == pytest.approx((-0.97 * 9, 0.97 * 9))
 
 
-def test_phase_space_behind_what_has_no_frame_is_refused_by_name():
-    from vcc.plot import plot_phase_space_stages
-
-    camera = vcc.Camera([LENS, vcc.Biprism(0.02, z=9 * mm, name="B")], SENSOR)
-    field = vcc.LightField.from_views(np.ones((3, 3, 4, 4), np.float32), 1 * mm, 0.01)
-    with pytest.raises(
-        vcc.InputError, match=r'biprism "B" bends rays otherwise than a lens or a prism.*camera\.plot'
-    ):
-        plot_phase_space_stages(camera, field)
-
-
 def test_phase_space_behind_a_diffuser_and_a_real_lens(tmp_path):
     from vcc.plot import plot_phase_space_stages
 

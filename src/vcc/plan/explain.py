@@ -15,7 +15,9 @@ import numpy as np
 
 from vcc.light_field import LightField, describe_geometry
 from vcc.plan.model import Plan
+from vcc.plan.parallax_rule import vergences
 from vcc.plan.rays import RayPlan
+from vcc.plan.sampling_limits import in_words, sampling_limits
 from vcc.sampled import known, to_dtype
 from vcc.units import short
 
@@ -48,6 +50,7 @@ def explain(camera: Camera, light_field: LightField, **options: Any) -> Explanat
     engine = options.pop("engine", None)
     options.pop("progress", None)
     tolerance = options.pop("tolerance", None)
+    limits = _limits(camera, light_field, options.get("scene_distance"))
     plan = camera.compile(light_field, **options)
     how = "How the picture is made\n" + "\n".join(f"  {note}" for note in plan.notes)
     if isinstance(plan, RayPlan):
@@ -57,7 +60,7 @@ def explain(camera: Camera, light_field: LightField, **options: Any) -> Explanat
     else:
         seconds = expected_seconds(plan, light_field, engine)
         parts = [_sampling(plan), _cost(plan, light_field, seconds), _warnings(plan)]
-    result = Explanation(_wrapped("\n\n".join([_what(camera, light_field), how, *parts])))
+    result = Explanation(_wrapped("\n\n".join([_what(camera, light_field), how, limits, *parts])))
     result.plan, result.expected_seconds = plan, seconds
     return result
 
@@ -102,6 +105,14 @@ def _what(camera: Camera, light_field: LightField) -> str:
     pitch = short(vertical) if vertical == horizontal else f"{short(vertical)} × {short(horizontal)}"
     lines.append(f"{_place(camera.sensor.z)}sensor, {rows}×{columns} pixels of {pitch}")
     return "\n".join(lines)
+
+
+def _limits(camera: Camera, light_field: LightField, scene_distance: float | None) -> str:
+    shown = vergences(light_field, scene_distance)
+    scene = None if shown is None else (float(shown.min()), float(shown.max()))
+    nv, nu, nt, ns = light_field.shape[:4]
+    found = sampling_limits(camera, light_field.frame, (nv, nu, nt, ns), scene)
+    return "What the samples can carry\n" + in_words(found)
 
 
 def _sampling(plan: Plan) -> str:

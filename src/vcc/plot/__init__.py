@@ -5,6 +5,14 @@ writes a file. New figures belong to nobody but the caller: pyplot and its globa
 """
 
 from vcc.plot.camera_plot import focused_distance, plot_camera
-from vcc.plot.phase_space import plot_phase_space, plot_phase_space_stages
+from vcc.plot.phase_space import phase_space_stages, plot_phase_space, plot_phase_space_stages
+from vcc.plot.phase_space_rays import PhaseSpacePicture
 
-__all__ = ["focused_distance", "plot_camera", "plot_phase_space", "plot_phase_space_stages"]
+__all__ = [
+    "PhaseSpacePicture",
+    "focused_distance",
+    "phase_space_stages",
+    "plot_camera",
+    "plot_phase_space",
+    "plot_phase_space_stages",
+]

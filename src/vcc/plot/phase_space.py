@@ -13,7 +13,19 @@ from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.optics import Faces
 from vcc.plot import style
+from vcc.plot.phase_space_rays import (
+    FULL,
+    IN_ONE_PLANE,
+    NAMES,
+    RAYS,
+    PhaseSpacePicture,
+    sheet_of_rays,
+    sheet_of_samples,
+    slice_of,
+    traced,
+)
 from vcc.sampled import to_numpy
+from vcc.sensor import Sensor
 from vcc.units import mm
 
 if TYPE_CHECKING:
@@ -22,6 +34,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+NO_OPTICS = Camera([], Sensor(0.0, (1, 1), 1.0))
+"""What a light field meets that is drawn where it is."""
+ENTRANCE = "entrance, z = 0 mm"
 CELLS_DRAWN_ONE_BY_ONE = 20_000
 """More cells than this are one picture inside a .svg or .pdf, which would grow too large otherwise."""
 
@@ -32,6 +47,7 @@ def plot_phase_space(
     row: int | None = None,
     pixel_row: int | None = None,
     across: str = "u",
+    fixed: tuple[float, float] | None = None,
     white: float | None = None,
     axes: Axes | None = None,
 ) -> Axes:
@@ -41,11 +57,17 @@ def plot_phase_space(
     that it stands for, placed by the frame: nothing is resampled, so flight shows as a shear along
     u, a lens as one along s. Grey is where the light field holds nothing.
 
+    Other slices hold the other two coordinates: ``across="uv"`` shows what comes from one direction, and
+    ``"st"`` what one place of this plane sees, upright: light from the right has s < 0. They are interpolated
+    linearly between samples.
+
     Args:
         light_field: at any plane.
         row: which row of views (v); None takes the middle one. A column of views for across="v".
         pixel_row: which row of pixels (t); None takes the middle one; a column for across="v".
-        across: ``"u"`` draws u and s, ``"v"`` draws v and t.
+        across: ``"u"`` draws u and s, ``"v"`` draws v and t; or two of u, v, s and t, the one to the right first.
+        fixed: the other two coordinates instead of rows, in the order u, v, s, t: metres and slopes. None takes
+            the middle of the light field, where ``across`` is neither u and s nor v and t.
         white: the radiance drawn white; None takes the brightest of the slice.
         axes: where to draw; None makes a new figure.
 
@@ -53,15 +75,23 @@ def plot_phase_space(
         The axes; ``.figure.savefig(path)`` writes them to a file.
 
     Raises:
-        InputError: no such row, or another axis.
+        InputError: no such row, another axis, rows beside ``fixed``, or rays that the light field does not hold.
     """
+    chosen = slice_of(across)
+    axes = style.new_axes(5.2, 4.2) if axes is None else axes
+    if not _held_by_samples(chosen, row, pixel_row, fixed):
+        (picture,) = traced(NO_OPTICS, sheet_of_rays(light_field, chosen, fixed), {-1.0: ENTRANCE})
+        brightest = float(picture.radiance.max()) or 1.0
+        _draw_picture(axes, picture, chosen, brightest if white is None else white)
+        _set_limits(axes, [picture], chosen)
+        _label(axes, chosen)
+        return axes
+    across = NAMES[chosen[0]]
     piece = _slice(light_field, row, pixel_row, across)
     u, s = cell_corners(piece, across)
     values = _radiance(piece, across)
     if white is None:
         white = float(values.max()) or 1.0
-    if axes is None:
-        axes = style.new_axes(5.2, 4.2)
     axes.set_facecolor(style.NOTHING)
     axes.pcolormesh(
         u / mm,
@@ -72,8 +102,7 @@ def plot_phase_space(
         vmax=1,
         rasterized=values.shape[0] * values.shape[1] > CELLS_DRAWN_ONE_BY_ONE,
     )
-    names = ("u", "s") if across == "u" else ("v", "t")
-    style.tidy(axes, f"{names[0]} [mm]", f"{names[1]} [slope]")
+    _label(axes, chosen)
     return axes
 
 
@@ -84,55 +113,158 @@ def plot_phase_space_stages(
     row: int | None = None,
     pixel_row: int | None = None,
     across: str = "u",
+    fixed: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw u–s diagrams on the way through a camera: entrance, behind each element, on the sensor.
 
     All have the same scales and the same white, so that what each element does can be seen: the
-    paper's Figure 4(c) for any camera.
+    paper's Figure 4(c) for any camera. Behind lens arrays, prisms of several faces, phase plates and diffusers the
+    slice's rays are traced and laid out in a raster; before, its cells are drawn as they are.
+
+    What is followed is the slice at the entrance: rays whose other two coordinates are held there. Where optics
+    change these too (lenslets off the row, say), the picture shows where the rays come to lie, whatever the others
+    are then. A diffuser spreads light along the slope drawn; what it scatters out of the slice is taken to be made
+    up by slices beside it.
 
     Args:
         camera: through which the light field goes.
         light_field: at the entrance plane.
-        row: as in `plot_phase_space`, likewise the next two.
+        row: as in `plot_phase_space`, likewise the next three.
         pixel_row: which row of pixels.
-        across: ``"u"`` or ``"v"``.
+        across: two coordinates.
+        fixed: the other two, at the entrance plane.
 
     Returns:
         The figure; ``.savefig(path)`` writes it to a file.
 
     Raises:
-        InputError: what `plot_phase_space` refuses; an element that bends rays otherwise than a lens or a prism
-            does (behind it no frame holds the cells).
+        InputError: what `plot_phase_space` refuses, or a diffuser in a slice other than of a place and its slope.
     """
-    for element in camera.elements:
-        if any(isinstance(part, Faces) and part.bending is not None for part in element.parts()):
-            raise InputError(
-                f"{element.label} bends rays otherwise than a lens or a prism: behind it cells of phase space are "
-                "no longer parallelograms of one frame, and they are what this figure draws. Draw the rays "
-                "(camera.plot), or a camera of the elements before it"
-            )
-    piece = _slice(light_field, row, pixel_row, across)  # first: what follows works on few samples
-    stages = [("entrance, z = 0 mm", piece)]
-    for z, title in _planes(camera):
-        stages.append((title, camera.light_field_at(piece, z)))
-    white = float(_radiance(piece, across).max()) or 1.0
-    rows = math.ceil(len(stages) / 4)
-    columns = math.ceil(len(stages) / rows)
+    chosen = slice_of(across)
+    titles = [(-1.0, ENTRANCE), *_planes(camera)]
+    cells: dict[float, LightField] = {}
+    if _held_by_samples(chosen, row, pixel_row, fixed):
+        piece = _slice(light_field, row, pixel_row, NAMES[chosen[0]])  # first: what follows works on few samples
+        cells = {
+            z: piece if z < 0 else camera.light_field_at(piece, z) for z, _ in titles if z < _traced_from(camera)
+        }
+    pictures: dict[float, PhaseSpacePicture] = {}
+    if len(cells) < len(titles):
+        found = phase_space_stages(camera, light_field, row=row, pixel_row=pixel_row, across=across, fixed=fixed)
+        pictures = {z: picture for (z, _), picture in zip(titles, found, strict=True)}
+    brightest = _radiance(cells[-1.0], NAMES[chosen[0]]) if cells else pictures[-1.0].radiance
+    white = float(brightest.max()) or 1.0
+    rows = math.ceil(len(titles) / 4)
+    columns = math.ceil(len(titles) / rows)
     grid = style.new_axes(
         max(5.2, 3.1 * columns), 3.3 * rows, rows, columns, sharex=True, sharey=True, squeeze=False
     )
     figure: Figure = grid[0, 0].figure
-    for place, ((title, stage), axes) in enumerate(zip(stages, grid.flat, strict=False)):
-        plot_phase_space(stage, across=across, white=white, axes=axes)
+    for place, ((z, title), axes) in enumerate(zip(titles, grid.flat, strict=False)):
+        if z in cells:
+            plot_phase_space(cells[z], across=NAMES[chosen[0]], white=white, axes=axes)
+        else:
+            _draw_picture(axes, pictures[z], chosen, white)
+            _label(axes, chosen)
         axes.set_title(title, fontsize=style.TEXT, color=style.INK)
         if place % columns:
             axes.set_ylabel("")
-        axes.tick_params(labelbottom=place + columns >= len(stages))
-        if place + columns < len(stages):
+        axes.tick_params(labelbottom=place + columns >= len(titles))
+        if place + columns < len(titles):
             axes.set_xlabel("")
-    for axes in grid.flat[len(stages) :]:
+    if pictures:
+        _set_limits(grid[0, 0], list(pictures.values()), chosen)
+    for axes in grid.flat[len(titles) :]:
         axes.set_visible(False)
     return figure
+
+
+def phase_space_stages(
+    camera: Camera,
+    light_field: LightField,
+    *,
+    row: int | None = None,
+    pixel_row: int | None = None,
+    across: str = "u",
+    fixed: tuple[float, float] | None = None,
+    rays: int = RAYS,
+) -> list[PhaseSpacePicture]:
+    """The numbers that `plot_phase_space_stages` draws: rasters of radiance at each plane, by traced rays.
+
+    Args: as there, and
+        rays: about how many are traced, 1 or more.
+
+    Raises:
+        InputError: as there.
+    """
+    chosen = slice_of(across)
+    if not rays >= 1:
+        raise InputError(f"rays is a number from 1 on, not {rays}")
+    if _held_by_samples(chosen, row, pixel_row, fixed):
+        sheet = sheet_of_samples(_slice(light_field, row, pixel_row, NAMES[chosen[0]]), chosen)
+    else:
+        sheet = sheet_of_rays(light_field, chosen, fixed)
+    return list(traced(camera, sheet, {-1.0: ENTRANCE} | dict(_planes(camera)), rays=rays))
+
+
+def _held_by_samples(
+    chosen: tuple[int, int], row: int | None, pixel_row: int | None, fixed: tuple[float, float] | None
+) -> bool:
+    """Whether rows of samples are held, rather than coordinates."""
+    if chosen in IN_ONE_PLANE and fixed is None:
+        return True
+    if row is not None or pixel_row is not None:
+        names = [NAMES[n] for n in range(4) if n not in chosen]
+        raise InputError(
+            "row and pixel_row hold samples for u and s, or v and t, alone: give the coordinates that are held as "
+            f"fixed=({names[0]}, {names[1]})"
+        )
+    return False
+
+
+def _traced_from(camera: Camera) -> float:
+    """The z of the first plane behind which a frame no longer holds the cells."""
+    for element in camera.elements:
+        for part in element.parts():
+            if isinstance(part, Faces) and (part.bending is not None or part.spread is not None):
+                return element.z
+    return math.inf
+
+
+def _draw_picture(axes: Axes, picture: PhaseSpacePicture, chosen: tuple[int, int], white: float) -> None:
+    """A raster, fading into the grey of nothing where its cells are filled in part."""
+    shown = np.asarray(_for_display(picture.radiance / white), dtype=np.float64)
+    shown = shown if shown.ndim == 3 else np.repeat(shown[..., None], 3, axis=2)
+    axes.set_facecolor(style.NOTHING)
+    extent = [
+        float(borders[end] / (mm if n < 2 else 1.0))
+        for n, borders in zip(chosen, (picture.first, picture.second), strict=True)
+        for end in (0, -1)
+    ]
+    opacity = np.minimum(picture.filled / FULL, 1.0)
+    axes.imshow(
+        np.concatenate([shown, opacity[..., None]], axis=2),
+        extent=(extent[0], extent[1], extent[2], extent[3]),
+        origin="lower",
+        aspect="auto",
+        interpolation="antialiased",
+        interpolation_stage="rgba",
+    )
+
+
+def _label(axes: Axes, chosen: tuple[int, int]) -> None:
+    style.tidy(axes, *(f"{NAMES[n]} [{'mm' if n < 2 else 'slope'}]" for n in chosen))
+
+
+def _set_limits(axes: Axes, pictures: list[PhaseSpacePicture], chosen: tuple[int, int]) -> None:
+    """All of the pictures in view, as one sees them: v downwards, rays from the right (s < 0) at the right."""
+    limits = []
+    for n, name in zip(chosen, ("first", "second"), strict=True):
+        borders = np.concatenate([getattr(each, name)[[0, -1]] for each in pictures]) / (mm if n < 2 else 1.0)
+        margin = 0.03 * np.ptp(borders)
+        limits.append((float(borders.min() - margin), float(borders.max() + margin)))
+    axes.set_xlim(limits[0][::-1] if chosen == (2, 3) else limits[0])
+    axes.set_ylim(limits[1][::-1] if chosen == (0, 1) else limits[1])
 
 
 def cell_corners(light_field: LightField, across: str = "u") -> tuple[Array, Array]:
@@ -156,8 +288,6 @@ def cell_corners(light_field: LightField, across: str = "u") -> tuple[Array, Arr
 
 def _slice(light_field: LightField, row: int | None, pixel_row: int | None, across: str) -> LightField:
     """The light field with one row of views and one row of pixels left, in its place."""
-    if across not in ("u", "v"):
-        raise InputError(f'across is "u" or "v", not {across!r}')
     nv, nu, nt, ns = light_field.shape[:4]
     counts = {"row": nv, "pixel_row": nt} if across == "u" else {"row": nu, "pixel_row": ns}
     chosen = []

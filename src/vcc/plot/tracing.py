@@ -163,7 +163,7 @@ class _Bundle:
 
 def branches(scatter: Scatter, axis: int, x: Array, y: Array) -> Array:
     """Changes of slope along an axis at the quantiles `BRANCHES` of the kernels at places x, y: (places, 3)."""
-    slopes, shares, widths = _mixed(scatter, axis, x, y)
+    slopes, shares, widths = marginals(scatter, axis, x, y)
     order = np.argsort(slopes)
     running = np.cumsum(shares[:, order], axis=1)
     # The first that reaches the share: never between two spots, where there is no light.
@@ -173,17 +173,17 @@ def branches(scatter: Scatter, axis: int, x: Array, y: Array) -> Array:
 
 def spread_along(scatter: Scatter, axis: int, x: Array, y: Array) -> Array:
     """The standard deviation of the change of slope along an axis at places x, y: (places,)."""
-    slopes, shares, widths = _mixed(scatter, axis, x, y)
+    slopes, shares, widths = marginals(scatter, axis, x, y)
     mean = shares @ slopes
     return np.asarray(widths * np.sqrt(np.maximum(shares @ slopes**2 - mean**2, 0.0)))
 
 
-def _mixed(scatter: Scatter, axis: int, x: Array, y: Array) -> tuple[Array, Array, Array]:
+def marginals(scatter: Scatter, axis: int, x: Array, y: Array) -> tuple[Array, Array, Array]:
     """Changes of slope (n,) of all kernels, their shares at each place (places, n), and the widths (places,)."""
     mix, widths = scatter.at(x, y)
-    marginals = [_marginal(kernel, axis) for kernel in scatter.kernels]
-    shares = np.concatenate([mix[:, n, None] * share for n, (_, share) in enumerate(marginals)], axis=1)
-    return np.concatenate([slopes for slopes, _ in marginals]), shares, widths
+    single = [_marginal(kernel, axis) for kernel in scatter.kernels]
+    shares = np.concatenate([mix[:, n, None] * share for n, (_, share) in enumerate(single)], axis=1)
+    return np.concatenate([slopes for slopes, _ in single]), shares, widths
 
 
 def _marginal(kernel: Kernel, axis: int) -> tuple[Array, Array]:

@@ -1,0 +1,208 @@
+"""A search for aperture patterns whose blur can be undone: Zhou and Nayar's genetic algorithm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.analysis.deblurring import expected_deblurring_error
+from vcc.errors import InputError
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+_BATCH = 2**22
+"""Numbers in the kernels that are transformed together: 16 MiB in single precision."""
+
+
+@dataclass(frozen=True, eq=False)
+class OptimisedAperture:
+    """The best pattern that a search met, and how it went.
+
+    Args:
+        pattern: 1 where open, 0 where opaque, shape (cells, cells); `vcc.Mask` takes it with a width.
+        error: R(K) of its kernel, as `vcc.analysis.expected_deblurring_error` has it.
+        history: the least R(K) met so far: of the first, random population, then after each generation.
+        typical: the median R(K) of the survivors of each of these populations.
+        converged: whether it stopped because ``patience`` generations had brought nothing.
+        message: how it ended, for people.
+    """
+
+    pattern: Array
+    error: float
+    history: tuple[float, ...] = field(repr=False)
+    typical: tuple[float, ...] = field(repr=False)
+    converged: bool
+    message: str
+
+    @property
+    def generations(self) -> int:
+        """How many were bred."""
+        return len(self.history) - 1
+
+
+def optimised_aperture(
+    noise: float,
+    power: ArrayLike,
+    *,
+    cells: int = 13,
+    pixels_per_cell: int = 1,
+    population: int = 4000,
+    survivors: int = 400,
+    generations: int = 80,
+    exchange: float = 0.2,
+    mutation: float = 0.05,
+    patience: int | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> OptimisedAperture:
+    """A binary pattern with as little expected deblurring error R(K) as a genetic search finds.
+
+    The algorithm of Zhou and Nayar, "What are good apertures for defocus deblurring?", ICCP 2009, section 4, and
+    its parameters: a random population of patterns; of each generation the best survive, and breed until the
+    population is whole again. Two survivors drawn at random are copied; each pair of their bits is exchanged with
+    the probability ``exchange``; then each bit flips with the probability ``mutation``. Survivors stay as they
+    are, so the best one is never lost. The search finds good patterns, not provably the best one.
+
+    Args:
+        noise: σ, in the units of the picture, as light through the whole opening makes it.
+        power: |F₀|² of pictures, shape (rows, columns), as `natural_image_power` has it. The search takes time in
+            proportion to its size; 64×64 is fine enough for a blur of 13 pixels.
+        cells: of the pattern, a side.
+        pixels_per_cell: how wide the blur of a cell is. The kernel is the pattern in pixels, divided by the
+            number of its pixels: its sum is the share of light that passes.
+        population: patterns of a generation.
+        survivors: of them.
+        generations: bred at most.
+        exchange: probability that the two parents' bits at a place change sides.
+        mutation: probability that a child's bit flips.
+        patience: stop after so many generations without a better pattern; None breeds them all.
+        seed: of the random numbers; the same seed finds the same pattern.
+        progress: called with (generations bred, generations) after each, first with 0. What it raises ends the
+            search.
+
+    Raises:
+        InputError: a noise of zero or less, powers that are negative or not finite, a kernel larger than the
+            picture, fewer than 2 survivors or no more patterns than survivors, or probabilities outside 0 to 1.
+    """
+    prior = np.asarray(power, dtype=np.float64)
+    _check_search(cells, pixels_per_cell, population, survivors, generations, patience)
+    _check(noise, prior, cells * pixels_per_cell)
+    for name, value in (("exchange", exchange), ("mutation", mutation)):
+        if not 0 <= value <= 1:
+            raise InputError(f"{name} is a probability from 0 to 1, not {value}")
+    random = np.random.default_rng(seed)
+    errors_of = _Errors(noise, prior, cells, pixels_per_cell)
+    bits = random.random((population, cells, cells)) < 0.5
+    errors = errors_of(bits)
+    history: list[float] = []
+    typical: list[float] = []
+    waited = 0
+    while True:
+        best = np.argsort(errors, kind="stable")[:survivors]
+        bits, errors = bits[best], errors[best]
+        waited = 0 if not history or errors[0] < history[-1] else waited + 1
+        history.append(float(errors[0]))
+        typical.append(float(np.median(errors)))
+        done = len(history) - 1
+        if progress is not None:
+            progress(done, generations)
+        converged = patience is not None and waited >= patience
+        if converged or done >= generations:
+            break
+        children = _bred(random, bits, population - survivors, exchange, mutation)
+        bits = np.concatenate([bits, children])
+        errors = np.concatenate([errors, errors_of(children)])
+    message = f"stopped after all {done} generations"
+    if waited:
+        message += f", the last {waited} of which brought nothing better"
+    if converged:
+        message = f"converged: {waited} generations brought nothing better; {done} bred"
+    pattern = bits[0].astype(np.float64)
+    kernel = np.kron(pattern, np.ones((pixels_per_cell, pixels_per_cell))) / (cells * pixels_per_cell) ** 2
+    # The search is in single precision; a dark pattern, the best of dark ones only, has no kernel.
+    error = expected_deblurring_error(kernel, noise, prior) if pattern.any() else history[-1]
+    return OptimisedAperture(pattern, error, tuple(history), tuple(typical), converged, message)
+
+
+class _Errors:
+    """R(K) of many patterns at once."""
+
+    def __init__(self, noise: float, prior: Array, cells: int, pixels_per_cell: int) -> None:
+        self.shape = prior.shape
+        self.pixels_per_cell = pixels_per_cell
+        self.pixels = (cells * pixels_per_cell) ** 2
+        # R = Σ σ²P/(|K|²P + σ²) over all frequencies, of which a real transform has half: P may differ between
+        # f and −f, |K|² does not. What is not in the half stands at the place of its conjugate.
+        mirrored = np.roll(prior[::-1, ::-1], (1, 1), axis=(0, 1))
+        half = prior.shape[1] // 2 + 1
+        alone = np.zeros(half, bool)
+        alone[0] = True
+        alone[-1] |= prior.shape[1] % 2 == 0
+        self.prior = np.stack([prior[:, :half], np.where(alone, 0.0, mirrored[:, :half])]).astype(np.float32)
+        self.noise = np.float32(noise**2)
+
+    def __call__(self, bits: NDArray[np.bool_]) -> Array:
+        """Of patterns (n, cells, cells): shape (n,)."""
+        from scipy import fft
+
+        found = np.zeros(len(bits))
+        batch = max(_BATCH // (self.shape[0] * self.shape[1]), 1)
+        for start in range(0, len(bits), batch):
+            kernels = bits[start : start + batch].astype(np.float32) / np.float32(self.pixels)
+            for axis in (1, 2):
+                kernels = np.repeat(kernels, self.pixels_per_cell, axis=axis)
+            transfer = fft.rfft2(kernels, s=self.shape, axes=(1, 2))
+            passed = transfer.real**2 + transfer.imag**2
+            for prior in self.prior:
+                part = prior / (passed * prior + self.noise)
+                found[start : start + batch] += part.sum(axis=(1, 2), dtype=np.float64)
+        return found * float(self.noise)
+
+
+def _bred(
+    random: np.random.Generator, parents: NDArray[np.bool_], count: int, exchange: float, mutation: float
+) -> NDArray[np.bool_]:
+    """Children (count, cells, cells) of pairs of parents."""
+    pairs = -(-count // 2)
+    first = parents[random.integers(len(parents), size=pairs)]
+    second = parents[random.integers(len(parents), size=pairs)]
+    swapped = random.random(first.shape) < exchange
+    children = np.concatenate([np.where(swapped, second, first), np.where(swapped, first, second)])[:count]
+    return np.asarray(children ^ (random.random(children.shape) < mutation))
+
+
+def _check(noise: float, prior: Array, kernel: int) -> None:
+    if not (noise > 0 and math.isfinite(noise)):
+        raise InputError(f"noise is a standard deviation above 0, not {noise}")
+    if prior.ndim != 2 or not np.isfinite(prior).all() or prior.min(initial=0.0) < 0 or not prior.any():
+        raise InputError("power is (rows, columns) of finite numbers of 0 or more, not all of them 0")
+    if min(prior.shape) < kernel:
+        raise InputError(
+            f"a blur of {kernel}×{kernel} pixels is larger than the picture of {prior.shape[0]}×"
+            f"{prior.shape[1]}: give the power of a larger picture, fewer cells or fewer pixels per cell"
+        )
+
+
+def _check_search(
+    cells: int, pixels_per_cell: int, population: int, survivors: int, generations: int, patience: int | None
+) -> None:
+    numbers = {
+        "cells": cells,
+        "pixels_per_cell": pixels_per_cell,
+        "generations": generations,
+        "patience": 1 if patience is None else patience,
+    }
+    for name, value in numbers.items():
+        if int(value) != value or value < 1:
+            raise InputError(f"{name} is a whole number of 1 or more, not {value}")
+    if int(survivors) != survivors or survivors < 2:
+        raise InputError(f"two survivors or more are needed to breed, not {survivors}")
+    if int(population) != population or population <= survivors:
+        raise InputError(
+            f"a population of {population} leaves no place for children of {survivors} survivors: make it larger"
+        )
