@@ -10,6 +10,7 @@ import pytest
 import torch
 
 import vcc
+from vcc.light_field import describe_geometry
 from vcc import Affine, LightField
 from vcc.units import mm
 
@@ -172,3 +173,10 @@ def test_transformed_is_lazy():
     assert moved.values is lf.values
     np.testing.assert_allclose(moved.frame([1, 2, 3, 4]), Affine.lens(0.05)(lf.frame([1, 2, 3, 4])), rtol=1e-12)
     assert moved.flux == pytest.approx(lf.flux, rel=1e-12)
+
+
+@pytest.mark.parametrize(("distance", "words"), [(1e15, "parallel views"), (1.25, "converging at 1.25 m")])
+def test_views_that_converge_beyond_all_rounding_are_called_parallel(distance, words):
+    """9 views 0.5 mm apart turn by 9·0.5 mm/10¹⁵ m = 5·10⁻¹⁸: nothing beside a pixel of 0.001."""
+    lf = vcc.LightField.from_views(np.ones((9, 9, 4, 4)), 0.5e-3, 1e-3, distance)
+    assert words in describe_geometry(lf)

@@ -383,8 +383,9 @@ def describe_geometry(light_field: LightField) -> str:
         return "general frame"
     from vcc.units import short
 
-    focus = math.inf if linear[2, 0] == 0 else linear[0, 0] / linear[2, 0]
-    converging = "parallel views" if math.isinf(focus) else f"converging at {short(focus)}"
+    # What turns the outermost views by less than a millionth of a pixel is rounding.
+    parallel = abs(linear[2, 0]) * light_field.shape[1] < 1e-6 * abs(linear[2, 2])
+    converging = "parallel views" if parallel else f"converging at {short(linear[0, 0] / linear[2, 0])}"
     return f"spacing {short(abs(linear[0, 0]))}, slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
 
 

@@ -103,6 +103,7 @@ def test_info_says_what_is_known_and_what_is_assumed(folder):
         (["-o", "side.svg", "--object-distance", "1.2 m", "--object-distance", "inf"], "side.svg"),
         (["-o", "side.pdf", "--across", "y", "--light-field", "views"], "side.pdf"),
         (["-o", "stages.png", "--phase-space", "--light-field", "views"], "stages.png"),
+        (["-o", "uv.png", "--phase-space", "--slice", "uv", "--light-field", "views"], "uv.png"),
     ],
 )
 def test_plot_writes_a_drawing(folder, arguments, file):
@@ -144,6 +145,7 @@ def test_errors_name_what_is_wrong(folder):
     assert "--spacing is" in refused(*capture, "-o", "a.png", "--spacing", "1 mm, 1 mm, 1 mm")
     assert "--spacing is" in refused(*capture, "-o", "a.png", "--spacing", "1")
     assert "--phase-space" in refused("plot", "camera.toml", "--phase-space")
+    assert "--slice" in refused("plot", "camera.toml", "--slice", "uv")
     assert "object distance" in refused("plot", "camera.toml", "--object-distance", "0 m")
     (folder / "camera.toml").write_text(CAMERA.replace('"1 mm"', "1"))
     message = refused("plot", "camera.toml")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from vcc.cli import decode as decoding
 from vcc.cli import options as given
 from vcc.cli import refocus as refocusing
 from vcc.cli import synth_blender, synth_depth, synth_opengl  # noqa: F401
@@ -340,6 +341,16 @@ def plot(
             "element, on the sensor.",
         ),
     ] = False,
+    slice_across: Annotated[
+        str | None,
+        typer.Option(
+            "--slice",
+            metavar="NAMES",
+            help="With --phase-space: two of u, v, s and t to draw, such as uv; the other two are held at the "
+            "light field's middle. Default: us, or vt with --across y.",
+            show_default=False,
+        ),
+    ] = None,
     transfer: given.Transfer = "auto",
     spacing: given.Spacing = None,
     slope_per_pixel: given.SlopePerPixel = None,
@@ -349,6 +360,8 @@ def plot(
     """Draw a camera from the side with rays, or a light field's way through it in phase space."""
     if phase_space and light_field is None:
         raise InputError("--phase-space draws a light field: give it with --light-field FOLDER")
+    if slice_across is not None and not phase_space:
+        raise InputError("--slice chooses what --phase-space draws: give --phase-space too")
     target = check_output(output or Path(f"{camera.stem}.png"), (".png", ".svg", ".pdf"))
     distances = [given.length(each, "--object-distance") or 0.0 for each in object_distance or []]
     from vcc.camera_file import load_camera
@@ -365,7 +378,8 @@ def plot(
 
         field = found if isinstance(found, LightField) else found.read()
     if phase_space and field is not None:
-        stages = plot_phase_space_stages(optics, field, across="u" if across == "x" else "v")
+        names = slice_across or ("us" if across == "x" else "vt")
+        stages = plot_phase_space_stages(optics, field, across=names)
         figure: Figure | SubFigure = stages
     else:
         axes = plot_camera(optics, light_field=field, object_distances=distances or None, across=across)
@@ -561,6 +575,7 @@ def convert(
 
 
 # In the order in which --help shows them.
+app.command(epilog=decoding.EPILOG)(decoding.decode)
 app.command(epilog=refocusing.EPILOG)(refocusing.refocus)
 app.command(epilog=SPECTRUM_EPILOG)(spectrum)
 app.command(epilog=GALLERY_EPILOG)(gallery)

@@ -64,7 +64,7 @@ def to_file(source: Path, output: Path, *, kind: str | None, overwrite: bool, re
     """
     from vcc.formats.writing import save_light_field
 
-    output = _free(output, overwrite)
+    output = free_output(output, overwrite)
     told: Any = kind
     field = reading.light_field(source, reading.transfer)
     with progress("Writing views") as advance:
@@ -97,7 +97,7 @@ def to_store(
     """
     from vcc.store import Lossless, Lossy, convert, is_store
 
-    output = _free(output, overwrite)
+    output = free_output(output, overwrite)
     codec: Any = packing[0]
     compression = (Lossy if codec in ("jpegxl", "avif") else Lossless)(codec, packing[1])
     transfer: Any
@@ -170,7 +170,7 @@ def store_facts(path: Path, quick: bool) -> str:
     return "\n".join(f"{name:<{width}}{value}" for name, value in lines.items())
 
 
-def _free(output: Path, overwrite: bool) -> Path:
+def free_output(output: Path, overwrite: bool) -> Path:
     """A path that may be written to, before the work that it is for."""
     output = output.expanduser()
     if not output.parent.is_dir():

@@ -75,6 +75,15 @@ def refocus(
     frames_per_second: Annotated[float, typer.Option(metavar="NUMBER", help="Of a film.")] = 8.0,
     interpolation: given.Interpolation = "cubic",
     between_views: given.BetweenViews = "auto",
+    memory_limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SIZE",
+            help='What the pictures of a focal stack may take, "1.5 GB"; of one picture, what reading a store in '
+            "pieces may. Default: 1 GiB for pieces.",
+            show_default=False,
+        ),
+    ] = None,
     transfer: given.Transfer = "auto",
     spacing: given.Spacing = None,
     slope_per_pixel: given.SlopePerPixel = None,
@@ -95,7 +104,7 @@ def refocus(
     film = stack is not None and not all_in_focus
     output = check_output(output, ENDINGS if film else WRITE_ENDINGS)
     factor = given.exposure_of(exposure)
-    where = given.length(distance, "--distance")
+    where, limit = given.length(distance, "--distance"), given.memory_size(memory_limit)
     options: dict[str, Any] = {
         "diameter": given.length(aperture, "--aperture"),
         "interpolation": interpolation,
@@ -108,15 +117,16 @@ def refocus(
     field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
     if where is not None:
         with progress("Refocusing") as advance:
-            image = refocused(field, where, **options, progress=advance)
+            image = refocused(field, where, **options, memory_limit=limit, progress=advance)
         show(image.save(output, exposure=factor).description)
         return
     with progress("Refocusing") as advance:
-        pictures = focal_stack(field, distances or _distances_of(field), **options, progress=advance)
+        chosen = distances or _distances_of(field)
+        pictures = focal_stack(field, chosen, **options, memory_limit=limit, progress=advance)
     if film:
         show(pictures.save(output, frames_per_second=frames_per_second, exposure=factor))
     else:
-        show(pictures.all_in_focus().image.save(output, exposure=factor).description)
+        show(pictures.all_in_focus(memory_limit=limit).image.save(output, exposure=factor).description)
 
 
 def _distances_of(field: LightField | StoredLightField) -> tuple[float, ...]:

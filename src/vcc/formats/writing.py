@@ -113,7 +113,7 @@ def save_light_field(
             take, or what the format's writer refuses.
     """
     path = Path(path).expanduser()
-    chosen = _kind_of(path, kind)
+    chosen = kind_of(path, kind)
     writer = _writer(chosen)
     taken = set(inspect.signature(writer).parameters) - {"light_field", "path", "kind", "progress"}
     for option in options:
@@ -206,7 +206,12 @@ def save_folder(
     return SavedLightField(path, kind, codes.exposure, codes.clipped, _words(light_field, path, words))
 
 
-def _kind_of(path: Path, kind: Kind | None) -> Kind:
+def kind_of(path: Path, kind: Kind | None) -> Kind:
+    """The format that a name and a kind ask for; see `save_light_field`.
+
+    Raises:
+        InputError: an ending that is not known, or that is not that of the kind.
+    """
     ending = path.suffix.lower()
     if kind is None:
         if ending not in _ENDINGS:

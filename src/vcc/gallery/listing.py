@@ -10,10 +10,16 @@ from vcc.gallery.entry import Entry
 
 ENTRIES = (
     "conventional",
+    "heterodyne",
+    "coded-aperture-refocusing",
+    "coded-aperture-depth",
+    "good-apertures",
     "light-field-rendering",
+    "plenoptic",
     "integral-lens-prism",
     "biprism-stereo",
     "wavefront-coding",
+    "diffuser-depth-of-field",
 )
 """Names, in the gallery's order. ``a-name`` is the module ``vcc.gallery.a_name``, which holds an ``ENTRY``."""
 

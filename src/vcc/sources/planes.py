@@ -365,9 +365,9 @@ class PlanesScene:
             raise InputError(f"a light field is made as uint8, uint16 or float32, not {kind}")
         if min(*views, *pixels) < 1:
             raise InputError(f"a light field needs at least one view and pixel, not {views} and {pixels}")
-        # An empty stand-in lets LightField check the geometry before any work is done.
+        # A stand-in lets LightField check the geometry before any work is done.
         values = np.empty((*views, *pixels, 3), dtype=kind)
-        LightField.from_views(values[:1, :1, :1, :1] * 0, spacing, slope_per_pixel, focus_distance)
+        LightField.from_views(np.zeros((1, 1, 1, 1, 3), kind), spacing, slope_per_pixel, focus_distance)
         if any(plane.tilted for plane in self.planes):
             cameras = CameraArray(views, pixels, spacing, slope_per_pixel, focus_distance)
             _fill_view_by_view(self, values, cameras, threads, progress)

@@ -1,0 +1,99 @@
+"""A flat target out of focus, as cameras with codes in their apertures record it.
+
+The target is a grid of points of light, one for each pixel, and repeats beyond its borders, so that no border
+plays a part: recording it is a convolution with one kernel, the camera's picture of a single point. Where a code's
+cells are whole pixels wide, that kernel is the code itself, as papers on apertures take it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.camera import Camera
+from vcc.demo.bench import Bench
+from vcc.errors import InputError
+from vcc.light_field import LightField
+from vcc.optics import Lens, Mask
+from vcc.sensor import Sensor
+from vcc.units import mm
+
+Array = NDArray[np.float64]
+
+FOCAL_LENGTH = 50 * mm
+OPENING = 20 * mm
+"""Width of the apertures' square."""
+FOCUS, DISTANCE = 0.8, 2.0
+"""What the camera is focused on, and where the target stands, metres."""
+VIEWS_PER_PIXEL = 4
+"""Of the blur, a side: of how many rays a pixel's light is made."""
+SMALLEST = 64
+"""Side of a target, pixels."""
+
+
+def grey_view(bench: Bench, most: int) -> Array:
+    """The middle of the middle view as a target: grey, 0 to 1, shape (rows, columns) of ``most`` or less.
+
+    Raises:
+        InputError: views that are smaller than a target must be, or dark.
+    """
+    nv, nu, nt, ns = bench.light_field.shape[:4]
+    if min(nt, ns) < SMALLEST:
+        raise InputError(
+            f"the views of this light field have {nt}×{ns} pixels: a flat target is made of one, and needs "
+            f"{SMALLEST}×{SMALLEST} or more"
+        )
+    view = bench.light_field.view(nv // 2, nu // 2).to_numpy().astype(np.float64)
+    grey = view if view.ndim == 2 else view.mean(axis=2)
+    rows, columns = min(nt, most), min(ns, most)
+    top, left = (nt - rows) // 2, (ns - columns) // 2
+    grey = grey[top : top + rows, left : left + columns]
+    white = float(np.percentile(grey, 99.5))
+    if not white > 0:
+        raise InputError("the middle view of this light field is dark: there is nothing to deblur")
+    return np.asarray(np.clip(grey / white, 0, 1))
+
+
+def focal_camera(mask: Mask, shape: tuple[int, int], blur: int, focus: float = FOCUS) -> Camera:
+    """A lens with a mask in it, whose opening is ``blur`` pixels wide in the picture of a point of the target."""
+    distance = 1 / (1 / FOCAL_LENGTH - 1 / focus)
+    return Camera([Lens(FOCAL_LENGTH), mask], Sensor(distance, shape, _slope(blur) * distance))
+
+
+def recorded(mask: Mask, target: Array, blur: int) -> Array:
+    """The target through the camera, without noise.
+
+    Args:
+        mask: no wider than `OPENING`.
+        target: radiances, (rows, columns).
+        blur: pixels across the opening.
+
+    Returns:
+        Upright, shape of the target; 1 is radiance 1 through all of the square opening.
+    """
+    around = [(blur, blur), (blur, blur)]
+    return _through(mask, np.pad(target, around, mode="wrap"), target.shape, blur)
+
+
+def kernel(mask: Mask, blur: int) -> Array:
+    """The picture of one point of the target, upright, of an odd side; its sum is the share of light passed."""
+    side = blur + 5 - blur % 2
+    dot = np.zeros((side + 2 * blur, side + 2 * blur))
+    dot[dot.shape[0] // 2, dot.shape[1] // 2] = 1
+    return np.maximum(_through(mask, dot, (side, side), blur), 0)
+
+
+def _through(mask: Mask, wide: Array, shape: tuple[int, ...], blur: int) -> Array:
+    views = VIEWS_PER_PIXEL * blur
+    # All views of a flat thing are the same picture where they converge on it: no copies are made.
+    values = np.broadcast_to(wide.astype(np.float32), (views, views, *wide.shape))
+    field = LightField.from_views(values, OPENING / views, _slope(blur), DISTANCE, disparity_range=(0.0, 0.0))
+    camera = focal_camera(mask, (shape[0], shape[1]), blur)
+    # A point's ray brings all of its light to the pixel that it lands in.
+    image = camera.capture(field, method="footprints", between_views="none", interpolation="nearest")
+    return np.asarray(image.upright().to_numpy(), dtype=np.float64) * camera.sensor.z**2 / OPENING**2
+
+
+def _slope(blur: int) -> float:
+    """Of a pixel: the opening's shadow is OPENING·d·|1/FOCUS − 1/DISTANCE| wide, at d behind the lens."""
+    return OPENING * abs(1 / FOCUS - 1 / DISTANCE) / blur

@@ -1,0 +1,324 @@
+"""``vcc decode``: light fields from recordings in files."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import imagecodecs
+import numpy as np
+import pytest
+import scipy.io
+
+import vcc
+from command_line import refused, run
+from vcc.recover import LensletGrid, decode_heterodyne, decode_plenoptic
+from vcc.store import open_store
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "formats"))
+from test_lytro_lfp import container, pack_little
+
+DATA = Path(__file__).parents[3] / "shared" / "data" / "plenoptic_raw"
+real = pytest.mark.skipif(not DATA.is_dir(), reason=f"real recordings are not here: {DATA}")
+
+PLENOPTIC = """
+[[elements]]
+kind = "lens"
+z = "0 mm"
+focal_length = "50 mm"
+diameter = "8 mm"
+
+[[elements]]
+kind = "lens_array"
+z = "52.631578947368425 mm"
+pitch = "0.25 mm"
+focal_length = "1.4 mm"
+layout = "hexagonal"
+
+[sensor]
+z = "54.031578947368425 mm"
+shape = [96, 100]
+pitch = "28 um"
+"""
+MASKED = """
+[[elements]]
+kind = "lens"
+z = "0 mm"
+focal_length = "50 mm"
+
+[[elements]]
+kind = "mask"
+z = "0 mm"
+pattern = {{ name = "open" }}
+width = "10 mm"
+
+[[elements]]
+kind = "mask"
+z = "{z} mm"
+pattern = {{ name = "cosine_sum", period = "0.32258064516129037 mm", harmonics = 2 }}
+
+[sensor]
+z = "52.631578947368425 mm"
+shape = [120, 120]
+pitch = "66.66666666666667 um"
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder with a plenoptic camera, and its recordings of something, of white and of nothing, 16 bits."""
+    monkeypatch.chdir(tmp_path)
+    Path("camera.toml").write_text(PLENOPTIC)
+    camera = vcc.load_camera("camera.toml")
+    seen = np.random.default_rng(0).random((6, 6, 12, 12), np.float32)
+    field = vcc.LightField.from_views(seen, 1.6 * vcc.units.mm, 8e-3, 1.0, disparity_range=(0, 0))
+    white = field.replaced(np.ones_like(seen))
+    peak = camera.capture(white, samples=64).to_numpy().max()
+    for name, scene in (("raw", field), ("white", white)):
+        light = camera.capture(scene, samples=64).to_numpy() / peak
+        write(f"{name}.tif", np.rint(500 + 50000 * light).astype(np.uint16))
+    write("dark.tif", np.full(camera.sensor.shape, 500, np.uint16))
+    return tmp_path
+
+
+def write(name: str, numbers: np.ndarray) -> None:
+    imagecodecs.imwrite(name, numbers)
+
+
+def numbers(name: str) -> np.ndarray:
+    return imagecodecs.imread(name)
+
+
+def lattice() -> np.ndarray:
+    """(x, y) of the camera's micro-images, by its geometry."""
+    grid = LensletGrid.of_camera(vcc.load_camera("camera.toml"))
+    return grid.centre_of(*grid.within((96, 100), 5).T)
+
+
+@pytest.mark.usefixtures("here")
+def test_lenslets_are_decoded_as_the_library_does():
+    result = run(*("decode", "raw.tif", "--camera", "camera.toml", "--white", "white.tif"),
+                 *("--dark", "dark.tif", "--views", 5, "-o", "field.zarr"))  # fmt: skip
+    assert result.exit_code == 0, result.output
+    camera = vcc.load_camera("camera.toml")
+    expected = decode_plenoptic(
+        numbers("raw.tif"), camera=camera, white=numbers("white.tif"), dark=numbers("dark.tif"), views=5
+    )
+    found = open_store("field.zarr").read()
+    np.testing.assert_array_equal(found.values, expected.values)
+    assert found.frame.isclose(expected.frame)
+    said = result.stdout
+    assert "field.zarr: 5×5 views of" in said
+    assert "found in white.tif, a hexagonal lattice of 9.1" in said
+    assert "converging at 1 m" in said
+    assert "vcc refocus field.zarr" in said
+    assert open_store("field.zarr").provenance["decoded_from"] == "raw.tif"
+    # The camera's own lattice is as good, and integers count as shares of their largest number.
+    result = run("decode", "raw.tif", "--camera", "camera.toml", "--dark", "dark.tif", "--views", 5, "-o", "b.npz")
+    assert result.exit_code == 0, result.output
+    assert "by the camera file" in result.stdout
+    grid = LensletGrid.of_camera(camera)
+    plain = decode_plenoptic(numbers("raw.tif"), grid, camera=camera, dark=numbers("dark.tif"), views=5)
+    other = vcc.open_light_field("b.npz")
+    np.testing.assert_allclose(other.values, np.asarray(plain.values) / 65535, rtol=1e-5)
+
+
+@pytest.mark.usefixtures("here")
+def test_centres_of_all_kinds_of_list_give_one_light_field():
+    places = lattice()
+    np.savetxt("xy.csv", places, delimiter=",")
+    np.savetxt("named.csv", places[:, ::-1], delimiter=",", header="row,column", comments="")
+    np.save("centres.npy", places)
+    scipy.io.savemat("centres.mat", {"centres": places[:, ::-1] + 1, "size": np.array([96, 100])})
+    outputs = []
+    for number, options in enumerate(
+        [["xy.csv"], ["named.csv"], ["centres.npy"],
+         ["centres.mat", "--centres-order", "row-column", "--centres-from", 1]]
+    ):  # fmt: skip
+        name = f"field{number}.npz"
+        result = run("decode", "raw.tif", "--dark", "dark.tif", "--views", 5, "-o", name, "--centres", *options)
+        assert result.exit_code == 0, result.output
+        assert "Note" not in result.stderr
+        assert "given centres" in result.stdout
+        assert "not metric without --camera" in result.stdout
+        outputs.append(np.asarray(vcc.open_light_field(name).values))
+    grid = LensletGrid.from_centres(places)
+    plain = decode_plenoptic(numbers("raw.tif"), grid, dark=numbers("dark.tif"), views=5)
+    for each in outputs:
+        # A lattice fitted to centres written with all digits: to rounding.
+        np.testing.assert_allclose(each, np.asarray(plain.values) / 65535, atol=1e-4)
+
+
+@pytest.mark.usefixtures("here")
+def test_centres_between_micro_images_are_noticed():
+    np.save("off.npy", lattice() + np.array([4.6, 2.7]))  # a third of a lattice's steps
+    result = run("decode", "raw.tif", "--white", "white.tif", "--centres", "off.npy", "-o", "a.npz", "--views", 3)
+    assert result.exit_code == 0, result.output
+    assert "white.tif is not brighter at the centres in off.npy than between them" in result.stderr
+
+
+@pytest.mark.usefixtures("here")
+def test_a_black_level_is_an_even_dark_frame():
+    colours = np.stack([numbers("raw.tif"), numbers("raw.tif") // 2 + 250], axis=-1)
+    np.save("colours.npy", colours)
+    known = "--camera", "camera.toml", "--views", 3
+    for source, said in (("raw.tif", ["--black", 500]), ("raw.tif", ["--dark", "dark.tif"])):
+        result = run("decode", source, *known, *said, "-o", f"{said[0][2:]}.npz")
+        assert result.exit_code == 0, result.output
+    one, other = (np.asarray(vcc.open_light_field(f"{name}.npz").values) for name in ("black", "dark"))
+    np.testing.assert_allclose(one * (65535 - 500), other * 65535, rtol=1e-5, atol=1e-3)
+    result = run("decode", "colours.npy", *known, "--black", 500, "-o", "two.npz")
+    assert result.exit_code == 0, result.output
+    two = np.asarray(vcc.open_light_field("two.npz").values)
+    np.testing.assert_allclose(two[..., 0], one, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(two[..., 1], one / 2, rtol=1e-3, atol=2e-5)  # a whole number, rounded
+    assert "pixel by pixel" in refused(
+        "decode", "raw.tif", *known, "--black", 5, "--dark", "dark.tif", "-o", "a.npz"
+    )
+
+
+@pytest.mark.usefixtures("here")
+def test_recordings_turned_upright_give_the_same_light_field():
+    write("turned.tif", numbers("raw.tif")[::-1, ::-1].copy())
+    for name, more in (("raw", []), ("turned", ["--upright"])):
+        result = run("decode", f"{name}.tif", "--camera", "camera.toml", "--views", 5, "-o", f"{name}.npz", *more)
+        assert result.exit_code == 0, result.output
+    one, other = (vcc.open_light_field(f"{name}.npz") for name in ("raw", "turned"))
+    np.testing.assert_allclose(other.values, one.values, atol=1e-5)
+    assert other.frame.isclose(one.frame)
+
+
+@pytest.mark.usefixtures("here")
+def test_what_expose_wrote_is_decoded_through_its_filters_and_above_its_black_level():
+    Path("colour.toml").write_text(
+        PLENOPTIC + '[sensor.electronics]\ncolor_filter = "RGGB"\nblack_level = 100.0\nread_noise = 0.0\n'
+    )
+    camera = vcc.load_camera("colour.toml")
+    grey = vcc.LightField.from_views(np.ones((4, 4, 8, 8, 3), np.float32), 4e-3, 20e-3, disparity_range=(0, 0))
+    recording = camera.expose(grey, "auto", samples=64)
+    recording.save("raw.png")
+    result = run("decode", "raw.png", "--camera", "colour.toml", "--views", 3, "-o", "field.npz")
+    assert result.exit_code == 0, result.output
+    values = np.asarray(vcc.open_light_field("field.npz").values)
+    assert values.shape[-1] == 3
+    # By hand: numbers at the middles of micro-images, above 100, as a share of what 12 bits hold above it. Noise
+    # of 1 % in a pixel is averaged over a hundred of them.
+    column, row = np.rint(lattice()).astype(int).T
+    by_hand = (imagecodecs.imread("raw.png")[row, column].astype(float) - 100) / (4095 - 100)
+    assert values[1, 1].mean() == pytest.approx(by_hand.mean(), rel=0.01)
+    refusal = refused("decode", "raw.png", "--camera", "colour.toml", "--color-filter", "BGGR", "-o", "a.npz")
+    assert "colour filter is RGGB" in refusal
+
+
+@pytest.mark.usefixtures("here")
+def test_lytro_files_are_decoded_by_what_they_state():
+    levels = {
+        "black": dict.fromkeys(("r", "gr", "gb", "b"), 64),
+        "white": dict.fromkeys(("r", "gr", "gb", "b"), 1023),
+    }
+    image = {"width": 100, "height": 96, "pixelPacking": {"endianness": "little", "bitsPerPixel": 10}}
+    image |= {"pixelFormat": levels, "mosaic": {"tile": "r,gr:gb,b", "upperLeftPixel": "gr"}}
+    stated = {"camera": {"make": "Lytro, Inc.", "model": "ILLUM"}, "image": image}
+    mosaics = {}
+    for name in ("raw", "white"):
+        mosaics[name] = numbers(f"{name}.tif") // 64
+        Path(f"{name}.lfr").write_bytes(container(pack_little(mosaics[name]), stated))
+    result = run("decode", "raw.lfr", "--white", "white.lfr", "--views", 3, "-o", "field.npz")
+    assert result.exit_code == 0, result.output
+    black = np.full((96, 100), 64.0)
+    expected = decode_plenoptic(mosaics["raw"], white=mosaics["white"], dark=black, color_filter="GRBG", views=3)
+    np.testing.assert_array_equal(vcc.open_light_field("field.npz").values, expected.values)
+    assert "its mosaic is GRBG" in refused("decode", "raw.lfr", "--color-filter", "RGGB", "-o", "a.npz")
+    assert "give --white" in refused("decode", "raw.lfr", "-o", "a.npz")
+
+
+def test_a_mask_s_recording_is_decoded_with_a_simulated_calibration(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("masked.toml").write_text(MASKED.format(z=50.93378607809847))
+    camera = vcc.load_camera("masked.toml")
+    y, x = np.mgrid[:60, :60]
+    picture = (0.5 + 0.2 * np.sin(x / 60 * 6 * np.pi) * np.sin(y / 60 * 6 * np.pi)).astype(np.float32)
+    views = np.broadcast_to(picture, (5, 5, 60, 60))
+    field = vcc.LightField.from_views(views, 2e-3, 2.8e-3, 1.0, disparity_range=(0, 0))
+    image = camera.capture(field, between_views="none")
+    np.save("raw.npy", image.to_numpy())
+    np.save("upright.npy", image.upright().to_numpy())
+    expected = decode_heterodyne(image, camera, border=0.1)
+    for name, more in (("raw", []), ("upright", ["--upright"])):
+        result = run("decode", f"{name}.npy", "--camera", "masked.toml", "-o", f"{name}.npz", *more)
+        assert result.exit_code == 0, result.output
+        assert "calibration simulated" in result.stdout
+        assert "5×5 of" in result.stdout
+        found = vcc.open_light_field(f"{name}.npz")
+        np.testing.assert_allclose(found.values, expected.values, atol=1e-6)
+        assert found.frame.isclose(expected.frame)
+    said = refused("decode", "raw.npy", "--camera", "masked.toml", "--white", "raw.npy", "-o", "a.npz")
+    assert "--white is for lenslets" in said
+    Path("far.toml").write_text(MASKED.format(z=49.0))
+    said = refused("decode", "raw.npy", "--camera", "far.toml", "-o", "a.npz")
+    assert "carriers overlap" in said
+    assert "or less before the sensor" in said
+
+
+@pytest.mark.usefixtures("here")
+def test_views_for_people_are_exposed():
+    result = run("decode", "raw.tif", "--white", "white.tif", "--dark", "dark.tif", "--views", 3, "-o", "views")
+    assert result.exit_code == 0, result.output
+    assert "HCI-style folder, 8-bit sRGB, exposure" in result.stdout
+    assert len(list(Path("views").glob("*.png"))) == 9
+
+
+@pytest.mark.usefixtures("here")
+def test_bad_input_is_refused_in_words():
+    known = "--camera", "camera.toml"
+    assert "give --white" in refused("decode", "raw.tif", "-o", "a.npz")
+    write("cut.tif", numbers("raw.tif")[:-1].copy())
+    assert "95×100 pixels and the camera's sensor 96×100" in refused("decode", "cut.tif", *known, "-o", "a.npz")
+    assert "the white image is 95×100" in refused("decode", "raw.tif", "--white", "cut.tif", *known, "-o", "a.npz")
+    assert "dark" in refused("decode", "raw.tif", "--white", "dark.tif", *known, "-o", "a.npz")
+    holes = numbers("raw.tif").astype(np.float32)
+    holes[3, 4] = np.nan
+    np.save("holes.npy", holes)
+    assert "not finite" in refused("decode", "holes.npy", *known, "-o", "a.npz")
+    assert "there already" in refused("decode", "raw.tif", *known, "-o", "raw.tif")
+    # Said before anything is read.
+    assert "cannot be written as" in refused("decode", "not-there.tif", *known, "-o", "a.jpg")
+    assert "name must end in" in refused("decode", "camera.toml", *known, "-o", "a.npz")
+    assert "--calibration is for a mask" in refused(
+        "decode", "raw.tif", *known, "--calibration", "x", "-o", "a.npz"
+    )
+    assert "do not fit into micro-images" in refused("decode", "raw.tif", *known, "--views", 30, "-o", "a.npz")
+    assert "no list of centres" in refused("decode", "raw.tif", "--centres", "none.csv", "-o", "a.npz")
+    Path("words.csv").write_text("x,y\n1,2\nthree,4\n")
+    assert "two numbers each" in refused("decode", "raw.tif", "--centres", "words.csv", "-o", "a.npz")
+    np.save("far.npy", lattice() + 500)
+    assert "lie outside" in refused("decode", "raw.tif", "--centres", "far.npy", "-o", "a.npz")
+    Path("plain.toml").write_text(PLENOPTIC.split("[[elements]]\nkind = \"lens_array\"")[0] +
+                                  "[sensor]" + PLENOPTIC.split("[sensor]")[1])  # fmt: skip
+    assert "holds no views" in refused("decode", "raw.tif", "--camera", "plain.toml", "-o", "a.npz")
+    assert not list(Path().glob("a.*"))
+
+
+@real
+def test_a_lytro_recording_by_its_list_of_centres(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = DATA / "lytro_f01"
+    result = run(
+        *(
+            "decode",
+            folder / "IMG_3.jpg",
+            "--centres",
+            folder / "image_cords.mat",
+            "--centres-order",
+            "row-column",
+        ),
+        *("--centres-from", 1, "--color-filter", "BGGR", "--views", 3, "--view-step", 3, "-o", "lytro.zarr"),
+    )
+    assert result.exit_code == 0, result.output
+    assert "a hexagonal lattice of 9.933 pixels" in result.stdout
+    assert "Note" not in result.stderr
+    field = open_store("lytro.zarr").read()
+    low, high = field.measured_disparity_range()
+    # Views ±3 pixels apart: of one pixel each, −0.27 to 0.85 were measured in all 7×7.
+    assert -1.5 < low < -0.3
+    assert 1.8 < high < 3.2
