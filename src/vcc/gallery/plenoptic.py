@@ -25,7 +25,7 @@ from vcc.light_field import LightField
 from vcc.optics import Lens, LensArray, PhasePlate
 from vcc.patterns import Circle
 from vcc.recording import expose_image
-from vcc.recover import LensletGrid, decode_plenoptic
+from vcc.recover import LensletGrid, decode_plenoptic, without_aberration
 from vcc.sensor import Sensor
 from vcc.surfaces import Surface, Zernike
 from vcc.units import um
@@ -162,7 +162,8 @@ def run(bench: Bench, progress: Progress) -> Result:
     surface = Zernike.from_terms({11: SPHERICAL, 8: COMA}, plenoptic.diameter)
     # What stands at the lens bends no light away from it: micro-images of white, and so the white image, stay.
     spoilt = plenoptic.decoded(plenoptic.recorded(bench.light_field, surface), white)
-    lens = [_values(plenoptic.refocuser(each).at(bench.middle)) for each in (spoilt, resorted(spoilt, surface))]
+    put_right = without_aberration(spoilt, surface)
+    lens = [_values(plenoptic.refocuser(each).at(bench.middle)) for each in (spoilt, put_right)]
     before, after = (psnr(picture, ideal[1], peak) for picture in lens)
     numbers = [
         Finding(
@@ -282,30 +283,6 @@ def depth_of_field(plenoptic: Plenoptic) -> fringes.Sharpness:
 
 
 # --- aberrations ---
-
-
-def resorted(decoded: LightField, surface: Surface) -> LightField:
-    """Each view moved back by the slopes that a plate at the views' plane has added to its rays.
-
-    A ray that came at the slope s to the place u of the plate is found at s + Δs(u) by a decoder that takes the
-    lens for perfect (Ng and Hanrahan, Digital correction of lens aberrations in light field photography, 2006).
-
-    Args:
-        decoded: at the plane of the plate, its pixels along s and t.
-        surface: whose gradient is Δs.
-    """
-    from scipy.ndimage import shift
-
-    linear = decoded.frame.linear
-    values = np.array(decoded.values, dtype=np.float32)
-    nt, ns = values.shape[2:4]
-    for row, column in np.ndindex(*values.shape[:2]):
-        u, v = decoded.frame([column, row, (ns - 1) / 2, (nt - 1) / 2])[:2]
-        across, down = surface.slopes(u, v)
-        moved = (-float(down) / linear[3, 3], -float(across) / linear[2, 2], 0.0)
-        # Views are smooth between lenslets only as far as cubic splines follow them.
-        values[row, column] = shift(values[row, column], moved[: values.ndim - 2], order=3, mode="nearest")
-    return decoded.replaced(np.maximum(values, 0))
 
 
 # --- what is shown ---

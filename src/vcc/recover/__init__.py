@@ -4,6 +4,7 @@ stacks, deblurring, decoding of plenoptic and mask-modulated recordings, depth.
 
 from __future__ import annotations
 
+from vcc.recover.aberration import without_aberration
 from vcc.recover.deblur import Deblurred, blurred, richardson_lucy, sparse_gradients, wiener
 from vcc.recover.defocus_depth import DefocusDepth, defocus_kernels, depth_from_defocus
 from vcc.recover.depth import DepthMap, depth_by_plane_sweep, depth_by_structure_tensor, disparity_error
@@ -42,4 +43,5 @@ __all__ = [
     "richardson_lucy",
     "sparse_gradients",
     "wiener",
+    "without_aberration",
 ]
