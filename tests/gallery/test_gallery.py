@@ -13,7 +13,7 @@ import vcc
 from vcc.cli import commands
 from vcc.formats.pictures import read_picture
 from vcc.formats.writing import save_light_field
-from vcc.gallery import ENTRIES, Entry, Finding, Picture, Result, entries, entry, write_entry
+from vcc.gallery import ENTRIES, Entry, Finding, Picture, Result, entries, entry, extended_depth, write_entry
 from vcc.gallery import biprism_stereo as biprism
 from vcc.gallery import integral_lens_prism as integral
 from vcc.gallery import light_field_rendering as rendering
@@ -217,26 +217,15 @@ def test_distance_from_one_recording():
 # --- wavefront coding ---
 
 
-def test_the_filter_undoes_a_known_blur():
-    y, x = np.mgrid[:90, :90].astype(float)
-    picture = Waves(12.0)(x, y)[..., 0]
-    spread = np.zeros((5, 5))
-    spread[1, 2:] = 1 / 3  # off its middle, so that a mirrored or shifted filter fails
-    blurred = sum(Waves(12.0)(x - across, y + 1)[..., 0] for across in (0, 1, 2)) / 3
-    inner = np.s_[15:-15, 15:-15]
-    assert psnr(wavefront.wiener(blurred, [spread], 0.01)[inner], picture[inner]) > 45
-    assert psnr(blurred[inner], picture[inner]) < 35
-
-
 def test_a_cubic_plate_spreads_a_point_as_far_as_its_parabola(light_field):
     bench = bench_for(light_field)
     pair = wavefront.designed(bench)
-    spread = wavefront._spread(bench, pair.coded, pair.focus, pair.focus)
+    spread = pair.comparison.spreads(pair.coded)[extended_depth.DEPTHS // 2]
     assert spread.sum() == pytest.approx(1)
     # α·x³ bends by 3αλ/(2πR)·x² at most, hence a spot that wide times d, from the axis to one side (of an upright
     # picture: the other).
-    sensor_z = bench.image_distance(pair.focus)
-    width = 3 * pair.alpha * wavefront.WAVELENGTH / (math.pi * wavefront.PUPIL) * sensor_z
+    sensor_z = bench.image_distance(pair.comparison.focus)
+    width = 3 * pair.alpha * extended_depth.WAVELENGTH / (math.pi * extended_depth.PUPIL) * sensor_z
     pixels = width / (SLOPE * sensor_z)
     across = np.flatnonzero(spread.sum(axis=0) > 1e-9)
     middle = spread.shape[1] // 2
@@ -255,7 +244,7 @@ def test_wavefront_coding_runs_on_a_light_field_of_one_s_own(monkeypatch):
         (5, 5), (320, 320), spacing=4 * mm, slope_per_pixel=0.00125, focus_distance=CONVERGENCE, dtype="float32"
     )
     for name, value in (("DEPTHS", 3), ("RAYS", 200), ("TARGET", 80)):
-        monkeypatch.setattr(wavefront, name, value)
+        monkeypatch.setattr(extended_depth, name, value)
     result = entry("wavefront-coding").run(fine)
     with_plate, without = result.numbers[:2]
     assert with_plate.value > 0.9 > without.value

@@ -318,7 +318,8 @@ TWO = np.full((2, 8, 9), 0.5)
         (lambda: wiener(HOLE, LOPSIDED, 0.1), r"the recording has nan at index \(0, 0\)"),
         (lambda: wiener(PICTURE, np.full((3, 3), np.nan), 0.1), r"the PSF has nan at index \(0, 0\)"),
         (lambda: wiener(PICTURE, [[-0.5, 1.5]], 0.1), "the PSF is negative"),
-        (lambda: wiener(PICTURE, np.full((2, 1, 1), 1.0), 0.1), "A PSF for each depth goes with masks="),
+        (lambda: richardson_lucy(PICTURE, np.full((2, 1, 1), 1.0)), "A PSF for each depth goes with masks="),
+        (lambda: wiener(PICTURE, np.full((2, 1, 1), 0.7), 0.1), "PSF 0 sums to 0.7"),
         (lambda: blurred(np.zeros(5), LOPSIDED), "the picture has the axes"),
         (lambda: blurred(PICTURE, LOPSIDED, borders="dark"), "borders is"),
         (lambda: blurred(PICTURE, [["a"]]), "array of floating-point numbers"),
@@ -339,3 +340,24 @@ TWO = np.full((2, 8, 9), 0.5)
 def test_what_cannot_be_is_refused(call, words):
     with pytest.raises(vcc.InputError, match=words):
         call()
+
+
+def test_one_filter_for_several_psfs_is_the_closed_form_of_least_squares():
+    """Σ conj(K)·Y/(Σ|K|² + n·σ²/P), by NumPy alone; and of equal PSFs it is the filter of one."""
+    random = np.random.default_rng(12)
+    picture, n, noise, contrast = random.random((24, 24)), 24, 0.05, 0.03
+    psfs = np.stack([np.pad(LOPSIDED, 1), disc(3)[:5, :5]])
+    transfers = []
+    for psf in psfs:
+        kernel = np.zeros((n, n))
+        kernel[:5, :5] = psf
+        transfers.append(np.fft.fft2(np.roll(kernel, (-2, -2), (0, 1))))
+    f2 = np.add.outer(np.fft.fftfreq(n) ** 2, np.fft.fftfreq(n) ** 2)
+    filter_ = sum(np.conj(k) for k in transfers) / (
+        sum(np.abs(k) ** 2 for k in transfers) + 2 * noise**2 * f2 / contrast**2
+    )
+    expected = np.fft.ifft2(np.fft.fft2(picture) * filter_).real
+    found = wiener(picture, psfs, noise, contrast=contrast, borders="periodic").picture
+    np.testing.assert_allclose(found, expected, atol=1e-13)
+    one = wiener(picture, psfs[0], noise).picture
+    np.testing.assert_allclose(wiener(picture, psfs[[0, 0]], noise).picture, one, atol=1e-13)

@@ -81,12 +81,19 @@ class _Blur:
     transfer: NDArray[np.complex128]  # (layers, rows, columns // 2 + 1)
 
     @classmethod
-    def of(cls, psf: ArrayLike, masks: ArrayLike | None, shape: tuple[int, int], borders: str) -> _Blur:
+    def of(
+        cls,
+        psf: ArrayLike,
+        masks: ArrayLike | None,
+        shape: tuple[int, int],
+        borders: str,
+        several: bool = False,
+    ) -> _Blur:
         from scipy import fft
 
         if borders not in ("unknown", "periodic"):
             raise InputError(f'borders is "unknown" or "periodic", not {borders!r}')
-        psfs = _checked_psf(psf, shape, masks is not None)
+        psfs = _checked_psf(psf, shape, several or masks is not None)
         size = psfs.shape[1:]
         middle = size[0] // 2, size[1] // 2
         if borders == "periodic":
@@ -186,12 +193,14 @@ def wiener(
     Apertures for Defocus Deblurring?* (2009) have it. P is infinite at f = 0, so the mean brightness stays as it
     is. Without noise it divides by K wherever K lets anything pass, and leaves lost frequencies at 0.
 
-    One filter is for one PSF. Where the PSF changes with depth, `sparse_gradients` takes masks; with an exponent
-    of 2 it has this prior.
+    Of n PSFs, such as those of n depths that are equally likely, it makes the one filter of least mean squared
+    error over all: X = Σ conj(K)·Y / (Σ |K|² + n·σ²/P). That serves cameras whose PSF hardly changes with depth.
+    Where it does change and depths are known, `sparse_gradients` takes masks; with an exponent of 2 it has this
+    prior.
 
     Args:
         recording: (rows, columns[, channels]), any unit.
-        psf: (rows, columns), sum 1.
+        psf: (rows, columns), sum 1; or several of one size, (n, rows, columns), for which there is one filter.
         noise: standard deviation σ of the recording's noise, in its unit; 0 where there is none.
         contrast: √c, in the recording's unit × cycles per pixel, where P is the mean squared amplitude of a
             unitary Fourier transform; None takes that by which the recording's variance is as the prior foretells.
@@ -208,13 +217,13 @@ def wiener(
     if contrast is not None and not (contrast > 0 and math.isfinite(contrast)):
         raise InputError(f"the contrast of the prior must be above 0, not {contrast}")
     rows, columns = channels.shape[1:]
-    blur = _Blur.of(psf, None, (rows, columns), borders)
+    blur = _Blur.of(psf, None, (rows, columns), borders, several=np.ndim(psf) == 3)
     down, right = np.meshgrid(fft.fftfreq(blur.domain[0]), fft.rfftfreq(blur.domain[1]), indexing="ij")
     squared = down**2 + right**2
     # Frequencies that the half spectrum leaves out are the conjugates of those it has.
     twice = np.where((right > 0) & (right < 0.5), 2.0, 1.0)
-    transfer = blur.transfer[0]
-    power = np.abs(transfer) ** 2
+    transfer = blur.transfer.mean(axis=0)
+    power = (np.abs(blur.transfer) ** 2).mean(axis=0)
     passed = power > _PRESENT**2 if noise == 0 else np.full(power.shape, True)
     spread = float((twice * power / np.where(squared > 0, squared, np.inf)).sum())
     found = np.zeros((len(channels), rows, columns))
@@ -484,7 +493,7 @@ def _checked_psf(psf: ArrayLike, shape: tuple[int, int], layered: bool) -> Array
     if psfs.dtype.kind not in "fiu":
         raise InputError(f"a PSF is an array of floating-point numbers, not of {psfs.dtype}")
     if psfs.ndim != (3 if layered else 2) or 0 in psfs.shape:
-        axes = "(layers, rows, columns), as there are masks" if layered else "(rows, columns)"
+        axes = "(layers, rows, columns), one for each layer" if layered else "(rows, columns)"
         raise InputError(
             f"the PSF has the axes {axes}; this one has the shape {psfs.shape}"
             + ("" if layered or psfs.ndim != 3 else ". A PSF for each depth goes with masks=")

@@ -1,0 +1,293 @@
+"""Diffusers that extend the depth of field: random-phase (García-Guerrero 2007) and radial (Cossairt 2010)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.demo import figures, story
+from vcc.demo.bench import Bench
+from vcc.gallery import extended_depth
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.extended_depth import ALIKE, PUPIL, WAVELENGTH, Comparison, Elements, Measured
+from vcc.optics import Lens, Mask, PhasePlate
+from vcc.patterns import Circle
+from vcc.surfaces import Surface
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+RINGS = 96
+"""Rings of the plates, of equal area."""
+MARGIN = 1.5
+"""How much further than the range of depths the plates reach, so that its ends are like its middle."""
+SEED = 2007
+FREQUENCY = 0.1
+"""Cycles per pixel at which contrast is compared."""
+LEAST_GAIN = 5.0
+"""dB: what wavefront coding is asked for, asked here too."""
+
+
+@dataclass(frozen=True)
+class RandomRings(Surface):
+    """A round surface of rings of equal area, each of which bends light along the radius by a random amount.
+
+    Args:
+        radius: of the surface, metres.
+        strongest: the largest deflection at the rim, as a slope: ring n has gₙ evenly spread over ±strongest.
+        power: of r/radius by which the deflection grows: 1 makes rings of lenses, each of its own focal length
+            (García-Guerrero et al. 2007); 0 makes wedges that scatter as far everywhere (Cossairt et al. 2010).
+        rings: how many.
+        seed: of their order.
+    """
+
+    radius: float = field(metadata={"unit": "length"})
+    strongest: float
+    power: int
+    rings: int = RINGS
+    seed: int = SEED
+
+    @cached_property
+    def amounts(self) -> Array:
+        """Of the rings from the middle outwards, evenly spread over ±1 and in random order."""
+        even = (np.arange(self.rings) + 0.5) / self.rings * 2 - 1
+        return np.random.default_rng(self.seed).permutation(even)
+
+    def path(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """∫ of the deflection over the radius: continuous, with a kink between rings; metres."""
+        r = np.hypot(x, y) / self.radius
+        edges = np.sqrt(np.arange(self.rings + 1) / self.rings)
+        grown = edges ** (self.power + 1) / (self.power + 1)
+        before = np.concatenate([[0], np.cumsum(self.amounts * np.diff(grown))])
+        ring = self._ring(r)
+        within = self.amounts[ring] * (r ** (self.power + 1) / (self.power + 1) - grown[ring])
+        return np.asarray(self.strongest * self.radius * (before[ring] + within))
+
+    def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """strongest·gₙ·(r/radius)^power along the radius."""
+        x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
+        r = np.hypot(x, y)
+        bent = self.strongest * self.amounts[self._ring(r / self.radius)] * (r / self.radius) ** self.power
+        away = np.where(r > 0, r, 1)
+        return bent * x / away, bent * y / away
+
+    def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
+        """The strongest ring's, at the rim or at the corner of the rectangle."""
+        far = max(np.hypot(half_width, half_height) / self.radius, 1.0) ** self.power
+        return self.strongest * far, self.strongest * far
+
+    def _ring(self, r: ArrayLike) -> NDArray[np.intp]:
+        return np.minimum((np.square(r) * self.rings).astype(np.intp), self.rings - 1)
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """The lens without a diffuser and with each kind.
+
+    Args:
+        comparison: over which depths.
+        strongest: deflection of the diffusers at the rim, as a slope.
+        plain: elements without a diffuser.
+        random: with the random-phase one.
+        radial: with the radial one.
+    """
+
+    comparison: Comparison
+    strongest: float
+    plain: tuple[Lens | Mask, ...]
+    random: tuple[Lens | PhasePlate, ...]
+    radial: tuple[Lens | PhasePlate, ...]
+
+
+def designed(bench: Bench) -> Kinds:
+    """Diffusers that bend by `MARGIN` times what defocus does at the rim.
+
+    Raises:
+        InputError: a range of depths so small that nothing is out of focus.
+    """
+    comparison = Comparison(bench, round=True)
+    lens = Lens(bench.focal_length)
+    strongest = MARGIN * comparison.reach * PUPIL / 2
+    random, radial = (
+        (lens, PhasePlate(RandomRings(PUPIL / 2, strongest, power), diameter=PUPIL)) for power in (1, 0)
+    )
+    return Kinds(comparison, strongest, (lens, Mask(Circle(PUPIL))), random, radial)
+
+
+def run(bench: Bench, progress: Progress) -> Result:
+    """PSFs over depth without and with both diffusers, a flat target restored by one filter, and the scene."""
+    kinds = designed(bench)
+    comparison, depths = kinds.comparison, kinds.comparison.depths
+    steps, done = 3 * len(depths) + 2, 0
+
+    def advance() -> None:
+        nonlocal done
+        done += 1
+        progress(done, steps)
+
+    progress(0, steps)
+    cameras: dict[str, Elements] = {
+        "no diffuser": kinds.plain,
+        "random-phase": kinds.random,
+        "radial": kinds.radial,
+    }
+    found = {words: comparison.measured(elements, kinds.plain, advance) for words, elements in cameras.items()}
+    pictures = (
+        (
+            Picture(
+                "psf",
+                "Point-spread functions",
+                "From near to far, rays traced; brightness is the square root of light, each PSF by its own peak.",
+                extended_depth.spreads_figure(found, depths),
+            ),
+        ),
+        (
+            Picture(
+                "target",
+                "A flat target near, in focus and far",
+                "Restored by one filter for each camera; in focus without a diffuser no filter is needed.",
+                extended_depth.target_figure(found, depths),
+            ),
+        ),
+        (
+            Picture(
+                "contrast",
+                "Contrast",
+                "Modulation transfer along a row: in focus (full lines) and at the near end (dashed).",
+                _contrast_figure(found),
+            ),
+        ),
+        extended_depth.scene_pictures(
+            comparison,
+            ("No diffuser", kinds.plain),
+            ("Radial diffuser", kinds.radial),
+            found["radial"].spreads,
+            advance,
+        ),
+    )
+    narrowest = PUPIL / 2 * (1 - math.sqrt(1 - 1 / RINGS))
+    spread = WAVELENGTH * comparison.sensor((1, 1)).z / narrowest
+    text = paragraphs(
+        [
+            f"A lens of f = {story.length(bench.focal_length)} and {story.length(PUPIL)} opening, focused "
+            f"{story.away(comparison.focus)}, with a clear diffuser in it: a plate of {RINGS} rings of equal "
+            "area, each of which bends light by a random amount along the radius. <i>Random-phase</i>, after "
+            "García-Guerrero and others: each ring is a lens of its own, so that light of a point comes to a "
+            "focus at places spread evenly along the axis. <i>Radial</i>, after Cossairt, Zhou and Nayar: each "
+            "ring is a wedge, and light is scattered along the radius as far in the middle as at the rim. "
+            f"Either bends by up to {1e3 * kinds.strongest:.2g} mrad at the rim, {MARGIN:g} times what defocus "
+            "does at the ends of the range. At every depth some light of a point meets in its middle: a peak "
+            "that falls as one over the distance from it. Number and order of the rings are ours: with fewer of "
+            "them chance counts for more.",
+            f"A flat target, the middle view of the light field, is recorded at {len(depths)} depths with noise "
+            f"of {extended_depth.NOISE:.1%} of white, and restored by one Wiener filter for all depths. The "
+            "camera without a diffuser has a filter made likewise, or none where that is better. Decibels are "
+            "against the lens’s picture in focus without noise.",
+            f"Rays, no diffraction. The outermost ring is {story.length(narrowest)} wide, and by itself would "
+            f"spread light over λ·d/a = {story.length(spread)}: a real plate must be laid out by waves, as "
+            "the published ones were.",
+        ]
+    )
+    numbers = tuple(
+        number
+        for words in ("random-phase", "radial")
+        for number in _findings(words, found[words], found["no diffuser"], depths)
+    )
+    plain = found["no diffuser"].alike
+    without = Finding(
+        "PSF alike over depth, no diffuser: lowest correlation",
+        f"not alike: below {ALIKE}",
+        plain,
+        "",
+        plain < ALIKE,
+    )
+    return Result(text, pictures, (without, *numbers), bench.assumed)
+
+
+def _findings(words: str, coded: Measured, plain: Measured, depths: tuple[float, ...]) -> list[Finding]:
+    numbers = [
+        Finding(
+            f"PSF alike over depth, {words}: lowest correlation",
+            f"alike: {ALIKE} or more",
+            coded.alike,
+            "",
+            coded.alike >= ALIKE,
+            "the peak in the middle stays; what lies around it changes with depth",
+        )
+    ]
+    for end in (0, -1):
+        gain = coded.decibels[end] - plain.decibels[end]
+        numbers.append(
+            Finding(
+                f"flat target {story.away(depths[end])}, {words}, one filter for all depths: gain",
+                f"{LEAST_GAIN:g} dB or more",
+                gain,
+                "dB",
+                gain >= LEAST_GAIN,
+                f"{coded.decibels[end]:.1f} dB against {plain.decibels[end]:.1f} dB",
+            )
+        )
+    middle = len(depths) // 2
+    kept = float(contrast(coded.spreads[middle], FREQUENCY)) / float(contrast(plain.spreads[middle], FREQUENCY))
+    numbers += [
+        Finding(
+            f"contrast in focus at {FREQUENCY:g} cycles per pixel that is left, {words}",
+            "",
+            kept,
+            "",
+            None,
+            "what is spread around the peak veils the picture",
+        ),
+        Finding(
+            f"what the diffuser costs in focus, {words}",
+            "",
+            plain.decibels[middle] - coded.decibels[middle],
+            "dB",
+            None,
+            "the filter that gives contrast back amplifies noise",
+        ),
+    ]
+    return numbers
+
+
+def contrast(spread: Array, frequency: ArrayLike) -> Array:
+    """The modulation transfer along rows |Σ PSF·exp(−2πi·f·x)|, f in cycles per pixel."""
+    across = np.arange(spread.shape[1]) - spread.shape[1] // 2
+    wave = np.exp(-2j * np.pi * np.multiply.outer(np.asarray(frequency, np.float64), across))
+    return np.asarray(np.abs(wave @ spread.sum(axis=0)))
+
+
+def _contrast_figure(found: dict[str, Measured]) -> Figure:
+    figure = figures.new_figure(7.5, 3.6)
+    axes = figure.subplots()
+    frequency = np.linspace(0, 0.5, 101)
+    for (words, each), colour in zip(found.items(), (figures.QUIET, figures.ACCENT, "#0072B2"), strict=True):
+        middle = len(each.spreads) // 2
+        axes.plot(frequency, contrast(each.spreads[middle], frequency), color=colour, label=words)
+        axes.plot(frequency, contrast(each.spreads[0], frequency), color=colour, linestyle="--")
+    axes.set_xlabel("frequency [cycles per pixel]", fontsize=figures.LABEL)
+    axes.set_ylabel("contrast left", fontsize=figures.LABEL)
+    axes.set_xlim(0, 0.5)
+    axes.set_ylim(0, 1.02)
+    axes.legend(fontsize=figures.LABEL, frameon=False)
+    return figure
+
+
+ENTRY = Entry(
+    "diffuser-depth-of-field",
+    "Random-phase and radial diffusers for depth of field",
+    "E. E. García-Guerrero, E. R. Méndez, H. M. Escamilla, T. A. Leskova and A. A. Maradudin, Design and "
+    "fabrication of random phase diffusers for extending the depth of focus, Optics Express 15, 2007; "
+    "O. Cossairt, C. Zhou and S. Nayar, Diffusion coded photography for extended depth of field, ACM Transactions "
+    "on Graphics 29 (SIGGRAPH 2010)",
+    "A clear diffuser at the lens makes the blur alike at all depths, so that one filter restores them all, at a "
+    "cost in contrast.",
+    run,
+)

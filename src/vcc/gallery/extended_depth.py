@@ -1,0 +1,289 @@
+"""What cameras that make the blur alike at all depths are measured by: PSFs, a flat target and the scene.
+
+Each is compared with the same lens without its element: how alike its PSFs are over a range of depths, what one
+filter for all depths restores, and what that costs in focus.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.camera import Camera
+from vcc.demo import figures, story
+from vcc.demo.bench import Bench
+from vcc.errors import InputError
+from vcc.gallery.entry import Picture
+from vcc.image import Image
+from vcc.light_field import LightField
+from vcc.optics import Lens, Mask, PhasePlate
+from vcc.plot.tracing import trace
+from vcc.recover import wiener
+from vcc.sensor import Sensor
+from vcc.units import mm, nm
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Elements = Sequence[Lens | PhasePlate | Mask]
+
+PUPIL = 10 * mm
+"""Width of the opening."""
+WAVELENGTH = 550 * nm
+LEAST_MISFOCUS = 20 / 3
+"""ψ in radians at the ends of the range below which there is no depth of field to extend."""
+DEPTHS = 7
+NOISE = 0.005
+"""Standard deviation of the noise of all recordings, as a share of white."""
+TARGET = 240
+"""Largest side of the flat target, pixels."""
+RAYS = 800
+"""Rays across the opening of which a point-spread function is made."""
+SAMPLES = 512
+"""Rays for each pixel of a recording: of fewer the sampling, not the noise, would limit what filters restore."""
+BORDER = 0.14
+"""Share of the flat target at each side that decibels leave out: filters know too little there."""
+ALIKE = 0.95
+"""Correlation from which on PSFs count as alike."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What came of a camera.
+
+    Args:
+        spreads: its PSF at each depth, upright, of sum 1, (depths, rows, columns).
+        restored: the flat target at each depth, (rows, columns).
+        decibels: PSNR of these.
+    """
+
+    spreads: Array
+    restored: tuple[Array, ...]
+    decibels: tuple[float, ...]
+
+    @property
+    def alike(self) -> float:
+        """The lowest correlation of a PSF with the one in focus."""
+        middle = self.spreads[len(self.spreads) // 2].ravel()
+        return min(float(np.corrcoef(each.ravel(), middle)[0, 1]) for each in self.spreads)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Cameras compared over a range of depths; all are focused in its middle, in 1/Z.
+
+    Args:
+        bench: whose light field they see, and whose middle view is the flat target.
+        round: whether their opening is a disc, of the diameter `PUPIL`, or else a square.
+    """
+
+    bench: Bench
+    round: bool = False
+
+    def __post_init__(self) -> None:
+        if self.misfocus < LEAST_MISFOCUS:
+            raise InputError(
+                f"the scene's depths reach from {self.bench.near:.3g} to {self.bench.far:.3g} m, a misfocus of "
+                f"{self.misfocus:.2g} rad only: nothing is out of focus. Give a light field with more parallax"
+            )
+
+    @property
+    def focus(self) -> float:
+        """Where they are focused, metres."""
+        return 2 / (1 / self.bench.near + 1 / self.bench.far)
+
+    @property
+    def reach(self) -> float:
+        """|1/Z − 1/focus| at the ends of the range, 1/m."""
+        return (1 / self.bench.near - 1 / self.bench.far) / 2
+
+    @property
+    def misfocus(self) -> float:
+        """ψ = π·R²/λ·|1/Z − 1/focus| at the ends, radians (Dowski and Cathey 1995)."""
+        return math.pi * (PUPIL / 2) ** 2 / WAVELENGTH * self.reach
+
+    @property
+    def depths(self) -> tuple[float, ...]:
+        """Metres, nearest first, in equal steps of 1/Z."""
+        vergences = np.linspace(1 / self.bench.near, 1 / self.bench.far, DEPTHS)
+        return tuple(1 / float(v) if v > 1e-9 else math.inf for v in vergences)
+
+    @property
+    def slope(self) -> float:
+        """What a pixel spans, as a slope."""
+        return abs(float(self.bench.light_field.frame.linear[2, 2]))
+
+    def sensor(self, shape: tuple[int, int]) -> Sensor:
+        """A sensor in focus, its pixels those of the views."""
+        distance = self.bench.image_distance(self.focus)
+        return Sensor(distance, shape, self.slope * distance)
+
+    def spreads(self, elements: Elements) -> Array:
+        """The PSFs of points on the axis at all depths, on the sensor's pixels: rays traced and counted.
+
+        Returns:
+            (depths, rows, columns), upright as pictures are, each of sum 1.
+        """
+        sensor = self.sensor((1, 1))
+        places = ((np.arange(RAYS) + 0.5) / RAYS - 0.5) * PUPIL
+        u, v = (axis.ravel() for axis in np.meshgrid(places, places))
+        if self.round:
+            inside = np.hypot(u, v) <= PUPIL / 2
+            u, v = u[inside], v[inside]
+        camera = Camera(elements, sensor)
+        landed = [
+            trace(camera, np.stack([u, v, u / depth, v / depth], axis=-1)).positions[:, -1]
+            for depth in self.depths
+        ]
+        pitch = sensor.pitches[0]
+        reach = math.ceil(max(float(np.abs(each).max()) for each in landed) / pitch) + 2
+        edges = (np.arange(2 * reach + 2) - reach - 0.5) * pitch
+        counts = np.stack([np.histogram2d(each[:, 1], each[:, 0], bins=(edges, edges))[0] for each in landed])
+        return np.asarray(counts[:, ::-1, ::-1] / counts.sum(axis=(1, 2), keepdims=True))
+
+    def target(self) -> Array:
+        """A flat target: the middle of the middle view, grey, 0 to 1."""
+        nv, nu, nt, ns = self.bench.light_field.shape[:4]
+        view = self.bench.light_field.view(nv // 2, nu // 2).to_numpy().astype(np.float64)
+        grey = view if view.ndim == 2 else view.mean(axis=2)
+        rows, columns = min(nt, TARGET), min(ns, TARGET)
+        top, left = (nt - rows) // 2, (ns - columns) // 2
+        grey = grey[top : top + rows, left : left + columns]
+        return np.asarray(grey / np.percentile(grey, 99.5))
+
+    def recorded(self, elements: Elements, depth: float, noise: float = NOISE) -> tuple[Array, float]:
+        """The flat target at a depth, through a camera; upright, white 1, with noise; and how much of it.
+
+        Beyond its border it goes on mirrored, so that the border of the recording holds no dark.
+        """
+        flat = self.target()
+        margin = min(64, *(side - 1 for side in flat.shape))
+        wide = np.pad(flat, margin, mode="symmetric").astype(np.float32)
+        # All views of a flat thing are the same picture where they converge on it.
+        views = np.ascontiguousarray(np.broadcast_to(wide, (2, 2, *wide.shape)))
+        field = LightField.from_views(views, PUPIL, self.slope, depth, disparity_range=(0.0, 0.0))
+        return self.photographed(elements, field, (flat.shape[0], flat.shape[1]), noise)
+
+    def photographed(
+        self, elements: Elements, field: LightField, shape: tuple[int, int], noise: float = NOISE
+    ) -> tuple[Array, float]:
+        """A light field through a camera, upright, with noise; and how much, that of the rays with it.
+
+        Radiance 1 through the whole opening is 1.
+        """
+        camera = Camera(elements, self.sensor(shape))
+        image = camera.capture(field, method="rays", samples=SAMPLES)
+        scale = camera.sensor.z**2 / (PUPIL**2 * (math.pi / 4 if self.round else 1))
+        values = image.upright().to_numpy().astype(np.float64) * scale
+        noisy = values + noise * np.random.default_rng(0).standard_normal(values.shape)
+        return noisy, math.hypot(noise, image.sampling_error * scale)
+
+    def measured(self, elements: Elements, plain: Elements, advance: Callable[[], None]) -> Measured:
+        """The PSFs of a camera, and the flat target restored by one Wiener filter for all depths.
+
+        Args:
+            elements: of the camera.
+            plain: of the one without an element, whose picture in focus without noise is the truth. If that is the
+                camera itself, a recording stays as it is where no filter is better.
+            advance: called after each depth.
+        """
+        spreads = self.spreads(elements)
+        sharp, _ = self.recorded(plain, self.focus, noise=0)
+        restored, decibels = [], []
+        for depth in self.depths:
+            taken, noise = self.recorded(elements, depth)
+            candidates = [wiener(taken, spreads, noise).picture]
+            if elements is plain:
+                candidates.append(taken)
+            best = max(candidates, key=lambda each: psnr(each, sharp))
+            restored.append(best)
+            decibels.append(psnr(best, sharp))
+            advance()
+        return Measured(spreads, tuple(restored), tuple(decibels))
+
+
+def psnr(picture: Array, truth: Array) -> float:
+    """Decibels, white 1, without the borders."""
+    rows, columns = (round(BORDER * n) for n in truth.shape[:2])
+    inner = np.s_[rows : truth.shape[0] - rows, columns : truth.shape[1] - columns]
+    return -10 * math.log10(max(float(np.mean((picture[inner] - truth[inner]) ** 2)), 1e-20))
+
+
+def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Figure:
+    """PSFs side by side over depth, a row a camera.
+
+    Args:
+        found: by the words that stand beside the row.
+        depths: metres.
+    """
+    side = min(max(each.spreads.shape[1] for each in found.values()), 61)
+    figure = figures.new_figure(1.5 * len(depths), 1.6 * len(found) + 0.2)
+    grid = figure.subplots(len(found), len(depths), squeeze=False)
+    for row, (words, each) in enumerate(found.items()):
+        for axes, spread, depth in zip(grid[row], each.spreads, depths, strict=True):
+            wide = np.pad(spread, max((side - len(spread)) // 2, 0))
+            cut = max((len(wide) - side) // 2, 0)
+            shown = np.sqrt(wide / wide.max()).astype(np.float32)[cut : cut + side, cut : cut + side]
+            figures.put(axes, shown, story.away(depth) if row == 0 else "", cmap="gray", vmin=0, vmax=1)
+        grid[row, 0].set_ylabel(words, fontsize=figures.LABEL)
+    return figure
+
+
+def target_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Figure:
+    """The flat target restored near, in focus and far, a row a camera."""
+    figure = figures.new_figure(9.0, 3.2 * len(found))
+    grid = figure.subplots(len(found), 3, squeeze=False)
+    for row, (words, each) in enumerate(found.items()):
+        for axes, place in zip(grid[row], (0, len(depths) // 2, -1), strict=True):
+            picture = each.restored[place]
+            rows, columns = (int(BORDER / 2 * n) for n in picture.shape)
+            inner = picture[rows : picture.shape[0] - rows, columns : picture.shape[1] - columns]
+            title = f"{words}, {story.away(depths[place])}: {each.decibels[place]:.1f} dB"
+            shown = np.clip(inner, 0, 1).astype(np.float32) ** np.float32(1 / 2.2)
+            figures.put(axes, shown, title, cmap="gray", vmin=0, vmax=1)
+    return figure
+
+
+def scene_pictures(
+    comparison: Comparison,
+    plain: tuple[str, Elements],
+    coded: tuple[str, Elements],
+    spreads: Array,
+    advance: Callable[[], None],
+) -> tuple[Picture, ...]:
+    """The light field itself through both cameras, and the coded recording restored by the one filter.
+
+    Args:
+        comparison: whose light field.
+        plain: the words above the picture, and the elements.
+        coded: likewise.
+        spreads: PSFs of the coded camera.
+        advance: called after each picture.
+    """
+    field = comparison.bench.light_field
+    rows, columns = (int(0.94 * n) for n in field.shape[2:4])
+    without, _ = comparison.photographed(plain[1], field, (rows, columns))
+    advance()
+    recorded, noise = comparison.photographed(coded[1], field, (rows, columns))
+    advance()
+    white = float(np.percentile(without, 99.5)) if comparison.bench.scene is None else 1.0
+    whole = {
+        "plain": (plain[0], without),
+        "coded": (f"{coded[0]}, as recorded", recorded),
+        "restored": ("Restored by the one filter", wiener(recorded, spreads, noise).picture),
+    }
+    return tuple(
+        Picture(f"scene-{name}", title, "", shown(picture / white)) for name, (title, picture) in whole.items()
+    )
+
+
+def shown(picture: Array) -> figures.Shown:
+    """Upright values of white 1 as screens want them."""
+    return figures.shown(Image(picture.astype(np.float32), Affine.scaling(1, 1), inverted=False), 1.0)
