@@ -93,6 +93,11 @@ ELEMENTS = {
         vcc.Diffuser(KERNELS[1], z=25 * mm),
         vcc.Mask(patterns.Circle(12 * mm), z=30 * mm),
     ],
+    "fine cosines": [
+        vcc.Diffuser(KERNELS[2], z=8 * mm),
+        vcc.Mask(patterns.CosineSum((0.3 * mm, 0.7 * mm), 4, 0.3), z=20 * mm, decentre=(0.1 * mm, 0)),
+        vcc.Mask(patterns.CosineSum((0.5 * mm, np.inf), 2), z=22 * mm, width=14 * mm),
+    ],
     "gaps": [Gaps(z=20 * mm)],
     "thick": [vcc.FirstOrder.thick_lens((60 * mm, -50 * mm), 4 * mm, 1.5, z=2 * mm, decentre=(0.3 * mm, 0))],
     "mixing x and y": [vcc.FirstOrder(_turn := np.kron(np.eye(2), [[0.8, -0.6], [0.6, 0.8]]), 1 * mm, z=3 * mm)],

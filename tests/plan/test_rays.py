@@ -169,9 +169,28 @@ def test_functions_become_textures_as_fine_as_they_need():
     assert np.abs(weigh.texture(x, y)[:, 0] - np.exp(-(x**2 + y**2) / (3 * mm) ** 2)).max() < 1e-4
 
 
+def test_cosines_are_exact_however_many_periods_there_are():
+    pattern = vcc.patterns.CosineSum((20e-6, np.inf), harmonics=5, phase=0.4)
+    plan = plan_of(LENS, vcc.Mask(pattern, z=2 * mm, decentre=(3e-6, 0.0)))
+    (weigh,) = (step for step in plan.steps if isinstance(step, steps.Cosines))
+    x, y = np.random.default_rng(1).uniform(-3 * mm, 3 * mm, (2, 1000))
+    rays = steps.Bundle(x, y, 0 * x, 0 * x, np.ones(1000), np.zeros((1000, 0)))
+    weigh(rays)
+    # In closed form: ½ + Σ cos(nθ)/2h = ½ + (sin((h + ½)θ)/(2·sin(θ/2)) − ½)/2h, Dirichlet's kernel.
+    theta = 2 * np.pi * (x - 3e-6) / 20e-6 + 0.4
+    dirichlet = np.sin(5.5 * theta) / (2 * np.sin(theta / 2)) - 0.5
+    np.testing.assert_allclose(rays.share, 0.5 + dirichlet / 10, atol=1e-9)
+    assert not any("texture" in note for note in plan.notes)
+
+
 def test_what_is_too_fine_for_a_texture_is_said():
     plan = plan_of(LENS, vcc.PhasePlate(lambda x, y: (0.01 * np.sin(4e6 * x), 0 * y), diameter=6 * mm))
     assert any("phase plate" in note and "root mean square" in note for note in plan.notes)
+    # Of a mask, too, whose texture holds means: they are wrong alike at its points and between them.
+    plan = plan_of(LENS, vcc.Mask(lambda x, y: 0.5 + 0.5 * np.sin(4e6 * x) + 0 * y, width=6 * mm))
+    (note,) = (note for note in plan.notes if "mask" in note and "finer than its texture" in note)
+    # A sine of which nothing is left is off by its own root mean square, of a largest value between ½ and 1.
+    assert 35 < float(note.split(": ")[1].split("%")[0]) < 72
 
 
 @dataclass(frozen=True)

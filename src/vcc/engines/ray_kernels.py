@@ -173,6 +173,18 @@ def take_steps(codes, whole, real, shares, slopes, points, first, n, x, y, s, t,
             for p in range(n):
                 at = corner(x[p], y[p], a[0], a[1], f)
                 share[p] *= mixed(shares, a[2], 1, 0, a[1], at)
+        elif code == 12:
+            for p in range(n):
+                for axis in range(2):
+                    if f[2 + axis] > 0:
+                        place = x[p] if axis == 0 else y[p]
+                        first_cosine = math.cos(f[2 + axis] * (place - f[axis]) + f[4])
+                        # cos((n + 1)θ) = 2·cos(θ)·cos(nθ) − cos((n − 1)θ)
+                        before, now, total = 1.0, first_cosine, first_cosine
+                        for _ in range(a[0] - 1):
+                            before, now = now, 2 * first_cosine * now - before
+                            total += now
+                        share[p] *= 0.5 + total / (2 * a[0])
         else:
             for p in range(n):
                 kernel = 0

@@ -19,9 +19,9 @@ from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.plan.diffuser_rules import diffusers_as_blurs
 from vcc.plan.footprint import REACH, SMALLEST_STEP
-from vcc.plan.model import Plan
+from vcc.plan.model import MaskLookup, Plan
 from vcc.plan.parallax_rule import BetweenViews, choose_between_views
-from vcc.plan.planes import Plane, depends_on_view_only, detail_lost, mask_lookup, tap_origin
+from vcc.plan.planes import Plane, depends_on_view_only, detail_lost, mask_lookup, tap_origin, texture_error
 from vcc.sampled import to_dtype
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ FINE_DETAIL_IN_SAMPLE = 0.01
 LARGEST_REFINEMENT = 8
 LARGEST_RASTER = 2**28
 """Pixels of the sensor and its margin: 1 GiB for each colour channel."""
+COARSE_TEXTURE = 5e-3
+"""Error of a mask's texture between its points, as a share of its largest value, from which on a plan says it."""
 LARGEST_CHOSEN_REFINEMENT = 4
 """Beyond this a plan divides samples only when told to: the cost grows with the square."""
 
@@ -121,6 +123,7 @@ def compile_plan(
         missing_rays=missing,
         missing_reason=reason,
         notes=_notes(camera, view_planes, path_planes, against_sensor, between, divide, fine, swapped)
+        + _coarse_textures(lookups)
         + blurs.notes,
         expected_ghosting=between.gap_left,
         opening=math.sqrt(sensor.fill_factor),
@@ -370,6 +373,16 @@ def _covered_share(first: Array, step: float, samples: int, pixels: int) -> Arra
     low, high = ends.min(axis=0), ends.max(axis=0)
     covered = np.minimum(high, pixels - 0.5) - np.maximum(low, -0.5)
     return np.asarray(np.clip(covered, 0, None) / pixels)
+
+
+def _coarse_textures(lookups: tuple[MaskLookup, ...]) -> tuple[str, ...]:
+    found = [(lookup, texture_error(lookup.texture)) for lookup in lookups]
+    return tuple(
+        f"{lookup.label} is finer than its texture of {'×'.join(map(str, lookup.texture.shape))} points shows: "
+        f"{error:.1%} root mean square of its largest value"
+        for lookup, error in found
+        if error > COARSE_TEXTURE
+    )
 
 
 def _notes(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NoReturn
@@ -17,7 +17,7 @@ from vcc.errors import InputError
 from vcc.optics.deflections import CellDeflection, FacetDeflection
 from vcc.optics.lattice import CellApertures, CellBlock, Product
 from vcc.optics.scatter import Scatter, SheetMap
-from vcc.patterns import Bounded, Cells, Circle, Open, Pattern
+from vcc.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
 from vcc.plan import steps
 from vcc.plan.beam import Beam
 from vcc.plan.parallax_rule import index_motions, vergences
@@ -576,11 +576,17 @@ def _transmission(
             pattern.middle[1] + decentre[1] - size[1] * rows / 2,
         )
         return [steps.CellShares(pattern.values.astype(np.float32), corner, size, label)]
+    if isinstance(pattern, CosineSum):
+        across, down = (2 * math.pi / period for period in pattern.periods)
+        return [steps.Cosines(decentre, (across, down), pattern.phase, pattern.harmonics, label)]
 
     def sampled(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
         return pattern.mean(x - decentre[0], y - decentre[1], *spacing)[..., None]
 
-    texture, error = _textured(sampled, region)
+    def itself(x: Array, y: Array) -> Array:
+        return np.asarray(pattern(x - decentre[0], y - decentre[1]))[..., None]
+
+    texture, error = _textured(sampled, region, itself)
     if error > WORTH_SAYING:
         notes.append(f"{label} is finer than its texture shows: {error:.1%} root mean square of its largest value")
     single = replace(texture, values=texture.values.astype(np.float32))
@@ -608,8 +614,16 @@ def _deflection(stage: Stage, region: tuple[Array, Array], label: str, notes: li
     return steps.TextureUnbend(texture, label)
 
 
-def _textured(sampled: object, region: tuple[Array, Array]) -> tuple[steps.Texture, float]:
-    """A texture fine enough for a function over a region, and its error between points (see `FINE_ENOUGH`)."""
+def _textured(
+    sampled: object, region: tuple[Array, Array], itself: Callable[[Array, Array], Array] | None = None
+) -> tuple[steps.Texture, float]:
+    """A texture fine enough for a function over a region, and its error anywhere (see `FINE_ENOUGH`).
+
+    Args:
+        sampled: the numbers that a point of the texture holds, a function of (x, y, spacing).
+        region: lowest and highest (x, y), metres.
+        itself: the function of (x, y) that the texture stands for, where that is not ``sampled``.
+    """
     low, high = region
     extent = np.maximum(high - low, 1e-9)
     generator = np.random.default_rng(0)
@@ -628,7 +642,7 @@ def _textured(sampled: object, region: tuple[Array, Array]) -> tuple[steps.Textu
             ]
         )
         texture = steps.Texture(values, (float(low[0]), float(low[1])), spacing)
-        truth = np.asarray(sampled(x, y, spacing))  # type: ignore[operator]
+        truth = np.asarray(sampled(x, y, spacing)) if itself is None else itself(x, y)  # type: ignore[operator]
         largest = np.abs(values).max()
         error = float(np.sqrt(np.mean((texture(x, y) - truth) ** 2)) / largest) if largest > 0 else 0.0
         if error < FINE_ENOUGH:

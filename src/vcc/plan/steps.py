@@ -355,6 +355,39 @@ class CellShares:
         packer.step(self.code, [*self.values.shape, table], [*self.corner, 1 / self.size[0], 1 / self.size[1]])
 
 
+@dataclass(frozen=True)
+class Cosines:
+    """A mask of sums of cosines along both axes, in closed form (`vcc.patterns.CosineSum`).
+
+    Args:
+        middle: place (x, y) of the mask, metres.
+        frequency: (x, y) of the first cosines, radians per metre; 0 along an axis without any.
+        phase: of the first cosines, radians.
+        harmonics: how many cosines.
+        words: for people.
+    """
+
+    middle: tuple[float, float]
+    frequency: tuple[float, float]
+    phase: float
+    harmonics: int
+    words: str
+    code: ClassVar[int] = 12
+
+    def __call__(self, rays: Bundle) -> None:
+        """Weigh rays by ½ + Σ cos(nθ)/2h along each axis."""
+        orders = np.arange(1, self.harmonics + 1)
+        for place, middle, frequency in zip((rays.x, rays.y), self.middle, self.frequency, strict=True):
+            if frequency > 0:
+                angle = frequency * (place - middle) + self.phase
+                total = np.cos(angle[..., None] * orders).sum(axis=-1)
+                rays.share = rays.share * (0.5 + total / (2 * self.harmonics))
+
+    def packed(self, packer: Packer) -> None:
+        """Middle, frequencies, phase, and how many cosines."""
+        packer.step(self.code, [self.harmonics], [*self.middle, *self.frequency, self.phase])
+
+
 @dataclass(frozen=True, eq=False)
 class TextureShares:
     """A mask of any other form, as a texture of means over its own points."""

@@ -1,0 +1,45 @@
+"""Textures of masks: how much linear interpolation between their points loses, in closed form, and who is told."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import vcc
+from vcc import patterns
+from vcc.plan.planes import texture_error
+from vcc.units import mm, um
+
+
+@pytest.mark.parametrize("points", [24, 40, 100])
+def test_the_error_of_a_cosine_between_points(points):
+    """Half-way between points, p a period, ½·cos(θ) is low by (1 − cos(π/p))/2·|cos θ|; the largest value is 1."""
+    texture = 0.5 + 0.5 * np.cos(2 * np.pi * np.arange(20 * points + 1) / points)
+    expected = (1 - math.cos(math.pi / points)) / 2 / math.sqrt(2)
+    found = texture_error(np.repeat(texture[None], 9, axis=0).astype(np.float32))
+    # A fourth of the error at twice the spacing: right but for (π/p)²/4 of it, 0.4 % of 24 points.
+    assert found == pytest.approx(expected, rel=0.01)
+    assert texture_error(np.repeat(texture[:, None], 9, axis=1).astype(np.float32)) == pytest.approx(found)
+
+
+def test_flat_and_dark_textures_have_none():
+    assert texture_error(np.full((8, 8), 0.3, np.float32)) == 0
+    assert texture_error(np.zeros((1, 1), np.float32)) == 0
+
+
+@pytest.mark.parametrize(("period", "told"), [(16 * um, True), (400 * um, False)])
+def test_a_mask_too_fine_for_its_texture_is_told(period, told):
+    """1500 pixels a view ask for 9000 texture points along s, of which 2048 are made: a cosine of five samples has
+    seven points, which are a tenth low half-way; one of 130 samples has all it needs."""
+    light_field = vcc.LightField.from_views(
+        np.ones((2, 2, 4, 1500), np.uint8), 0.1 * mm, 0.06 / 1000, math.inf, disparity_range=(0.0, 0.0)
+    )
+    mask = vcc.Mask(patterns.CosineSum((period, math.inf)), z=51 * mm, name="fine")
+    camera = vcc.Camera([vcc.Lens(50 * mm), mask], vcc.Sensor(52 * mm, (4, 1500), 3 * um))
+    notes = [note for note in camera.compile(light_field, method="footprints").notes if "its texture" in note]
+    assert bool(notes) is told
+    if told:
+        assert "fine" in notes[0]
+        assert 0.01 < float(notes[0].split(": ")[1].split("%")[0]) / 100 < 0.1
