@@ -67,6 +67,15 @@ def test_pictures_are_those_given(tmp_path):
     assert np.sqrt(np.mean((noise - NOISE) ** 2)) < np.sqrt(8.4**2 + 1.91 * 6.9**2) / 255
 
 
+def test_figures_of_lines_stay_sharp_and_figures_of_photographs_small(tmp_path):
+    lines, photograph = Figure(figsize=(3, 3)), Figure(figsize=(3, 3))
+    lines.subplots().plot([0, 1, 0.5])
+    photograph.figimage(np.random.default_rng(1).random((300, 300, 3)))
+    result = Result("", ((Picture("lines", "", "", lines), Picture("photograph", "", "", photograph)),), ())
+    write_entry_markdown(ENTRY, result, tmp_path)
+    assert sorted(path.name for path in (tmp_path / "some").iterdir()) == ["lines.png", "photograph.jpg"]
+
+
 def test_pictures_may_stand_elsewhere(tmp_path):
     page = write_entry_markdown(ENTRY, RESULT, tmp_path / "pages", pictures=tmp_path / "images" / "some")
     assert "](../images/some/ramp.png)" in page.read_text(encoding="utf-8")

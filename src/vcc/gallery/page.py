@@ -19,6 +19,8 @@ from vcc.gallery.entry import Entry, Finding, Picture, Result
 VERDICTS = {True: "reached", False: "not reached", None: "–"}
 JPEG_QUALITY = 88
 """Of photographs on Markdown pages: below it, noise and fine print begin to suffer."""
+PHOTOGRAPHS = 0.5
+"""A figure is taken for photographs where as JPEG it takes less than this share of its PNG."""
 
 
 def write_entry(entry: Entry, result: Result, folder: Path) -> Path:
@@ -54,7 +56,7 @@ def write_entry_markdown(
 ) -> Path:
     """Write an entry's page as Markdown, ``NAME.md``, for a site or a repository.
 
-    Photographs are JPEG, unless PNG is smaller; figures are PNG.
+    Photographs and figures made of them are JPEG, other figures PNG.
 
     Args:
         entry: whose run it was.
@@ -139,21 +141,27 @@ def _row_markdown(row: Sequence[tuple[Picture, str]], there: str) -> str:
 
 
 def _compact(picture: Picture, folder: Path) -> str:
-    """Write a picture small enough for a site; returns its file's name."""
-    if not isinstance(picture.content, np.ndarray):
-        write_figure(picture.content, folder / f"{picture.name}.png")
-        return f"{picture.name}.png"
-    from imagecodecs import jpeg8_encode, png_encode
+    """Write a picture small enough for a site; returns its file's name.
 
-    codes = _codes(picture.content)
-    encoded = {
-        "png": png_encode(codes, level=9),
-        "jpg": jpeg8_encode(codes, level=JPEG_QUALITY, subsampling="444"),
-    }
-    ending = min(encoded, key=lambda name: len(encoded[name]))
-    with atomic_path(folder / f"{picture.name}.{ending}") as temporary:
-        temporary.write_bytes(encoded[ending])
-    return f"{picture.name}.{ending}"
+    Lines and even areas stay sharp as PNG; what is far smaller as JPEG is a photograph, or a figure made of some.
+    """
+    from imagecodecs import jpeg8_encode, png_decode, png_encode
+
+    png = folder / f"{picture.name}.png"
+    if isinstance(picture.content, np.ndarray):
+        codes, share = _codes(picture.content), 1.0
+        with atomic_path(png) as temporary:
+            temporary.write_bytes(png_encode(codes, level=9))
+    else:
+        write_figure(picture.content, png)
+        codes, share = np.ascontiguousarray(png_decode(png.read_bytes())[..., :3]), PHOTOGRAPHS
+    encoded = jpeg8_encode(codes, level=JPEG_QUALITY, subsampling="444")
+    if len(encoded) > share * png.stat().st_size:
+        return png.name
+    with atomic_path(folder / f"{picture.name}.jpg") as temporary:
+        temporary.write_bytes(encoded)
+    png.unlink()
+    return f"{picture.name}.jpg"
 
 
 def _written(picture: Picture, folder: Path) -> Panel:
