@@ -11,8 +11,10 @@ from matplotlib.figure import Figure
 import vcc
 from vcc.demo.scene import demo_scene
 from vcc.formats.transfer import from_linear
-from vcc.patterns import CosineSum
+from vcc.gallery.entry import bench_for
+from vcc.gallery.heterodyne import designed, recorded
 from vcc.recover.heterodyne import decode_heterodyne, heterodyne_calibration
+from vcc.recover.heterodyne_band import band_limited, true_views
 from vcc.recover.plenoptic import decode_plenoptic, find_lenslets
 from vcc.units import m, mm
 
@@ -33,13 +35,6 @@ def save(figure: Figure, name: str) -> None:
         axes.set_yticks([])
         axes.title.set_fontsize(9)
     figure.savefig(HERE / name, dpi=80)
-
-
-def _dilated(values: np.ndarray) -> np.ndarray:
-    """Points of a spectrum, large enough to be seen."""
-    from scipy.ndimage import maximum_filter
-
-    return maximum_filter(values, 3)
 
 
 def plenoptic() -> None:
@@ -73,62 +68,39 @@ def plenoptic() -> None:
 
 
 def heterodyne() -> None:
-    """A wall in focus behind a pane of glass near by, both within what 5×5 tiles hold."""
-    focus, stop, harmonics, tile = 1 * m, 10 * mm, 2, 40
-    d = 1 / (1 / F - 1 / focus)
-    tiles, size = 2 * harmonics + 1, 8 * mm
-    side = tiles * tile
-    pixel = size / side
-    gamma = 1 / (1 + tiles * pixel / stop)
-    period = gamma * tiles * pixel
-    stop_sheet = vcc.Mask(pattern=np.ones((1, 1)), width=stop, name="stop")
-    mask = vcc.Mask(pattern=CosineSum(period, harmonics=harmonics), z=d * (1 - period / stop), name="carrier")
-    camera = vcc.Camera(
-        [vcc.Lens(focal_length=F), stop_sheet, mask], vcc.Sensor(z=d, shape=(side, side), pitch=pixel)
+    """The demo's scene, low-passed to what 9×9 tiles hold, through the gallery's camera, and back."""
+    views, pixels = 16, 320
+    scene = demo_scene().light_field(
+        (views, views),
+        (pixels, pixels),
+        spacing=20 * mm / views,
+        slope_per_pixel=25 / 52 / pixels,
+        focus_distance=1.3 * m,
     )
-    count = 15
-    u = (np.arange(count) - (count - 1) / 2) * stop / count
-    x = (np.arange(side + 8) - (side + 7) / 2) * pixel
-    across, up = x[None, None, None, :], x[None, None, :, None]
-    right, down = u[None, :, None, None], u[:, None, None, None]
-    turn = 2 * np.pi / size
-    wall = np.cos(turn * 9 * across) * np.cos(turn * 7 * up) + np.cos(turn * (4 * across + 11 * up))
-    # The pane's cosines go through one period across the stop: one harmonic of the aperture.
-    moved, lowered = 5 * turn * across + 2 * np.pi / stop * right, 5 * turn * up + 2 * np.pi / stop * down
-    pane = np.cos(moved) + np.cos(lowered + 1) + np.cos(moved + lowered)
-    values = (0.5 + 0.07 * wall + 0.07 * pane).astype(np.float32)
-    light_field = vcc.LightField.from_views(values, stop / count, pixel / d, focus, disparity_range=(0, 0))
-    options = {"interpolation": "cubic", "refine": 4}
-    image = camera.capture(light_field, between_views="none", **options)
-    calibration = heterodyne_calibration(camera, light_field=light_field, **options)
-    decoded = decode_heterodyne(image, camera, calibration=calibration)
-
-    frame = decoded.frame.matrix
-    j, i, row, column = np.ogrid[tuple(slice(n) for n in decoded.shape)]
-    u2, v2 = frame[0, 0] * i + frame[0, 4], frame[1, 1] * j + frame[1, 4]
-    # As `from_views` counts places in a picture: d·(u/focus − s).
-    x2 = d * (u2 / focus - frame[2, 0] * i - frame[2, 2] * column - frame[2, 4])
-    y2 = d * (v2 / focus - frame[3, 1] * j - frame[3, 3] * row - frame[3, 4])
-    wall2 = np.cos(turn * 9 * x2) * np.cos(turn * 7 * y2) + np.cos(turn * (4 * x2 + 11 * y2))
-    moved2, lowered2 = 5 * turn * x2 + 2 * np.pi / stop * u2, 5 * turn * y2 + 2 * np.pi / stop * v2
-    truth = 0.5 + 0.07 * wall2 + 0.07 * (np.cos(moved2) + np.cos(lowered2 + 1) + np.cos(moved2 + lowered2))
+    camera = designed(bench_for(scene), scene)
+    image = recorded(camera, band_limited(scene, camera))
+    calibration = heterodyne_calibration(camera, samples=64)
+    decoded = decode_heterodyne(image, camera, calibration=calibration, border=0.08)
+    truth = true_views(scene, camera, decoded)
     inner = np.s_[1:-1, 1:-1]
-    error = np.sqrt(np.mean((decoded.values[inner] - truth[inner]) ** 2))
-    reached = -20 * np.log10(error / truth.max())
+    error = np.sqrt(np.mean((decoded.values[inner] - truth.values[inner]) ** 2))
+    reached = -20 * np.log10(error / truth.values.max())
     print(f"inner views {reached:.1f} dB")
 
-    figure = Figure(figsize=(12, 3.2), layout="constrained")
+    figure = Figure(figsize=(15, 3.5), layout="constrained")
     axes = figure.subplots(1, 5)
-    axes[0].imshow(image.values[:60, :60], cmap="gray")
-    axes[0].set_title("recording, 60×60 pixels of it")
-    spectrum = np.abs(np.fft.fftshift(np.fft.fft2(image.values)))
-    axes[1].imshow(_dilated(np.log10(spectrum + 1e-4 * spectrum.max())), cmap="magma")
-    axes[1].set_title("its spectrum: tiles around 0 and ±1")
-    for place, column in zip(axes[2:4], (1, 3), strict=True):
-        place.imshow(decoded.values[2, column], cmap="gray", vmin=0, vmax=1)
-        place.set_title(f"view (2, {column}), decoded")
-    axes[4].imshow(truth[2, 3], cmap="gray", vmin=0, vmax=1)
-    axes[4].set_title(f"view (2, 3), true; inner views {reached:.1f} dB")
+    recording = image.upright().to_numpy()
+    axes[0].imshow(shown(recording))
+    axes[0].set_title(f"recording, {recording.shape[1]}×{recording.shape[0]} pixels")
+    fade = np.multiply.outer(*(np.hanning(n) for n in recording.shape[:2]))
+    spectrum = np.abs(np.fft.fftshift(np.fft.fft2(recording.mean(axis=2) * fade)))
+    axes[1].imshow(np.log10(spectrum / spectrum.max()), cmap="inferno", vmin=-7.5, vmax=0)
+    axes[1].set_title("its spectrum: 9×9 tiles")
+    for place, column in zip(axes[2:4], (1, 7), strict=True):
+        place.imshow(shown(decoded.values[4, column]))
+        place.set_title(f"view {column + 1} of 9, decoded")
+    axes[4].imshow(shown(truth.values[4, 7]))
+    axes[4].set_title(f"view 8 of 9, true; inner views {reached:.1f} dB")
     save(figure, "heterodyne.png")
 
 

@@ -8,6 +8,7 @@ import markdown
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scipy.ndimage import gaussian_filter
 
 import vcc
 from vcc.formats.pictures import read_picture
@@ -70,7 +71,8 @@ def test_pictures_are_those_given(tmp_path):
 def test_figures_of_lines_stay_sharp_and_figures_of_photographs_small(tmp_path):
     lines, photograph = Figure(figsize=(3, 3)), Figure(figsize=(3, 3))
     lines.subplots().plot([0, 1, 0.5])
-    photograph.figimage(np.random.default_rng(1).random((300, 300, 3)))
+    grains = gaussian_filter(np.random.default_rng(1).random((300, 300, 3)), (2, 2, 0))
+    photograph.figimage((grains - grains.min()) / np.ptp(grains))
     result = Result("", ((Picture("lines", "", "", lines), Picture("photograph", "", "", photograph)),), ())
     write_entry_markdown(ENTRY, result, tmp_path)
     assert sorted(path.name for path in (tmp_path / "some").iterdir()) == ["lines.png", "photograph.jpg"]

@@ -189,6 +189,63 @@ def test_calibration_is_the_masks_shadow():
     assert error < max(3 * image.sampling_error / expected.mean(), 1e-3)
 
 
+def test_a_mask_of_many_periods_is_calibrated_as_well():
+    """Its shadow, as above: what the highest of four cosines loses would raise nine views' noise."""
+    camera = camera_with(4, 50)
+    image = heterodyne_calibration(camera, samples=64)
+    mask, sensor = camera.elements[-1], camera.sensor
+    x = sensor.column_places * mask.z / D
+    along = mask.pattern.mean(x, 0.0, sensor.pitch * mask.z / D, 0.0) / mask.pattern(0.0, 0.0) ** 0.5
+    expected = along[:, None] * along[None, :] * (1e-3 * STOP / D) ** 2
+
+    def highest(picture: np.ndarray) -> float:
+        carrier = np.exp(-2j * np.pi * 4 * mask.z / D / mask.pattern.period * sensor.column_places)
+        return float(abs((picture @ carrier).sum() / picture.sum()))
+
+    share = highest(image.values.astype(float)) / highest(expected)
+    print(f"the fourth cosine has {share:.4f} of its strength")
+    # Rays meet the cosines in closed form: what is left is the sampling error of the whole picture, 0.2 % or so,
+    # of which one frequency has far less.
+    assert share == pytest.approx(1, abs=1e-3)
+
+
+@pytest.mark.parametrize("harmonics", [2, 4])
+def test_detail_one_carrier_too_fine_comes_out_stronger_in_the_wrong_place(harmonics):
+    """A wave in focus at a carrier plus 3 periods lies in tile 1, where 3 periods across the views belong.
+
+    The mask's mean, ½, recorded it; tiles ±1 are divided by their cosine's 1/(4h): 2h times the wave, moved by one
+    period across the views.
+    """
+    tile, amplitude = 12, 0.01
+    camera = camera_with(harmonics, tile)
+    width = SIZE / D * FOCUS
+    fine = Scene((Layer(FOCUS, Texture(0.5, ((amplitude, (tile + 3) / width, 0.0, 0.0),))),))
+    decoded = decode_heterodyne(recorded(camera, fine), camera).values
+    # In which tile 0 has nothing left: the wave is beyond its end.
+    found = np.abs(np.fft.fft(decoded.mean(axis=(0, 2)), axis=1))[:, 3] / (tile / 2)
+    print(found / amplitude)
+    # The recording's 2×2 Gauss points a pixel differ from sinc f by (πf)⁴/270, below 2 % up to f = 4/9 cycles.
+    np.testing.assert_allclose(found, 2 * harmonics * amplitude, rtol=0.02)
+
+
+def test_even_noise_is_amplified_as_in_closed_form():
+    camera = camera_with(2, 24)
+    geometry = HeterodyneGeometry.of(camera)
+    random = np.random.default_rng(5)
+    level = 1e-3  # small, so that nothing is cut off at 0
+    recording = 0.25 * (1 + level * random.standard_normal(camera.sensor.shape))
+    views = decode_heterodyne(recording, camera).values.astype(float)
+    grey = decode_heterodyne(np.full(camera.sensor.shape, 0.25), camera).values.astype(float)
+    gain = (views - grey).std() / grey.mean() / level
+    print(f"{gain:.2f} times, by closed form {geometry.noise_amplification:.2f}")
+    # 16 of the 25 tiles have nearly all the noise, out of as many independent numbers as the sensor has pixels.
+    # Each tile's lowest frequency has no partner and is dropped: along each axis 1 − 1/24 of the power stays.
+    spread = 3 / np.sqrt(2 * 16 / 25 * recording.size)
+    assert (1 - spread) * (1 - 1 / 24) < gain / geometry.noise_amplification < 1 + spread
+    # Without what pixels take of fine waves: (½)⁻² + 4·(1/8)⁻² over 5 tiles, a quarter of it.
+    assert geometry.noise_amplification > 0.25 * (4 + 4 * 64) / 5
+
+
 # -- bad input
 
 

@@ -10,6 +10,7 @@ from vcc.recover.defocus_depth import DefocusDepth, defocus_kernels, depth_from_
 from vcc.recover.depth import DepthMap, depth_by_plane_sweep, depth_by_structure_tensor, disparity_error
 from vcc.recover.focal_stack import AllInFocus, FocalStack, focal_stack, focus_distances
 from vcc.recover.heterodyne import HeterodyneGeometry, decode_heterodyne, heterodyne_calibration
+from vcc.recover.heterodyne_band import band_limited, true_views
 from vcc.recover.plenoptic import LensletGrid, decode_plenoptic, find_lenslets
 from vcc.recover.refocus import ideal_camera, novel_view, refocused
 from vcc.recover.stereo import BiprismStereo, StereoDepth, depth_by_biprism
@@ -24,6 +25,7 @@ __all__ = [
     "HeterodyneGeometry",
     "LensletGrid",
     "StereoDepth",
+    "band_limited",
     "blurred",
     "decode_heterodyne",
     "decode_plenoptic",
@@ -42,6 +44,7 @@ __all__ = [
     "refocused",
     "richardson_lucy",
     "sparse_gradients",
+    "true_views",
     "wiener",
     "without_aberration",
 ]

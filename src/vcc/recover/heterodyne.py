@@ -97,6 +97,25 @@ class HeterodyneGeometry:
         )
         return rows, columns
 
+    @property
+    def noise_amplification(self) -> float:
+        """Noise of the decoded views over that of the recording, each as a share of what a grey card gives.
+
+        For noise that is alike and independent in all pixels. Along an axis with pixels of pitch p a tile holds
+        the share carrier·p of the recording's noise power. It is divided by the strength of the tile's cosine,
+        ½ in the middle and 1/(4·harmonics) elsewhere, and by what the pixels' area lets pass of its frequencies;
+        the power of all tiles adds up in every pixel of a view. A grey card is recorded at ¼.
+        """
+        n = np.arange(-self.harmonics, self.harmonics + 1)
+        strengths = np.where(n == 0, 0.5, 1 / (4 * self.harmonics))
+        within = (np.arange(200) + 0.5) / 200 - 0.5
+        amplification = 0.25
+        for carrier, pitch, width in zip(self.carrier, self.pixel_pitch, self.sensitive, strict=True):
+            passed = np.sinc((n[:, None] + within) * carrier * width)
+            power = (np.mean(1 / passed**2, axis=1) / strengths**2).sum() * carrier * pitch
+            amplification *= math.sqrt(power)
+        return amplification
+
 
 @dataclass(frozen=True, eq=False)
 class _Setup:
