@@ -96,7 +96,7 @@ def from_defocus(path: Path) -> None:
     field = PlanesScene(planes).light_field(
         (28, 28), (176, 292), spacing=width / 28, slope_per_pixel=pitch / behind, focus_distance=focus
     )
-    values = camera.capture(field, between_views="none").to_numpy().mean(axis=2)
+    values = camera.capture(field.replaced(field.values[..., :1]), between_views="none").to_numpy()[..., 0]
     values = values / values.mean() + np.random.default_rng(1).normal(0, 0.005, values.shape)
     candidates = [1.6, 1.4, 1.25, 1.1, 1.0, 0.9]
     kernels = defocus_kernels(camera, candidates)
@@ -106,8 +106,9 @@ def from_defocus(path: Path) -> None:
         ("the kernels", np.concatenate([k / k.max() for k in kernels], axis=1), (0, 1)),
         ("distance of blocks, m", found.distance[::-1, ::-1], (0.8, 1.7)),
         ("confidence: 1 is white", found.confidence[::-1, ::-1], (0, 1)),
+        ("smoothed, m", found.smoothed().distance[::-1, ::-1], (0.8, 1.7)),
     ]
-    _draw(panels, path, columns=2)
+    _draw(panels, path)
 
 
 def from_biprism(path: Path) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 import vcc
-from vcc.recover.defocus_depth import defocus_kernels, depth_from_defocus
+from vcc.recover.defocus_depth import DefocusDepth, _beliefs, defocus_kernels, depth_from_defocus
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Picture
 from vcc.units import mm, um
@@ -75,6 +76,42 @@ def test_the_scale_of_blur_is_right_on_textured_blocks(recording: np.ndarray, no
     assert right.size >= 60
     assert right.mean() >= 0.9
     assert found.confidence[:, inside].mean() > 0.9
+
+
+def test_confidence_is_the_share_that_is_right() -> None:
+    """Boards that hide one another, far from Gaussian, in much noise: probabilities must come true on average."""
+    from scipy.signal import fftconvolve
+
+    random = np.random.default_rng(5)
+    kernels = defocus_kernels(camera(), CANDIDATES)
+    said, true = [], []
+    for truth in (0, 2, 4):
+        scene = np.full((240, 240, 3), 0.5)
+        for _ in range(900):
+            (y, x), (h, w) = random.integers(0, 240, 2), (3 / np.sqrt(random.uniform(0.005, 1, 2))).astype(int)
+            scene[y : y + h, x : x + w] = random.random(3)
+        blurred = np.stack([fftconvolve(each, kernels[truth], mode="valid") for each in np.moveaxis(scene, 2, 0)])
+        noisy = np.moveaxis(blurred, 0, 2) + random.normal(0, 0.05, (*blurred.shape[1:], 3))
+        found = depth_from_defocus(noisy, kernels, CANDIDATES, noise=0.05, block=32)
+        said.append(1 / np.exp(found.log_likelihood).sum(axis=0))
+        true.append(found.index == truth)
+    probable, right = np.array(said).ravel(), np.array(true).ravel()
+    assert 0.4 < right.mean() < 0.97  # or else there is nothing to test
+    # Some 150 blocks that hardly overlap: the share has a standard deviation of 0.04 or less; twice that.
+    assert abs(probable.mean() - right.mean()) < 0.08
+    assert probable[right].mean() > probable[~right].mean() + 0.1
+
+
+def test_colours_tell_what_their_mean_does_not() -> None:
+    """Where two channels are each other's negatives, their mean is flat; turned apart, one holds all."""
+    from scipy.signal import fftconvolve
+
+    kernels = defocus_kernels(camera(), CANDIDATES)
+    blurred = fftconvolve(np.asarray(natural(3, 1.4).values)[:160, :160, 0], kernels[3], mode="valid")
+    noisy = np.stack([1 + blurred, 1 - blurred], axis=2)
+    noisy += np.random.default_rng(4).normal(0, 0.005, noisy.shape)
+    found = depth_from_defocus(noisy, kernels, CANDIDATES, noise=0.005)
+    assert (found.index == 3).mean() >= 0.9
 
 
 def test_kernels_are_the_aperture_scaled() -> None:
@@ -158,3 +195,52 @@ def test_bad_input_is_refused(image, kernels, options, message) -> None:
 def test_kernels_that_cannot_be_made_are_refused(made, distances, options, message) -> None:
     with pytest.raises(vcc.errors.InputError, match=message):
         defocus_kernels(made, distances, **options)
+
+
+def test_kernels_change_evenly_with_distance() -> None:
+    """Distances a hundredth of a pixel of blur apart have kernels of their own, each the hole's exact shadow."""
+    distances = [1.25 + 0.0005 * n for n in range(6)]
+    kernels = defocus_kernels(camera(np.ones((1, 1))), distances)
+    for distance, kernel in zip(distances, kernels, strict=True):
+        width = WIDTH * BEHIND * abs(1 / distance - 1 / FOCUS) / PITCH
+        edges = np.arange(len(kernel) + 1) - len(kernel) / 2
+        share = np.diff(np.clip(edges, -width / 2, width / 2)) / width
+        # Each of 64 views is spread over a tent as wide as two of them, which moves light across an edge by a
+        # sixth of a view on average, on either side of it.
+        assert np.abs(kernel.sum(axis=0) - share).max() < 1 / 64 / 6
+    for one, other in itertools.pairwise(kernels):
+        assert np.abs(one - other).max() > 1e-6
+
+
+def test_smoothing_keeps_borders_and_outvotes_a_stray_block() -> None:
+    likelihood = np.zeros((5, 6, 8))
+    for candidate in range(5):
+        likelihood[candidate, :, :4] = -10 * abs(candidate - 0)
+        likelihood[candidate, :, 4:] = -10 * abs(candidate - 4)
+    likelihood[:, 2, 1] = [-40, -30, -20, -10, 0]  # a stray one, sure of itself
+    likelihood -= likelihood.max(axis=0)
+    rows, columns = 24.0 * np.arange(6), 24.0 * np.arange(8)
+    index = likelihood.argmax(axis=0)
+    away = (1.6, 1.4, 1.2, 1.0, 0.9)
+    found = DefocusDepth(np.array(away)[index], index, np.ones((6, 8)), likelihood, rows, columns, 48, away)
+    smooth = found.smoothed(cost=2.0)
+    expected = np.repeat([[0] * 4 + [4] * 4], 6, axis=0)
+    np.testing.assert_array_equal(smooth.index, expected)
+    np.testing.assert_array_equal(smooth.distance, np.array(away)[expected])
+    assert found.index[2, 1] == 4
+    with pytest.raises(vcc.errors.InputError, match="cost is greater than 0"):
+        found.smoothed(cost=0)
+
+
+def test_messages_find_the_least_energy_of_a_chain() -> None:
+    """On a chain min-sum is exact: against all 3⁶ labellings."""
+    random = np.random.default_rng(4)
+    against, steps = random.random((3, 1, 6)), 0.4 * np.abs(np.subtract.outer(np.arange(3), np.arange(3)))
+    best = min(
+        itertools.product(range(3), repeat=6),
+        key=lambda labels: (
+            sum(against[label, 0, n] for n, label in enumerate(labels))
+            + sum(steps[a, b] for a, b in itertools.pairwise(labels))
+        ),
+    )
+    np.testing.assert_array_equal(_beliefs(against, steps, 60).argmin(axis=0)[0], best)

@@ -19,6 +19,7 @@ from vcc.camera import Camera
 from vcc.demo import figures, story
 from vcc.demo.bench import Bench
 from vcc.errors import InputError
+from vcc.gallery import flat_target
 from vcc.gallery.entry import Picture
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -149,14 +150,8 @@ class Comparison:
         return np.asarray(counts[:, ::-1, ::-1] / counts.sum(axis=(1, 2), keepdims=True))
 
     def target(self) -> Array:
-        """A flat target: the middle of the middle view, grey, 0 to 1."""
-        nv, nu, nt, ns = self.bench.light_field.shape[:4]
-        view = self.bench.light_field.view(nv // 2, nu // 2).to_numpy().astype(np.float64)
-        grey = view if view.ndim == 2 else view.mean(axis=2)
-        rows, columns = min(nt, TARGET), min(ns, TARGET)
-        top, left = (nt - rows) // 2, (ns - columns) // 2
-        grey = grey[top : top + rows, left : left + columns]
-        return np.asarray(grey / np.percentile(grey, 99.5))
+        """A flat target: the middle of the middle view, grey, 0 to 1; see `vcc.gallery.flat_target.grey_view`."""
+        return flat_target.grey_view(self.bench, TARGET)
 
     def recorded(self, elements: Elements, depth: float, noise: float = NOISE) -> tuple[Array, float]:
         """The flat target at a depth, through a camera; upright, white 1, with noise; and how much of it.

@@ -25,10 +25,12 @@ from vcc.sampled import to_numpy
 
 Array = NDArray[np.float64]
 
-_VIEWS_PER_PIXEL = 4  # of a kernel's width: a hole's edge is right to a share of a quarter pixel
-_FEWEST_VIEWS = 32
-_SAMPLE = 0.02  # of a pixel: the size of the point that kernels are made of
-_RATIOS = np.geomspace(0.01, 4, 9)  # of noise to the contrast of a pixel's gradient, that a block is tried with
+_VIEWS_PER_PIXEL = 4  # of a kernel's width
+_FEWEST_VIEWS = 64
+_SAMPLE = 0.02  # of a pixel: the least size of the point that kernels are made of
+_RATIOS = np.geomspace(0.01, 4, 6)  # of noise to the contrast of a pixel's gradient, that a block is tried with
+_EXPONENTS = (2, 3)  # of 1/f, in power: textures of all scales have 2, a few straight edges 3 (Field 1987)
+_SECTORS, _RINGS = 4, 4  # of a spectrum: its parts, which misfits of the model are taken to hit one by one
 _FINER = 4  # frequencies between those of a block, where expected spectra are computed
 _SMALLEST_CHANGE = 0.01  # pixels by which the radii of neighbouring kernels must differ
 
@@ -40,11 +42,14 @@ class DefocusDepth:
     Args:
         distance: metres before the entrance plane, one of the candidates, shape (block rows, block columns).
         index: which candidate that is, likewise.
-        confidence: 0 (all candidates explain the block alike, as where there is no texture) to 1, likewise.
-        log_likelihood: of each candidate, nats, shape (candidates, block rows, block columns).
+        confidence: 0 (all candidates explain the block alike, as where there is no texture) to 1, likewise: the
+            probability of the candidate found, less that of a guess.
+        log_likelihood: of each candidate, less that of the best, nats, shape (candidates, block rows, block
+            columns).
         rows: the row of each block's middle in the picture, pixels, shape (block rows,).
         columns: likewise the column, shape (block columns,).
         block: side of a block, pixels.
+        distances: of all candidates, metres.
     """
 
     distance: Array
@@ -54,6 +59,43 @@ class DefocusDepth:
     rows: Array
     columns: Array
     block: int
+    distances: tuple[float, ...] = ()
+
+    def smoothed(self, cost: float = 1.0, outliers: float = 0.02, sweeps: int = 100) -> DefocusDepth:
+        """The distances that fit the blocks and their neighbours best, as Levin et al. smooth theirs.
+
+        A Markov random field over the blocks: along a border as long as half a block, neighbours whose candidates
+        lie n apart cost cost·n nats, and no more than log(candidates): things end, and then anything may come.
+        Blocks overlap and tell much the same: each counts by the share of its window (its middle half each way)
+        that is its own, so that the step from block to block does not matter. No block outvotes all others: some
+        are wrong however sure, and then have any candidate, so that what the likelihood holds against one counts
+        up to log(candidates / outliers). The least energy is sought by min-sum belief propagation (Felzenszwalb
+        and Huttenlocher, *Efficient belief propagation for early vision*, 2006).
+
+        Args:
+            cost: of one step between neighbouring candidates, nats; with 1 it is e times less probable.
+            outliers: the share of blocks that are wrong though sure; of pictures of occluding discs and boards
+                about one in fifty.
+            sweeps: of messages, at least twice as many as there are blocks from side to side.
+
+        Returns:
+            The same blocks, with the distances, confidences and likelihoods that know the neighbours.
+
+        Raises:
+            InputError: a cost of zero or less, a share of outliers that is not between 0 and 1, or no sweeps.
+        """
+        if not (cost > 0 and 0 < outliers < 1 and sweeps >= 1):
+            raise InputError(
+                f"cost is greater than 0, outliers between 0 and 1 and sweeps 1 or more, not {cost}, {outliers} "
+                f"and {sweeps}"
+            )
+        count = len(self.log_likelihood)
+        step = float(np.diff(self.rows).min() if len(self.rows) > 1 else self.block / 2)
+        own = min(2 * step / self.block, 1.0)  # each way
+        against = own**2 * np.minimum(-self.log_likelihood, math.log(count / outliers))
+        apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+        belief = _beliefs(against, own * np.minimum(cost * apart, math.log(count)), sweeps)
+        return replace(self, **_decided(-belief, self.distances))
 
 
 def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: float | None = None) -> list[Array]:
@@ -91,10 +133,13 @@ def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: flo
     views = max(_FEWEST_VIEWS, math.ceil(_VIEWS_PER_PIXEL * widest))
     kernels = []
     for distance in away:
+        # The point is as large as its pictures by neighbouring views lie apart: they join without gaps. Smaller
+        # ones would step from pixel to pixel as the distance changes, all at once where they lie in rows.
+        size_of_point = max(aperture * abs(spread[distance]) / views, _SAMPLE * pitch)
         point = LightField.from_views(
             np.ones((views, views, 1, 1), np.float32),
             aperture / views,
-            _SAMPLE * pitch / abs(ray[0, 2]),
+            size_of_point / abs(ray[0, 2]),
             distance,
             disparity_range=(0.0, 0.0),
         )
@@ -121,23 +166,31 @@ def depth_from_defocus(
 ) -> DefocusDepth:
     """Which of several kernels blurred each block of a picture, hence how far away it is.
 
-    With kernel F and a Gaussian prior on gradients, P(ω) = a²/|∇(ω)|², the sharp picture x that explains a
-    recording y best has the energy ‖y − F∗x‖²/σ² + ‖∇x‖²/a² = Σ |Y|²/S, S = |F|²P + σ² (Levin et al. 2007, section
-    3). A wrong kernel has its zeros where the recording has light, and the energy is high. Levin et al. weigh the
-    energies of different kernels by factors learned from pictures; here the likelihood has them, −½·Σ(|Y|²/S + log
-    S) (Whittle 1953), taken over each block under a Hann window, with S as that window sees it. The strength of
-    the texture a and the noise σ (no less than is stated, as other things than noise are unexplained too) are
-    those most likely for the block.
+    With kernel F and a Gaussian prior P(ω) = a²/|∇(ω)|², the sharp picture x that explains a recording y best has
+    the energy ‖y − F∗x‖²/σ² + ‖∇x‖²/a² = Σ |Y|²/S, S = |F|²P + σ² (Levin et al. 2007, section 3). A wrong kernel
+    has its zeros where the recording has light, and the energy is high. Levin et al. weigh the energies of
+    different kernels by factors learned from pictures; here the likelihood has them, −½·Σ(|Y|²/S + log S) (Whittle
+    1953), taken over each block under a Hann window, with S as that window sees it. The strength of the texture a,
+    its exponent (of |∇|: 2, or 3 for straight edges) and the noise σ (no less than is stated, as other things than
+    noise are unexplained too) are those most likely for the block. Channels are turned into as many components
+    whose gradients are uncorrelated over the picture, each with a texture of its own.
+
+    Pictures are not Gaussian: a single strong edge may favour one wrong kernel by hundreds of nats, all from a few
+    frequencies. How far a difference D of log-likelihoods is to be trusted, the parts d of the spectrum tell (4
+    directions, 4 rings, each component): with V = Σ d², as White's sandwich (1982) has it, it counts as 2·D²/V
+    nats where that is less. Under the model V is 2·D, and D counts as it is.
 
     The likelihood knows the kernels by |F| alone, which is the same on both sides of the focal plane (the kernel
     is turned by 180°), whatever the code: candidates must lie on one side.
 
     Args:
-        image: the recording, as light lands on the sensor, (rows, columns[, channels]); channels are averaged.
+        image: the recording, as light lands on the sensor, (rows, columns[, channels]).
         kernels: for each candidate its point spread, as light lands on the sensor, of sum 1: `defocus_kernels`.
         distances: of the candidates, metres.
-        noise: standard deviation of the noise of a pixel (of the mean of its channels), in the picture's units.
-        block: side of the blocks, pixels, no smaller than the kernels. The window gives weight to its middle half.
+        noise: standard deviation of the noise of a pixel, the same in each channel, in the picture's units.
+        block: side of the blocks, pixels, no smaller than the kernels. The window gives weight to its middle half,
+            and tells zeros of a spectrum apart that lie 2/block or more from each other: a kernel's lie 1/width
+            apart, so blocks should be twice as wide.
         step: from block to block, pixels; None takes half a block.
         memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
@@ -149,9 +202,9 @@ def depth_from_defocus(
             kernel larger than the picture or a block or not of sum 1, a picture with NaNs or too small for one
             block, a noise of zero or less, more memory needed than allowed.
     """
-    values = _grey(image)
+    values = _values(image)
     spreads = [np.asarray(kernel, np.float64) for kernel in kernels]
-    _check_candidates(spreads, distances, values.shape)
+    _check_candidates(spreads, distances, values.shape[:2])
     if not (noise > 0 and math.isfinite(noise)):
         raise InputError(f"noise must be greater than 0, in the picture's units, not {noise}")
     step = max(1, block // 2) if step is None else step
@@ -163,31 +216,73 @@ def depth_from_defocus(
             f"the largest kernel has {largest} pixels a side, and a block {block}: take blocks of {largest} "
             "or more"
         )
-    starts = [np.arange(0, length - block + 1, step) for length in values.shape]
+    starts = [np.arange(0, length - block + 1, step) for length in values.shape[:2]]
     if not (starts[0].size and starts[1].size):
         raise InputError(
             f"a picture of {values.shape[0]}×{values.shape[1]} pixels holds no block of {block}: take a "
             "smaller block"
         )
-    needed = 8 * starts[0].size * starts[1].size * (3 * block**2 + len(spreads)) + 8 * 4 * (_FINER * block) ** 2
+    blocks, parts = starts[0].size * starts[1].size, _SECTORS * _RINGS * values.shape[2]
+    needed = 8 * blocks * (3 * block**2 + len(spreads) * parts) + 8 * 4 * (_FINER * block) ** 2
     check_memory(needed, memory_limit, "depth from defocus", "give a part of the picture")
     profile = np.sin(np.pi * (np.arange(block) + 0.5) / block) ** 2
     window = np.outer(profile, profile)
-    spectra = _spectra(values, starts, window)
-    likelihood = np.stack([_log_likelihood(spectra, kernel, window, noise) for kernel in spreads])
-    index = likelihood.argmax(axis=0)
-    share = np.exp(likelihood - likelihood.max(axis=0))
-    share = share.max(axis=0) / share.sum(axis=0)
-    count = len(spreads)
-    return DefocusDepth(
-        np.asarray(distances, np.float64)[index],
-        index,
-        np.asarray(np.clip((share - 1 / count) / (1 - 1 / count), 0, 1), np.float64),
-        likelihood,
-        starts[0] + (block - 1) / 2,
-        starts[1] + (block - 1) / 2,
-        block,
+    expected = [[_expected(kernel, window, exponent) for exponent in _EXPONENTS] for kernel in spreads]
+    shares = np.concatenate(
+        [
+            _log_likelihoods(_spectra(each, starts, window), expected, window, noise)
+            for each in _components(values)
+        ],
+        axis=-1,
     )
+    best = shares.sum(axis=-1).argmax(axis=0)
+    lost = np.take_along_axis(shares, best[None, ..., None], axis=0) - shares
+    difference, scatter = lost.sum(axis=-1), (lost**2).sum(axis=-1)
+    trusted = np.divide(2 * difference**2, scatter, out=np.zeros_like(scatter), where=scatter > 0)
+    away = tuple(float(distance) for distance in distances)
+    return DefocusDepth(
+        **_decided(-np.minimum(difference, trusted), away),
+        rows=starts[0] + (block - 1) / 2,
+        columns=starts[1] + (block - 1) / 2,
+        block=block,
+        distances=away,
+    )
+
+
+def _decided(log_likelihood: Array, distances: Sequence[float]) -> dict[str, Any]:
+    """What the likelihoods (candidates, rows, columns) come to, as `DefocusDepth` has it."""
+    relative = log_likelihood - log_likelihood.max(axis=0)
+    index = relative.argmax(axis=0)
+    guess = 1 / len(relative)
+    confidence = np.clip((1 / np.exp(relative).sum(axis=0) - guess) / (1 - guess), 0, 1)
+    away = np.asarray(distances, np.float64)[index]
+    return {"distance": away, "index": index, "confidence": confidence, "log_likelihood": relative}
+
+
+def _beliefs(against: Array, steps: Array, sweeps: int) -> Array:
+    """Costs (candidates, rows, columns) with what neighbours on the grid add, by min-sum messages.
+
+    Args:
+        against: what each block holds against each candidate.
+        steps: cost of a pair of neighbouring candidates, (candidates, candidates).
+        sweeps: how often messages go round.
+    """
+
+    def onward(held: Array) -> Array:
+        message = np.stack([(held + each[:, None, None]).min(axis=0) for each in steps])
+        return np.asarray(message - message.min(axis=0))
+
+    down, up, right, left = messages = np.zeros((4, *against.shape))
+    for _ in range(sweeps):
+        belief = against + messages.sum(axis=0)
+        # What a neighbour has said is left out of what it is told. All speak at once: halfway from what was said
+        # before, lest neighbours take turns for ever.
+        sent = [onward((belief - up)[:, :-1]), onward((belief - down)[:, 1:])]
+        sent += [onward((belief - left)[:, :, :-1]), onward((belief - right)[:, :, 1:])]
+        heard = (down[:, 1:], up[:, :-1], right[:, :, 1:], left[:, :, :-1])
+        for old, new in zip(heard, sent, strict=True):
+            old += (new - old) / 2
+    return np.asarray(against + messages.sum(axis=0))
 
 
 def _opening(camera: Camera) -> float:
@@ -211,7 +306,8 @@ def _crosses(low: float, high: float, focus: float) -> str:
     )
 
 
-def _grey(image: Image | ArrayLike) -> Array:
+def _values(image: Image | ArrayLike) -> Array:
+    """(rows, columns, channels), finite."""
     given: Any = to_numpy(image.values) if isinstance(image, Image) else np.asarray(image)
     if given.ndim not in (2, 3) or 0 in given.shape:
         raise InputError(f"a picture has (rows, columns[, channels]), not shape {given.shape}")
@@ -221,7 +317,7 @@ def _grey(image: Image | ArrayLike) -> Array:
             f"the picture holds {np.count_nonzero(~np.isfinite(values))} values that are NaN or infinite: "
             "replace them first, or give a part without them"
         )
-    return np.asarray(values if values.ndim == 2 else values.mean(axis=2))
+    return np.asarray(values.reshape(*values.shape[:2], -1))
 
 
 def _check_candidates(kernels: list[Array], distances: Sequence[float], shape: tuple[int, ...]) -> None:
@@ -273,8 +369,15 @@ def _spectra(values: Array, starts: list[Any], window: Array) -> Array:
     return np.asarray(np.abs(rfft2((blocks - mean) * window)) ** 2 / (window**2).sum())
 
 
-def _expected(kernel: Array, window: Array) -> Array:
-    """The power spectrum that texture of a gradient of 1 has, on average, under the kernel and the window."""
+def _components(values: Array) -> Array:
+    """The channels turned so that their gradients are uncorrelated, (channels, rows, columns); noise stays."""
+    channels = values.shape[2]
+    gradients = np.concatenate([np.diff(values, axis=axis).reshape(-1, channels) for axis in (0, 1)])
+    return np.asarray(np.moveaxis(values @ np.linalg.eigh(gradients.T @ gradients)[1], 2, 0))
+
+
+def _expected(kernel: Array, window: Array, exponent: float) -> Array:
+    """The power spectrum that texture of strength 1 has, on average, under the kernel and the window."""
     from scipy.fft import irfft2, rfft2
 
     size = len(window)
@@ -283,31 +386,50 @@ def _expected(kernel: Array, window: Array) -> Array:
     wx = 2 * np.pi * np.fft.rfftfreq(fine[1])
     gradient = 4 * np.sin(wy / 2) ** 2 + 4 * np.sin(wx / 2) ** 2
     gradient[0, 0] = np.inf  # the mean brightness says nothing
-    covariance = irfft2(np.abs(rfft2(kernel, fine)) ** 2 / gradient, fine)
+    covariance = irfft2(np.abs(rfft2(kernel, fine)) ** 2 / gradient ** (exponent / 2), fine)
     # A product with the window is, for the covariance, one with the window's own correlation.
     seen = irfft2(np.abs(rfft2(window, fine)) ** 2, fine) / (window**2).sum()
     power = rfft2(covariance * seen).real[::_FINER, ::_FINER]
     return np.asarray(np.maximum(power, 0))
 
 
-def _log_likelihood(spectra: Array, kernel: Array, window: Array, noise: float) -> Array:
-    """Of each block, for one kernel and the most likely texture and noise; up to a constant, nats."""
+def _log_likelihoods(spectra: Array, expected: Sequence[Sequence[Array]], window: Array, noise: float) -> Array:
+    """Of each block, for the most likely texture and noise; up to a constant, nats.
+
+    Args:
+        spectra: of blocks, (block rows, block columns, b, b // 2 + 1).
+        expected: for each candidate the power spectra of several textures.
+        window: (b, b).
+        noise: standard deviation.
+
+    Returns:
+        What each part of the spectrum says, (candidates, block rows, block columns, parts).
+    """
     size = len(window)
-    expected = _expected(kernel, window)
-    weight = np.full(expected.shape, 2.0)  # rfft holds one half of the spectrum
+    weight = np.full(spectra.shape[2:], 2.0)  # rfft holds one half of the spectrum
     weight[:, 0] = 1
     if size % 2 == 0:
         weight[:, -1] = 1
     # What the window spreads from the mean is not texture.
     weight[np.ix_([0, 1, 2, -1, -2], [0, 1, 2])] = 0
-    count = weight.sum()
-    best = np.full(spectra.shape[:2], -np.inf)
-    for ratio in _RATIOS:
-        variance = expected + ratio**2
-        energy = np.einsum("rcij,ij->rc", spectra, weight / variance) / count
-        # The scale a² that fits the block best, unless its noise σ = ratio·a would be less than is known.
-        scale = np.maximum(energy, (noise / ratio) ** 2)
-        log_determinant = float((weight * np.log(variance)).sum() / count)
-        best = np.maximum(best, -0.5 * count * (energy / scale + np.log(scale) + log_determinant))
+    wy, wx = np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None]
+    sector = np.floor(np.arctan2(wy, wx) / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
+    ring = np.minimum((np.hypot(wy, wx) * 2 * _RINGS).astype(int), _RINGS - 1)
+    part = np.arange(_SECTORS * _RINGS)[:, None, None]
+    weights = (weight * (sector * _RINGS + ring == part)).reshape(len(part), -1)
+    counts, flat = weights.sum(axis=1), spectra.reshape(-1, weight.size)
+    found = np.empty((len(expected), len(flat), len(part)))
+    for candidate, textures in enumerate(expected):
+        best = np.full(len(flat), -np.inf)
+        for texture in textures:
+            for ratio in _RATIOS:
+                variance = texture.ravel() + ratio**2
+                energy = flat @ (weights / variance).T
+                # The scale a² that fits the block best, unless its noise σ = ratio·a would be less than is known.
+                scale = np.maximum(energy.sum(axis=1) / counts.sum(), (noise / ratio) ** 2)[:, None]
+                each = -0.5 * (energy / scale + counts * np.log(scale) + weights @ np.log(variance))
+                better = each.sum(axis=1) > best
+                best[better], found[candidate, better] = each.sum(axis=1)[better], each[better]
     # Bins under a window tell much the same as their neighbours: only as many as its energy spans are new.
-    return np.asarray(best * (window**2).sum() ** 2 / (window**4).sum() / window.size)
+    new = (window**2).sum() ** 2 / (window**4).sum() / window.size
+    return np.asarray(new * found).reshape(len(expected), *spectra.shape[:2], len(part))
