@@ -123,7 +123,8 @@ def _sampling(plan: Plan) -> str:
         else "the sensor is finer than the samples' footprints: shares laid out backward, by pixel"
     )
     lines = [
-        f"  a step from sample to sample is {step:.3g} pixels on the sensor; {relation}",
+        f"  a step from sample to sample is {step:.3g} pixel{'' if f'{step:.3g}' == '1' else 's'} on the sensor; "
+        f"{relation}",
         f"  interpolation within a view: {plan.interpolation}"
         + ("" if plan.separable else "; the frame shears the pixel grid, which takes the slower general path"),
     ]

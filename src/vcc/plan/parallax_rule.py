@@ -153,7 +153,7 @@ def _in_focus(on_sensor: Array) -> Array:
 
 def _advice(largest: float, pixel: float) -> str:
     if largest <= 1.5 * pixel:
-        blur = "a pixel" if pixel == 1.0 else f"a sample, which is {pixel:.2g} pixels wide here"
+        blur = "a pixel" if f"{pixel:.2g}" == "1" else f"a sample, which is {pixel:.2g} pixels wide here"
         return f"less than about {blur}: their plain sum is the integral over the aperture"
     return (
         f"what is in focus forbids filling these gaps, so out-of-focus parts show ghost copies: "

@@ -501,7 +501,7 @@ class _Limits:
         until = "" if blocking is None else f", as far as {blocking.stage.element.label}"
         error = tangent_over_sine(largest)
         advice = (
-            f"Paraxial optics takes tangent and sine as one; here they differ by up to {error:.2g} of their size, "
+            f"Paraxial optics takes tangent and sine as one; here they differ by up to {error:.2%}, "
             f"and a real camera's corners get {1 - (1 + largest**2) ** -2:.0%} less light (cos⁴)."
         )
         return {"slope": SamplingItem(f"largest slope{until}", largest, "slope", LARGEST_SLOPE, advice)}
@@ -712,4 +712,5 @@ def _quantity(value: float, unit: str) -> str:
         return short(value, digits=3)
     if unit != "pixels":
         return f"{value:.3g}"
-    return f"{value:.3g} pixel" if value == 1 else f"{value:.3g} pixels"
+    number = f"{value:.3g}"
+    return f"{number} pixel" if number == "1" else f"{number} pixels"
