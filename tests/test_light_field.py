@@ -10,8 +10,8 @@ import pytest
 import torch
 
 import vcc
-from vcc.light_field import describe_geometry
 from vcc import Affine, LightField
+from vcc.light_field import describe_geometry
 from vcc.units import mm
 
 FRAME = Affine.scaling(1e-3, 1e-3, -1e-3, -1e-3)
