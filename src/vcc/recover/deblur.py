@@ -37,6 +37,9 @@ _FAINT = 1e-2
 (Bertero & Boccacci 2005)."""
 _SMOOTHED = 0.1
 """Gradients below this share of the typical one count quadratically, so that the prior has a derivative at 0."""
+_DIM, _CLASSES, _TRIED, _ROUNDS = 1e-14, 400, 40, 5
+"""Of the search for a prior: the faintest frequency that counts, classes of frequencies, values tried at once, and
+how often a search goes on between the best one's neighbours."""
 _MISFIT = 0.05
 """Of the recording's contrast, how far a layer's PSF is wrong for other layers: only for where a solver starts."""
 
@@ -203,7 +206,9 @@ def wiener(
         psf: (rows, columns), sum 1; or several of one size, (n, rows, columns), for which there is one filter.
         noise: standard deviation σ of the recording's noise, in its unit; 0 where there is none.
         contrast: √c, in the recording's unit × cycles per pixel, where P is the mean squared amplitude of a
-            unitary Fourier transform; None takes that by which the recording's variance is as the prior foretells.
+            unitary Fourier transform; None takes that by which the recording's spectrum is likeliest, and not
+            more than its variance allows, channel by channel; with unknown borders, what they blend counts as
+            further noise.
         borders: "periodic" is exact for pictures that go on periodically. "unknown" lets the recording's opposite
             edges blend into each other beyond its borders; up to a PSF from them the result is less sure.
 
@@ -225,21 +230,63 @@ def wiener(
     transfer = blur.transfer.mean(axis=0)
     power = (np.abs(blur.transfer) ** 2).mean(axis=0)
     passed = power > _PRESENT**2 if noise == 0 else np.full(power.shape, True)
-    spread = float((twice * power / np.where(squared > 0, squared, np.inf)).sum())
     found = np.zeros((len(channels), rows, columns))
+    samples = blur.domain[0] * blur.domain[1]
     for channel, out in zip(channels, found, strict=True):
-        if contrast is None:
-            # A constant picture has no variance: any small contrast leaves it constant.
-            variance = float(channel.var())
-            variance = max(variance - noise**2, 1e-6 * variance, 1e-300)
-            strength = variance * blur.domain[0] * blur.domain[1] / max(spread, 1e-300)
-        else:
-            strength = contrast**2
-        ratio = noise**2 * squared / strength
-        inverse = np.where(passed, np.conj(transfer) / np.where(passed, power + ratio, 1), 0)
         spectrum = fft.rfft2(blur.extended(channel, "wrap"))
+        strength, variance = 1.0 if contrast is None else contrast**2, noise**2
+        if contrast is None and noise > 0:
+            # Beyond the borders there is no noise, but what blends there is no picture behind this blur either.
+            share = rows * columns / samples
+            shown = np.abs(spectrum) ** 2 / samples
+            strength, variance = _likeliest(shown, power, squared, twice, share * noise**2, share < 1)
+            variance = max(variance / share, noise**2)
+        ratio = variance * squared / strength
+        inverse = np.where(passed, np.conj(transfer) / np.where(passed, power + ratio, 1), 0)
         out[...] = blur.seen(np.asarray(fft.irfft2(inverse * spectrum, s=blur.domain)))
     return Deblurred(_reshaped(found, shape))
+
+
+def _likeliest(
+    shown: Array, power: Array, squared: Array, count: Array, noise: float, more: bool
+) -> tuple[float, float]:
+    """The c and the noise of greatest likelihood: |Y|² is exponentially distributed, of mean |K|²·c/f² + σ².
+
+    Args:
+        shown: |Y|² of a unitary transform.
+        power: |K|².
+        squared: f², cycles per pixel.
+        count: how many frequencies each stands for.
+        noise: σ² as it is in ``shown``, above 0.
+        more: whether there may be more noise than that.
+
+    Returns:
+        c, and σ² as it is in ``shown``.
+    """
+    known = squared > 0
+    passed = power[known] / squared[known]
+    # Frequencies of one |K|²/f² have one mean: they count by their sum.
+    brightest = float(passed.max())
+    place = np.log(np.maximum(passed / brightest, _DIM)) / math.log(_DIM) * (_CLASSES - 1)
+    index = np.rint(place).astype(np.intp)
+    number = np.bincount(index, count[known], _CLASSES)
+    total = np.bincount(index, count[known] * shown[known], _CLASSES)
+    level = brightest * _DIM ** (np.arange(_CLASSES) / (_CLASSES - 1))
+    whole = max(float(total.sum()), 1e-300)
+    # Between a picture that noise hides everywhere and one that has all that is seen: what this blur cannot have
+    # made, such as things at another depth, would ask for more at high frequencies than all that there is.
+    lowest = 1e-3 * noise / brightest
+    low_c, high_c = math.log(lowest), math.log(max(whole / float((number * level).sum()), 2 * lowest))
+    low_v = math.log(noise)
+    high_v = math.log(max(whole / float(number.sum()), 1.001 * noise)) if more else low_v
+    for _ in range(_ROUNDS):
+        cs, vs = np.linspace(low_c, high_c, _TRIED), np.linspace(low_v, high_v, _TRIED if more else 1)
+        mean = np.exp(cs)[:, None, None] * level + np.exp(vs)[:, None]
+        surprise = (number * np.log(mean) + total / mean).sum(axis=-1)
+        best_c, best_v = (int(n) for n in np.unravel_index(int(surprise.argmin()), surprise.shape))
+        low_c, high_c = float(cs[max(best_c - 1, 0)]), float(cs[min(best_c + 1, len(cs) - 1)])
+        low_v, high_v = float(vs[max(best_v - 1, 0)]), float(vs[min(best_v + 1, len(vs) - 1)])
+    return math.exp(cs[best_c]), math.exp(vs[best_v])
 
 
 def richardson_lucy(
