@@ -51,7 +51,17 @@ class Crop:
 
 def shown(image: Image, exposure: float) -> Shown:
     """A picture as screens want it: upright, exposed, sRGB, (rows, columns, 3), 0 to 1."""
-    values = image.upright().to_numpy() * np.float32(exposure)
+    return values_shown(image.upright().to_numpy(), 1 / exposure)
+
+
+def values_shown(upright: NDArray[Any], white: float = 1.0) -> Shown:
+    """Upright values of linear light as screens want them: (rows, columns, 3), 0 to 1, sRGB.
+
+    Args:
+        upright: (rows, columns[, channels]).
+        white: the value that is shown white.
+    """
+    values = np.asarray(upright, dtype=np.float32) * np.float32(1 / white)
     coded = np.clip(transfer.from_linear(np.clip(values, 0, 1)), 0, 1)
     if coded.ndim == 2 or coded.shape[2] == 1:
         coded = np.repeat(coded.reshape(*coded.shape[:2], 1), 3, axis=2)
@@ -66,8 +76,7 @@ def view_shown(light_field: LightField, row: int, column: int) -> Shown:
 def slice_shown(light_field: LightField, view_row: int, pixel_row: int) -> Shown:
     """The slice of all views of a row and one row of pixels, as screens want it: (views, columns, 3)."""
     values = to_numpy(light_field.values[view_row, :, pixel_row]).astype(np.float32)
-    frame = light_field.view(view_row, 0).frame
-    return shown(Image(values / np.float32(light_field.full_scale), frame, inverted=False), 1.0)
+    return values_shown(values, light_field.full_scale)
 
 
 def detailed_crops(pictures: Sequence[Shown], size: int) -> list[Crop]:

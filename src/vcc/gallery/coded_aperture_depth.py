@@ -14,7 +14,6 @@ from vcc.demo import figures, story
 from vcc.demo.bench import APERTURE, Bench
 from vcc.errors import InputError
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
-from vcc.gallery.extended_depth import shown
 from vcc.gallery.published_codes import LEVIN
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
@@ -332,7 +331,7 @@ def run(bench: Bench, progress: Progress) -> Result:
 
 
 def _upright(picture: Array) -> figures.Shown:
-    return shown(picture[::-1, ::-1])
+    return figures.values_shown(picture[::-1, ::-1])
 
 
 def _text(setup: Setup, used: int) -> str:

@@ -15,10 +15,10 @@ from vcc.demo import figures, story
 from vcc.demo.bench import APERTURE, Bench
 from vcc.demo.scene import MIDDLE
 from vcc.gallery import flat_target
+from vcc.gallery.closeness import psnr
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.gallery.flat_target import OPENING
 from vcc.gallery.published_codes import VEERARAGHAVAN
-from vcc.image import Image
 from vcc.optics import Lens, Mask
 from vcc.patterns import Open
 from vcc.recover import sparse_gradients, wiener
@@ -140,20 +140,15 @@ def _deblurred(recording: Array, kernel: Array, noise: float, progress: Progress
     return Deblurred(white, linear, sparse)
 
 
-def decibels(picture: Array, truth: Array) -> float:
-    """PSNR in linear light, white 1."""
-    return -10 * math.log10(max(float(np.mean((picture - truth) ** 2)), 1e-20))
-
-
 def _linear_gain(clean: dict[str, Array], kernels: dict[str, Array], target: Array, noise: float) -> float:
     """The coded aperture's decibels by the Wiener filter over the open one's, by the filter or without."""
     found = {}
     for name, kernel in kernels.items():
         passed = float(kernel.sum())
         white = _noisy(clean[name], noise) / passed
-        found[name] = decibels(wiener(white, kernel / passed, noise / passed, borders="periodic").picture, target)
+        found[name] = psnr(wiener(white, kernel / passed, noise / passed, borders="periodic").picture, target)
         if name == "open":
-            found[name] = max(found[name], decibels(white, target))
+            found[name] = max(found[name], psnr(white, target))
     return found["coded"] - found["open"]
 
 
@@ -168,22 +163,22 @@ def _photon_gain(clean: dict[str, Array], kernels: dict[str, Array], target: Arr
         )
         noise = math.sqrt(max(float(charge.mean()), 0.0) + READ_NOISE**2) / FULL_WELL  # its mean over the picture
         white = charge / FULL_WELL / passed
-        found[name] = decibels(wiener(white, kernel / passed, noise / passed, borders="periodic").picture, target)
+        found[name] = psnr(wiener(white, kernel / passed, noise / passed, borders="periodic").picture, target)
         if name == "open":
-            found[name] = max(found[name], decibels(white, target))
+            found[name] = max(found[name], psnr(white, target))
     return found["coded"] - found["open"]
 
 
 def _findings(deblurred: dict[str, Deblurred], target: Array) -> list[Finding]:
     opened, coded = deblurred["open"], deblurred["coded"]
-    without = decibels(opened.recording, target)
+    without = psnr(opened.recording, target)
     numbers = []
     for what, name, rivals in (
         ("Wiener filter", "linear", ("linear",)),
         ("sparse gradients; the open aperture by whichever is best", "sparse", ("linear", "sparse")),
     ):
-        ours = decibels(getattr(coded, name), target)
-        best = max(without, *(decibels(getattr(opened, rival), target) for rival in rivals))
+        ours = psnr(getattr(coded, name), target)
+        best = max(without, *(psnr(getattr(opened, rival), target) for rival in rivals))
         numbers.append(
             Finding(
                 f"flat target, blur of {BLUR} pixels, deblurred ({what}): gain of the mask over the open aperture",
@@ -261,7 +256,7 @@ def _scene(bench: Bench) -> tuple[list[tuple[Picture, ...]], list[Finding], str]
         "coded": f"Refocused {story.away(bench.middle)}: coded aperture",
         "coded-recorded": f"Coded aperture, focused {story.away(focus)}, as recorded",
     }
-    shown = {name: _shown(bench, picture / white) for name, picture in pictures.items()}
+    shown = {name: figures.values_shown(picture[::-1, ::-1], white) for name, picture in pictures.items()}
     rows = [
         tuple(Picture(f"scene-{name}", titles[name], "", shown[name]) for name in pair)
         for pair in (("open-recorded", "coded-recorded"), ("open", "coded"))
@@ -296,7 +291,7 @@ def _scene(bench: Bench) -> tuple[list[tuple[Picture, ...]], list[Finding], str]
     if bench.scene is None:
         return rows, [], words
     part = _chart(sharp_camera)
-    found = {name: decibels(pictures[name][part], sharp[part]) for name in pictures if name != "sharp"}
+    found = {name: psnr(pictures[name][part], sharp[part]) for name in pictures if name != "sharp"}
     best = max(found["open"], found["open-recorded"])
     finding = Finding(
         f"the scene’s chart, blur of {blur:.1f} pixels, refocused by the Wiener filter: gain of the mask",
@@ -334,12 +329,6 @@ def _chart(camera: Camera) -> tuple[slice, slice]:
 def _middle(picture: figures.Shown) -> figures.Crop:
     side = min(*picture.shape[:2], 140)
     return figures.Crop((picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2, side)
-
-
-def _shown(bench: Bench, picture: Array) -> figures.Shown:
-    from vcc.affine import Affine
-
-    return figures.shown(Image(picture.astype(np.float32), Affine.scaling(1, 1)), 1.0)
 
 
 def _spectra_figure(masks: dict[str, Mask]) -> Figure:
@@ -384,7 +373,7 @@ def _target_figure(deblurred: dict[str, Deblurred], target: Array) -> Figure:
             columns.append(("true", target))
         for axes, (words, picture) in zip(row, columns, strict=False):
             part = np.clip(picture[top : top + side, left : left + side], 0, 1).astype(np.float32)
-            value = "" if words == "true" else f": {decibels(picture, target):.1f} dB"
+            value = "" if words == "true" else f": {psnr(picture, target):.1f} dB"
             figures.put(axes, part ** np.float32(1 / 2.2), words + value, cmap="gray", vmin=0, vmax=1)
     grid[1, 3].set_axis_off()
     return figure

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.demo import figures, story
 from vcc.demo.bench import Bench
 from vcc.gallery import extended_depth
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, paragraphs
 from vcc.gallery.extended_depth import ALIKE, PUPIL, WAVELENGTH, Comparison, Elements, Measured
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.patterns import Circle
@@ -125,14 +125,8 @@ def run(bench: Bench, progress: Progress) -> Result:
     """PSFs over depth without and with both diffusers, a flat target restored by one filter, and the scene."""
     kinds = designed(bench)
     comparison, depths = kinds.comparison, kinds.comparison.depths
-    steps, done = 3 * len(depths) + 2, 0
-
-    def advance() -> None:
-        nonlocal done
-        done += 1
-        progress(done, steps)
-
-    progress(0, steps)
+    advance = Steps(progress, 3 * len(depths) + 2)
+    progress(0, advance.total)
     cameras: dict[str, Elements] = {
         "no diffuser": kinds.plain,
         "random-phase": kinds.random,

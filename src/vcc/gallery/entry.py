@@ -19,6 +19,26 @@ Progress = Callable[[int, int], None]
 """Called with (done, total) as the work advances."""
 
 
+@dataclass
+class Steps:
+    """Counts steps and tells how far the work is: called after each.
+
+    Args:
+        progress: whom to tell.
+        total: how many steps there are.
+        done: how many are done.
+    """
+
+    progress: Progress
+    total: int
+    done: int = 0
+
+    def __call__(self) -> None:
+        """One more is done."""
+        self.done += 1
+        self.progress(self.done, self.total)
+
+
 @dataclass(frozen=True, eq=False)
 class Picture:
     """A picture on an entry's page.

@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
 from vcc.camera import Camera
 from vcc.demo import figures, story
 from vcc.demo.bench import Bench
 from vcc.errors import InputError
-from vcc.gallery import flat_target
+from vcc.gallery import closeness, flat_target
 from vcc.gallery.entry import Picture
-from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.plot.tracing import trace
@@ -208,7 +206,7 @@ def psnr(picture: Array, truth: Array) -> float:
     """Decibels, white 1, without the borders."""
     rows, columns = (round(BORDER * n) for n in truth.shape[:2])
     inner = np.s_[rows : truth.shape[0] - rows, columns : truth.shape[1] - columns]
-    return -10 * math.log10(max(float(np.mean((picture[inner] - truth[inner]) ** 2)), 1e-20))
+    return closeness.psnr(picture[inner], truth[inner])
 
 
 def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Figure:
@@ -275,10 +273,6 @@ def scene_pictures(
         "restored": ("Restored by the one filter", wiener(recorded, spreads, noise).picture),
     }
     return tuple(
-        Picture(f"scene-{name}", title, "", shown(picture / white)) for name, (title, picture) in whole.items()
+        Picture(f"scene-{name}", title, "", figures.values_shown(picture, white))
+        for name, (title, picture) in whole.items()
     )
-
-
-def shown(picture: Array) -> figures.Shown:
-    """Upright values of white 1 as screens want them."""
-    return figures.shown(Image(picture.astype(np.float32), Affine.scaling(1, 1), inverted=False), 1.0)

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.camera import Camera
-from vcc.demo import story
+from vcc.demo import figures, story
 from vcc.demo.bench import Bench
 from vcc.electronics import Electronics
 from vcc.errors import InputError, ResultWarning
 from vcc.gallery import heterodyne_figures
+from vcc.gallery.closeness import psnr
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.gallery.heterodyne_figures import TRANSMITTED
 from vcc.image import Image
@@ -287,11 +288,9 @@ def _findings(
         "weak tiles are raised to the strength of the others, their noise with them",
     )
     for place, distance in _distances(bench).items():
-        errors = {
-            name: float(np.mean((pictures[name][place] - pictures["true"][place]) ** 2.0))
-            for name in ("decoded", "noisy")
-        }
-        clean, noisy = (-10 * math.log10(max(error, 1e-20) / white**2) for error in errors.values())
+        clean, noisy = (
+            psnr(pictures[name][place], pictures["true"][place], white) for name in ("decoded", "noisy")
+        )
         yield Finding(
             f"refocused {place} ({story.away(distance)}) against the true views refocused, PSNR",
             "",
@@ -360,7 +359,7 @@ def _pictures(
                 "All decoded views",
                 f"{VIEWS}×{VIEWS} views of {columns}×{rows} pixels of the scene that fits, as they lie in the "
                 "aperture.",
-                heterodyne_figures.shown(mosaic, white),
+                figures.values_shown(mosaic, white),
             ),
         ),
         (

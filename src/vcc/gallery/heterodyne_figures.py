@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
 from vcc.analysis import picture_spectrum, plot_plane_spectrum
 from vcc.camera import Camera
 from vcc.demo import figures
@@ -58,7 +57,11 @@ def recording_figure(camera: Camera, image: Image, white: float) -> Figure:
     energy = uniform_filter(modulation**2, pixels)[pixels:-pixels, pixels:-pixels]
     row, column = (int(n) + pixels // 2 for n in np.unravel_index(np.argmax(energy), energy.shape))
     square = np.s_[row : row + pixels, column : column + pixels]
-    figures.put(whole, shown(upright * share, 1.0), f"the recording, {sensor.shape[1]}×{sensor.shape[0]} pixels")
+    figures.put(
+        whole,
+        figures.values_shown(upright * share, 1.0),
+        f"the recording, {sensor.shape[1]}×{sensor.shape[0]} pixels",
+    )
     whole.add_patch(Rectangle((column, row), pixels, pixels, fill=False, color=figures.ACCENT, linewidth=2))
     most = float(np.abs(modulation[square]).max())
     for axes, values, title, low, high in (
@@ -126,7 +129,9 @@ def views_figure(columns: dict[str, tuple[LightField, Array | None]], white: flo
     for line, number in zip(figure.subplots(2, len(columns)), (1, count - 2), strict=True):
         for axes, (title, (field, decibels)) in zip(line, columns.items(), strict=True):
             reached = "" if decibels is None else f": {decibels[count // 2, number]:.1f} dB"
-            figures.put(axes, shown(np.asarray(field.values[count // 2, number]), white), title + reached)
+            figures.put(
+                axes, figures.values_shown(np.asarray(field.values[count // 2, number]), white), title + reached
+            )
         line[0].set_ylabel(f"view {number + 1} of {count}", fontsize=figures.LABEL, color=figures.INK)
     return figure
 
@@ -137,11 +142,6 @@ def refocus_figure(rows: dict[str, dict[str, Floats]], white: float) -> Figure:
     figure = figures.new_figure(3 * 4.4, len(rows) * (4.4 * height / width + 0.3))
     for line, (words, pictures) in zip(figure.subplots(len(rows), 3), rows.items(), strict=True):
         for axes, (place, picture) in zip(line, pictures.items(), strict=True):
-            figures.put(axes, shown(picture, white), place)
+            figures.put(axes, figures.values_shown(picture, white), place)
         line[0].set_ylabel(words, fontsize=figures.LABEL, color=figures.INK)
     return figure
-
-
-def shown(upright: Floats, white: float) -> figures.Shown:
-    """An upright picture with ``white`` as white, as screens want it."""
-    return figures.shown(Image(upright.astype(np.float32), Affine.scaling(1, 1), inverted=False), 1 / white)

@@ -13,6 +13,7 @@ from vcc.camera import Camera
 from vcc.demo import figures, story
 from vcc.demo.bench import Bench
 from vcc.errors import InputError, ResultWarning
+from vcc.gallery.closeness import psnr
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.light_field import LightField
 from vcc.optics import Mask
@@ -65,12 +66,13 @@ def run(bench: Bench, progress: Progress) -> Result:
     ]
     progress(3, 6)
     moved, found = _from_elsewhere(bench, progress)
-    shown = [("left out", _shown(truth))]
+    shown = [("left out", figures.values_shown(truth))]
     shown += [
-        (f"{words[name].split(',')[0]}, {decibels[name]:.1f} dB", _shown(p)) for name, p in predicted.items()
+        (f"{words[name].split(',')[0]}, {decibels[name]:.1f} dB", figures.values_shown(p))
+        for name, p in predicted.items()
     ]
     size = max(min(truth.shape[:2]) * 22 // 100, 8)
-    wrong = np.abs(_shown(predicted["nearest"]) - _shown(truth))
+    wrong = np.abs(figures.values_shown(predicted["nearest"]) - figures.values_shown(truth))
     close = figures.close_ups(shown, figures.detailed_crops([wrong], size), ["where they differ most"])
     pictures = (
         (Picture("left-out", "A view that was left out", "And as the other views predict it.", close),),
@@ -184,7 +186,7 @@ def _from_elsewhere(
                     why,
                 )
             )
-        pictures.append((name, title, caption, _shown(picture)))
+        pictures.append((name, title, caption, figures.values_shown(picture)))
     return pictures, numbers
 
 
@@ -208,14 +210,7 @@ def _psnr(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
     """Peak signal-to-noise ratio in linear light inside the border, the peak being the truth's brightest."""
     rows, columns = (max(int(INNER * n), 1) for n in truth.shape[:2])
     inner = np.s_[rows:-rows, columns:-columns]
-    error = float(np.mean((picture[inner] - truth[inner]) ** 2))
-    return 10 * math.log10(float(truth[inner].max()) ** 2 / max(error, 1e-20))
-
-
-def _shown(picture: NDArray[np.float64]) -> figures.Shown:
-    from vcc.image import Image
-
-    return figures.shown(Image(picture.astype(np.float32), Affine.scaling(1, 1), inverted=False), 1.0)
+    return psnr(picture[inner], truth[inner], float(truth[inner].max()))
 
 
 ENTRY = Entry(

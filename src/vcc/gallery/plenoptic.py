@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
 from vcc.analysis import Refocuser
 from vcc.camera import Camera
 from vcc.demo import figures, story
 from vcc.demo.bench import Bench
 from vcc.electronics import Electronics
 from vcc.errors import InputError, ResultWarning
-from vcc.gallery import fringes
+from vcc.gallery import closeness, fringes
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -155,7 +154,7 @@ def run(bench: Bench, progress: Progress) -> Result:
     refocused = [_values(refocuser.at(distance)) for distance in distances]
     ideal = [plenoptic.ideal(bench.light_field, distance) for distance in distances]
     peak = 1.0 if bench.scene is not None else float(np.percentile(ideal[1], 99.5))
-    closeness = [psnr(one, other, peak) for one, other in zip(refocused, ideal, strict=True)]
+    decibels = [psnr(one, other, peak) for one, other in zip(refocused, ideal, strict=True)]
     progress(3, steps)
     sharpness = depth_of_field(plenoptic)
     progress(4, steps)
@@ -174,7 +173,7 @@ def run(bench: Bench, progress: Progress) -> Result:
             value >= NEEDED,
             "the ideal picture is a lens’s of the same opening, averaged over what a lenslet shows",
         )
-        for distance, value in zip(distances, closeness, strict=True)
+        for distance, value in zip(distances, decibels, strict=True)
     ]
     numbers += sharpness.findings()
     numbers += [
@@ -191,7 +190,7 @@ def run(bench: Bench, progress: Progress) -> Result:
         ),
     ]
     size = max(min(plenoptic.lenslets) // 12, 12)
-    near, chart, _ = figures.detailed_crops([_shown(picture, peak) for picture in refocused], size)
+    near, chart, _ = figures.detailed_crops([figures.values_shown(picture, peak) for picture in refocused], size)
     wide = min(4 * size, min(plenoptic.lenslets))
     closer = figures.Crop(chart.row + size // 2 - wide // 2, chart.column + size // 2 - wide // 2, wide)
     lens_shown = {
@@ -199,11 +198,17 @@ def run(bench: Bench, progress: Progress) -> Result:
         f"corrected: {after:.1f} dB": lens[1],
         "ideal camera": ideal[1],
     }
-    whole = [(title, _shown(picture, peak)) for title, picture in lens_shown.items()]
+    whole = [(title, figures.values_shown(picture, peak)) for title, picture in lens_shown.items()]
     titles = [f"refocused {name}, {story.away(at)}" for name, at in zip(PLACES, distances, strict=True)]
     pairs = [
-        [(f"{t}: {c:.1f} dB", _shown(p, peak)) for t, p, c in zip(titles, refocused, closeness, strict=True)],
-        [(f"ideal camera, {story.away(at)}", _shown(p, peak)) for at, p in zip(distances, ideal, strict=True)],
+        [
+            (f"{t}: {c:.1f} dB", figures.values_shown(p, peak))
+            for t, p, c in zip(titles, refocused, decibels, strict=True)
+        ],
+        [
+            (f"ideal camera, {story.away(at)}", figures.values_shown(p, peak))
+            for at, p in zip(distances, ideal, strict=True)
+        ],
     ]
     drawn = (
         Picture(
@@ -291,7 +296,7 @@ def depth_of_field(plenoptic: Plenoptic) -> fringes.Sharpness:
 def psnr(picture: Array, truth: Array, peak: float) -> float:
     """In decibels, `MARGIN` lenslets at each border left out."""
     inner = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
-    return 10 * math.log10(peak**2 / max(float(np.mean((picture[inner] - truth[inner]) ** 2)), 1e-20))
+    return closeness.psnr(picture[inner], truth[inner], peak)
 
 
 def _values(image: Image) -> Array:
@@ -300,11 +305,6 @@ def _values(image: Image) -> Array:
 
 def _inner(decoded: LightField) -> NDArray[np.float32]:
     return np.asarray(decoded.values[1:-1, 1:-1], dtype=np.float32)
-
-
-def _shown(picture: Array, peak: float) -> figures.Shown:
-    image = Image(np.maximum(picture, 0).astype(np.float32), Affine.scaling(1, 1), inverted=False)
-    return figures.shown(image, 1 / peak)
 
 
 def _table(rows: Sequence[Sequence[tuple[str, figures.Shown]]]) -> Figure:
@@ -327,7 +327,7 @@ def _raw_figure(plenoptic: Plenoptic, raw: Image, near: figures.Crop, peak: floa
     whole, part = figure.subplots(1, 2, width_ratios=(upright.shape[1] / upright.shape[0], 1))
     rows, columns = plenoptic.lenslets
     title = f"whole: {rows}×{columns} lenslets, {EACH}×{EACH} pixels behind each"
-    all_shown = _shown(upright, peak)
+    all_shown = figures.values_shown(upright, peak)
     figures.put(whole, all_shown, title).set_interpolation("antialiased")
     whole.add_patch(
         Rectangle((piece.column, piece.row), piece.size, piece.size, fill=False, color=figures.ACCENT, linewidth=2)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from vcc.demo import story
 from vcc.demo.bench import Bench
 from vcc.gallery import extended_depth
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, paragraphs
 from vcc.gallery.extended_depth import ALIKE, PUPIL, WAVELENGTH, Comparison, Measured
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.patterns import Open
@@ -38,14 +38,8 @@ def run(bench: Bench, progress: Progress) -> Result:
     """Point-spread functions over depth, a flat target restored by one filter at each depth, and the scene."""
     pair = designed(bench)
     comparison, depths = pair.comparison, pair.comparison.depths
-    steps, done = 2 * len(depths) + 2, 0
-
-    def advance() -> None:
-        nonlocal done
-        done += 1
-        progress(done, steps)
-
-    progress(0, steps)
+    advance = Steps(progress, 2 * len(depths) + 2)
+    progress(0, advance.total)
     plain = comparison.measured(pair.plain, pair.plain, advance)
     coded = comparison.measured(pair.coded, pair.plain, advance)
     pictures = (
