@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from vcc.image import Image
     from vcc.optics import Element, Mask
     from vcc.sensor import Sensor
+
+Sample = Literal["mean", "point"]
+"""What a sample says of the scene: its mean over the cell of a pixel, or its value in the middle of the cell."""
 
 
 class DisparityRange:
@@ -53,15 +56,20 @@ class LightField:
         disparity_range: (lowest, highest) disparity of the scene in pixels per view along u, positive =
             nearer than the plane on which the views converge, where known. It decides how views are
             interpolated under strong defocus; unknown, it is measured from the pictures when needed.
+        sample: what a sample says of the scene: ``"mean"``, the mean radiance over the cell of its pixel, as
+            cameras and renderers give it; ``"point"``, the radiance of the ray in the middle of the cell, as a
+            formula evaluated there gives it. A camera undoes what the samples' own averaging took from sharpness.
 
     Raises:
         InputError: not 4-D or 5-D, an empty axis, a dtype that is not unsigned integer or floating point,
-            samples that are NaN, infinite or negative, or a frame that is not 5×5 and invertible.
+            samples that are NaN, infinite or negative, a frame that is not 5×5 and invertible, or another word for
+            ``sample``.
     """
 
     values: Any
     frame: Affine
     disparity_range: tuple[float, float] | None = None
+    sample: Sample = "mean"
     _shared_disparity: DisparityRange | None = field(default=None, repr=False)
     _disparity_factor: float = field(default=1.0, repr=False)
     _whole_views: tuple[float, float] | None = field(default=None, repr=False)
@@ -85,6 +93,10 @@ class LightField:
             )
         if self.disparity_range is not None and not self.disparity_range[0] <= self.disparity_range[1]:
             raise InputError(f"disparity_range is (lowest, highest), not {self.disparity_range}")
+        if self.sample not in get_args(Sample):
+            raise InputError(
+                f"sample is 'mean' (over a pixel, as of cameras and renderers) or 'point', not {self.sample!r}"
+            )
         if not self._checked:
             _check_samples(self.values)
             object.__setattr__(self, "_checked", True)
@@ -101,6 +113,7 @@ class LightField:
         slope_per_pixel: float | tuple[float, float],
         focus_distance: float = math.inf,
         disparity_range: tuple[float, float] | None = None,
+        sample: Sample = "mean",
     ) -> LightField:
         """A light field from pictures taken by a planar array of parallel cameras, upright, row 0 at the top.
 
@@ -115,6 +128,7 @@ class LightField:
             focus_distance: where the views converge, metres (shifted, not rotated, cameras); infinite if
                 their axes are parallel.
             disparity_range: see `LightField`.
+            sample: see `LightField`.
 
         Raises:
             InputError: a spacing, slope or focus distance of zero or less, or what `LightField` refuses.
@@ -139,7 +153,7 @@ class LightField:
         matrix[2, 0], matrix[3, 1] = du / focus_distance, dv / focus_distance
         matrix[2, 2], matrix[3, 3] = -ps, -pt
         centre = np.array([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2])
-        return cls(values, Affine(matrix) @ Affine.translation(*-centre), disparity_range)
+        return cls(values, Affine(matrix) @ Affine.translation(*-centre), disparity_range, sample)
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -204,7 +204,7 @@ def open_light_field(
         frame = LightField.from_views(_hollow(values.shape), **geometry).frame
     # Integers and light decoded from them are neither negative nor infinite: no need to look through them all.
     shared = DisparityRange(lambda: seen.disparities) if seen.measured and not moved.steps else None
-    light_field = LightField(values, frame, stated, shared, _checked=counts)
+    light_field = LightField(values, frame, stated, _shared_disparity=shared, _checked=counts)
     remarks = (*info.remarks, turned, moved.remark)
     if info.frame is None:
         remarks += (
