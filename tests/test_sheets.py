@@ -60,7 +60,7 @@ def test_cells_of_different_sizes_and_places_multiply_exactly():
 
 
 def test_a_hole_over_cells_is_right_to_the_rasters_points():
-    # A raster of 16×16 points a rectangle: where rim and edge cross one point, a quarter of it at most is wrong. At
+    # 16×16 points a rectangle: where rim and edge cross one point, a quarter of it at most is wrong. At
     # worst the rim runs along an edge, as it does here at (±3 mm, 0): then 16 of the 256 are.
     both = Product((Circle(6 * mm), Cells(CHECKERS, 8 * mm)))
     found = both.mean(*GRID, 0.7 * mm, 0.5 * mm)
