@@ -281,6 +281,8 @@ class Path:
         bounding = [strip for strip in strips if strip.half < UNBOUNDED * np.linalg.norm(strip.from_sensor[2:])]
         for pair in itertools.combinations(bounding, 2):
             rows = np.stack([strip.from_sensor for strip in pair])
+            if abs(rows[0, 2] * rows[1, 3]) < abs(rows[0, 3] * rows[1, 2]):  # s along the window's first axis
+                pair, rows = pair[::-1], rows[::-1]
             if abs(np.linalg.det(rows[:, 2:])) <= 1e-9 * np.prod(np.linalg.norm(rows[:, 2:], axis=1)):
                 continue
             back = np.linalg.inv(rows[:, 2:])
