@@ -241,3 +241,65 @@ def test_lenslets_without_a_main_lens_are_looked_through_one_by_one():
     np.testing.assert_allclose(image.values[np.ix_(inside, inside)], 0.04, rtol=1e-5)
     assert not image.values[outside].any()
     assert not image.values[:, outside].any()
+
+
+BESIDE = vcc.Camera(
+    [vcc.Prism((0.5, 0.0), z=1 * mm), vcc.Mask(Circle(8 * mm), z=1 * mm)], vcc.Sensor(0.1, (8, 9), 0.5 * mm)
+)
+"""A sensor of ±2 mm that a prism throws all light beside: 0.5 · 0.1 m are 50 mm."""
+
+
+@pytest.mark.parametrize(
+    ("camera", "method", "words"),
+    [
+        (BESIDE, "footprints", r"its samples land on columns \d+ to \d+ and rows .* of a sensor of 8×9"),
+        (
+            BESIDE,
+            "rays",
+            r"rays were traced back towards the grid of views, .* 100.0% of the rays asked for are missing",
+        ),
+        (
+            vcc.Camera([vcc.Mask(Circle(1 * mm), decentre=(30 * mm, 0))], vcc.Sensor(50 * mm, (8, 9), 1 * mm)),
+            "footprints",
+            "stops comes from beside the grid of views; 100.0% of the rays asked for are missing",
+        ),
+        (
+            vcc.Camera([vcc.Mask(Circle(1 * mm), decentre=(30 * mm, 0))], vcc.Sensor(50 * mm, (8, 9), 1 * mm)),
+            "rays",
+            "100.0% of the rays asked for are missing",
+        ),
+        (
+            vcc.Camera(
+                [clear(2 * mm, z=10 * mm), vcc.Mask(Circle(1 * mm), decentre=(5 * mm, 0), z=10.1 * mm)],
+                vcc.Sensor(50 * mm, (8, 9), 0.1 * mm),
+            ),
+            "rays",
+            "traced back towards mask at z = 10.1 mm, and each was stopped on its way .mask at z = 10 mm",
+        ),
+    ],
+)
+@pytest.mark.parametrize("pieces", [False, True])
+def test_a_dark_picture_of_a_light_field_that_is_not_is_told(camera, method, words, pieces, tmp_path):
+    lf = ones(6, 1 * mm, 0.03)
+    dark = lf.replaced(np.zeros(lf.shape, np.float32))
+    if pieces:
+        for name, one in (("lit", lf), ("dark", dark)):
+            vcc.store.save_store(one, tmp_path / name)
+        lf, dark = (vcc.store.open_store(tmp_path / name) for name in ("lit", "dark"))
+    with pytest.warns(
+        vcc.ResultWarning, match=f"(?s)picture is 0 everywhere, and the light field is not.*{words}"
+    ):
+        image = camera.capture(lf, method=method)
+    assert not image.values.any()
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        camera.capture(dark, method=method)
+    assert not any("everywhere" in str(one.message) for one in told)
+
+
+@pytest.mark.parametrize("z", [20 * mm, 50 * mm])
+def test_a_closed_camera_is_dark_without_a_word(z):
+    closed = vcc.Camera([vcc.Mask(lambda x, y: 0 * x, z=z)], vcc.Sensor(50 * mm, (8, 9), 0.1 * mm))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert not closed.capture(ones(4, 1.5 * mm, 0.1), method="footprints").values.any()
