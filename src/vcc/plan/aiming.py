@@ -372,10 +372,33 @@ class Path:
         area = ((high_x - low_x) * (high_y - low_y)).sum(axis=1).mean()
         return float(area / abs(np.prod(aim.place_from_slope)))
 
-    def beam(self, aim: Aim) -> Beam:
-        """All rays that an aim asks for, at the sensor."""
+    def footprint(self, aim: Aim, leg: Leg) -> Array | None:
+        """(width, height) in metres over which the rays of one pixel spread on a leg, by pixel or by window.
+
+        None where that is not known: where something on the way bends otherwise than lenses and prisms do.
+        """
+        nearer = itertools.takewhile(lambda other: other is not leg, self.legs)
+        if not isinstance(aim, Window) or any(other.stage.faces.bending is not None for other in nearer):
+            return None
+        pixel = np.array(self.camera.sensor.sensitive_pitches[::-1])
+        beam = self.beam(aim, pixel / 2).moved(leg.from_sensor)
+        return np.asarray(2 * np.abs(beam.basis[:2]).max(axis=1))
+
+    def index_from_slope(self, leg: Leg) -> Array | None:
+        """(4, 2): by how many samples of the light field a ray moves for a slope (s, t) behind a leg.
+
+        None where that is not known: where something beyond it bends otherwise than lenses and prisms do.
+        """
+        beyond = itertools.dropwhile(lambda other: other is not leg, self.legs)
+        if any(other.stage.faces.bending is not None for other in itertools.islice(beyond, 1, None)):
+            return None
+        return (self.index_from_sensor @ leg.from_sensor.inverse()).linear[:, 2:]
+
+    def beam(self, aim: Aim, half: Array | None = None) -> Beam:
+        """All rays that an aim asks for, at the sensor; from all of it, or a rectangle of half sizes (x, y)."""
         sensor = self.camera.sensor
-        middle, half = np.array(sensor.decentre), np.array(sensor.size[::-1]) / 2
+        middle = np.array(sensor.decentre)
+        half = np.array(sensor.size[::-1]) / 2 if half is None else half
         if isinstance(aim, Window):
             slopes = np.column_stack([aim.slope_from_point, aim.offset])
             beam = Beam.between(middle, half, slopes, aim.slope_from_sensor)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ from vcc.plan import steps
 from vcc.plan.aiming import Aimed, Leg, Path, columns_of
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import FIRST_COLUMNS, TABLE, Aim, RayPlan, Window
+from vcc.plan.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
 from vcc.units import short
 
 if TYPE_CHECKING:
@@ -31,13 +32,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DEFAULT_SAMPLES = 64
-TEXTURE_SIZES = (513, 1025, 2049)
-"""Points a side of textures for functions of position, tried until they are fine enough."""
-FINE_ENOUGH = 1e-6
-"""Error of a texture between its points, root mean square as a share of the largest value."""
-WORTH_SAYING = 1e-3
-"""The same, from which on a plan says it."""
-POINTS_AT_ONCE = 2**20
 ASKING_PIXELS, ASKING_RAYS = 16, 2**16
 """Pixels a side of the sensor, and rays in all, that tell what the light field lacks beyond the aim: shares are
 right to 1/2√n, 0.2 %, or better."""
@@ -111,7 +105,7 @@ def _missing(plan: RayPlan, path: Path, asked: Aimed) -> float:
 
     By rays to all that is asked for, from pixels all over the sensor.
     """
-    made, index_from_ray, scatters = _steps(path, asked, [], sizes=TEXTURE_SIZES[:1])
+    made, index_from_ray, scatters = _steps(path, asked, [], coarse=True)
     rows, columns = (np.unique(np.arange(ASKING_PIXELS) * n // ASKING_PIXELS) for n in plan.sensor_shape)
     pixel = (rows[:, None] * plan.sensor_shape[1] + columns).reshape(-1)
     wide = replace(
@@ -151,27 +145,55 @@ def _cautions(camera: Camera) -> Iterator[str]:
 # --- steps ---
 
 
+@dataclass(frozen=True, eq=False)
+class _Met:
+    """What is met, where, and how finely it must be known.
+
+    Args:
+        stage: what is met.
+        region: lowest and highest (x, y) at which it is, metres.
+        footprint: (width, height) in metres over which the rays of one pixel spread there; None where unknown.
+        index_from_slope: (4, 2), by how many samples of the light field a ray moves for a slope there; None where
+            that is not known.
+        sizes: points a side of textures for masks, and for bends.
+    """
+
+    stage: Stage
+    region: tuple[Array, Array]
+    footprint: Array | None
+    index_from_slope: Array | None
+    sizes: tuple[tuple[int, ...], tuple[int, ...]]
+
+    @property
+    def label(self) -> str:
+        return self.stage.element.label
+
+
 def _steps(
-    path: Path, aimed: Aimed, notes: list[str], sizes: tuple[int, ...] = TEXTURE_SIZES
+    path: Path, aimed: Aimed, notes: list[str], coarse: bool = False
 ) -> tuple[list[steps.Step], Affine, list[Scatter]]:
-    """What rays meet, the map to the light field's indices, and the scatterers in the order of the table."""
+    """What rays meet, the map to the light field's indices, and the scatterers in the order of the table.
+
+    ``coarse`` takes the coarsest textures, for a share of light rather than for a picture.
+    """
+    sizes = (COARSE_SIZES[:1], SIZES[:1]) if coarse else (COARSE_SIZES, SIZES)
     made: list[steps.Step] = []
     scatters: list[Scatter] = []
     pending, column = Affine.identity(), FIRST_COLUMNS
     for leg, region in zip(path.legs, aimed.regions, strict=True):
         pending = leg.undone @ pending
-        stage, faces, label = leg.stage, leg.stage.faces, leg.stage.element.label
+        stage, faces = leg.stage, leg.stage.faces
+        met = _Met(stage, region, path.footprint(aimed.aim, leg), path.index_from_slope(leg), sizes)
         here: list[steps.Step] = []
         with stage.named():
             if faces.pattern is not None and not _is_aimed_at(aimed.aim, leg):
-                here += _transmission(faces.pattern, stage, region, label, notes)
+                here += _transmission(faces.pattern, met, notes)
             if faces.bending is not None:
-                here.append(_deflection(stage, region, label, notes))
+                here.append(_deflection(met, notes))
             if faces.spread is not None:
-                scatter = _scatter(faces.spread, column, stage, region, label)
+                here.append(_scatter(faces.spread, column, met))
                 column += columns_of(faces.spread)
                 scatters.append(faces.spread)
-                here.append(scatter)
         if here:
             made += [steps.Move(pending), *here]
             pending = Affine.identity()
@@ -194,20 +216,18 @@ def _is_aimed_at(aim: Aim, leg: Leg) -> bool:
     )
 
 
-def _transmission(
-    pattern: Pattern, stage: Stage, region: tuple[Array, Array], label: str, notes: list[str]
-) -> list[steps.Step]:
+def _transmission(pattern: Pattern, met: _Met, notes: list[str]) -> list[steps.Step]:
     """The steps by which a pattern weighs rays."""
-    decentre = stage.element.decentre
+    decentre, label = met.stage.element.decentre, met.label
     if isinstance(pattern, Open):
         return []
     if isinstance(pattern, Circle):
         return [steps.Disc(decentre, pattern.diameter / 2, label)]
     if isinstance(pattern, Bounded):
         sheet = steps.Rectangle(decentre, (pattern.width / 2, pattern.height / 2), f"edges of {label}")
-        return [sheet, *_transmission(pattern.pattern, stage, region, label, notes)]
+        return [sheet, *_transmission(pattern.pattern, met, notes)]
     if isinstance(pattern, Product):
-        return [step for one in pattern.patterns for step in _transmission(one, stage, region, label, notes)]
+        return [step for one in pattern.patterns for step in _transmission(one, met, notes)]
     if isinstance(pattern, CellApertures):
         half = pattern.scale * pattern.lattice.pitch / 2
         return [steps.CellGaps(pattern.lattice, decentre, half, pattern.circular, f"gaps of {label}")]
@@ -226,20 +246,24 @@ def _transmission(
         return [steps.Cosines(decentre, (across, down), pattern.phase, pattern.harmonics, label)]
 
     def sampled(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
-        return pattern.mean(x - decentre[0], y - decentre[1], *spacing)[..., None]
+        return means_around(pattern, x - decentre[0], y - decentre[1], spacing)[..., None]
 
     def itself(x: Array, y: Array) -> Array:
         return np.asarray(pattern(x - decentre[0], y - decentre[1]))[..., None]
 
-    texture, error = _textured(sampled, region, itself)
+    enough = None if met.footprint is None else met.footprint / POINTS_PER_FOOTPRINT
+    texture, error = textured(sampled, met.region, met.sizes[0], itself=itself, spacing_enough=enough)
     if error > WORTH_SAYING:
-        notes.append(f"{label} is finer than its texture shows: {error:.1%} root mean square of its largest value")
+        note = f"{label} is finer than its texture shows: {error:.1%} root mean square of its largest value"
+        if met.footprint is not None:
+            note += f", of which a pixel averages {min(met.footprint / texture.spacing):.0f} points across or more"
+        notes.append(note)
     single = replace(texture, values=texture.values.astype(np.float32))
     return [steps.TextureShares(single, label)]
 
 
-def _deflection(stage: Stage, region: tuple[Array, Array], label: str, notes: list[str]) -> steps.Step:
-    bending, decentre = stage.faces.bending, stage.element.decentre
+def _deflection(met: _Met, notes: list[str]) -> steps.Step:
+    bending, decentre, label = met.stage.faces.bending, met.stage.element.decentre, met.label
     assert bending is not None
     if isinstance(bending, CellDeflection):
         return steps.CellsUnbend(bending.lattice, decentre, bending.powers, bending.slopes, label)
@@ -250,7 +274,7 @@ def _deflection(stage: Stage, region: tuple[Array, Array], label: str, notes: li
         s, t = bending(x - decentre[0], y - decentre[1])
         return np.stack(np.broadcast_arrays(s, t), axis=-1)
 
-    texture, error = _textured(sampled, region)
+    texture, error = textured(sampled, met.region, met.sizes[1], index_from_value=met.index_from_slope)
     if error > WORTH_SAYING:
         notes.append(
             f"{label} bends by a texture of {texture.values.shape[0]}² points, {error:.1%} root mean square of "
@@ -259,61 +283,22 @@ def _deflection(stage: Stage, region: tuple[Array, Array], label: str, notes: li
     return steps.TextureUnbend(texture, label)
 
 
-def _textured(
-    sampled: object, region: tuple[Array, Array], itself: Callable[[Array, Array], Array] | None = None
-) -> tuple[steps.Texture, float]:
-    """A texture fine enough for a function over a region, and its error anywhere (see `FINE_ENOUGH`).
-
-    Args:
-        sampled: the numbers that a point of the texture holds, a function of (x, y, spacing).
-        region: lowest and highest (x, y), metres.
-        itself: the function of (x, y) that the texture stands for, where that is not ``sampled``.
-    """
-    low, high = region
-    extent = np.maximum(high - low, 1e-9)
-    generator = np.random.default_rng(0)
-    x, y = (low[n] + extent[n] * generator.random(4096) for n in (0, 1))
-    texture, error = None, math.inf
-    for size in TEXTURE_SIZES:
-        spacing = (float(extent[0] / (size - 1)), float(extent[1] / (size - 1)))
-        column, row = low[0] + spacing[0] * np.arange(size), low[1] + spacing[1] * np.arange(size)
-        values = np.concatenate(
-            [
-                np.broadcast_to(
-                    part := np.asarray(sampled(column[None, :], rows[:, None], spacing)),  # type: ignore[operator]
-                    (len(rows), size, part.shape[-1]),
-                )
-                for rows in np.array_split(row, -(-size * size // POINTS_AT_ONCE))
-            ]
-        )
-        texture = steps.Texture(values, (float(low[0]), float(low[1])), spacing)
-        truth = np.asarray(sampled(x, y, spacing)) if itself is None else itself(x, y)  # type: ignore[operator]
-        largest = np.abs(values).max()
-        error = float(np.sqrt(np.mean((texture(x, y) - truth) ** 2)) / largest) if largest > 0 else 0.0
-        if error < FINE_ENOUGH:
-            break
-    assert texture is not None
-    return texture, error
-
-
-def _scatter(
-    scatter: Scatter, column: int, stage: Stage, region: tuple[Array, Array], label: str
-) -> steps.Unscatter:
+def _scatter(scatter: Scatter, column: int, met: _Met) -> steps.Unscatter:
     """The step of a diffuser whose numbers begin at this column of the table."""
     kernels = len(scatter.kernels)
     cumulative = width = None
     if scatter.weights is not None:
-        shares = _sheet(scatter.weights, stage, region)
+        shares = _sheet(scatter.weights, met)
         cumulative = replace(shares, values=np.cumsum(shares.values, axis=-1))
     if scatter.width is not None:
-        width = _sheet(scatter.width, stage, region)
+        width = _sheet(scatter.width, met)
     pick = column + 2 * kernels if cumulative is not None else -1
-    return steps.Unscatter(column, kernels, pick, cumulative, width, label)
+    return steps.Unscatter(column, kernels, pick, cumulative, width, met.label)
 
 
-def _sheet(given: object, stage: Stage, region: tuple[Array, Array]) -> steps.Texture:
+def _sheet(given: object, met: _Met) -> steps.Texture:
     """A map over a sheet as a texture: as it is where it is one, else sampled."""
-    decentre = stage.element.decentre
+    decentre = met.stage.element.decentre
     if isinstance(given, SheetMap):
         values = np.moveaxis(given.values, 0, -1) if given.values.ndim == 3 else given.values[..., None]
         rows, columns = values.shape[:2]
@@ -329,7 +314,7 @@ def _sheet(given: object, stage: Stage, region: tuple[Array, Array]) -> steps.Te
         shape = np.broadcast_shapes(x.shape, y.shape)
         return values[..., None] if values.shape == shape else values
 
-    return _textured(sampled, region)[0]
+    return textured(sampled, met.region, met.sizes[1])[0]
 
 
 # --- points ---
