@@ -69,8 +69,8 @@ def test_the_blur_is_the_kernel_times_the_distance():
         place = np.arange(weights.shape[1]) - weights.shape[1] // 2
         return float((weights.sum(axis=0) * place**2).sum())
 
-    # σ·distance in pixels; its square is the variance, and the tent by which weights are shared out, 1/6 pixel², is
-    # taken out again. The kernel is cut at 4 σ, which takes 0.1 % of the variance.
+    # σ·distance in pixels; its square is the variance, and the tent by which weights are shared out, 1/6 pixel²,
+    # is taken out again. The kernel is cut at 4 σ, which takes 0.1 % of the variance.
     pixels = 0.006 / 4e-3
     assert spread(far) == pytest.approx(pixels**2, rel=2e-3)
     assert spread(near) == pytest.approx((pixels / 2) ** 2, rel=2e-3)
