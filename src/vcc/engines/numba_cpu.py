@@ -77,7 +77,7 @@ class _FineGrid:
         nothing = (np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.float32))
         self.tables = (*nothing, *nothing, channels)
         if plan.refine > 1:
-            down, across = (Division.of(plan.interpolation, n, plan.refine) for n in plan.samples)
+            down, across = (plan.division(n) for n in plan.samples)
             self.rows, self.columns = len(down.first), len(across.first)
             self.first_row, self.first_column = down.start, across.start
             self.divided_as = down, across
