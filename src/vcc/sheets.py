@@ -134,7 +134,7 @@ class Tiles(Pattern):
     @staticmethod
     def _place(borders: Array, at: Array) -> Array:
         """Places as numbers of borders, fractions between them."""
-        return np.interp(at, borders, np.arange(len(borders), dtype=np.float64))
+        return np.asarray(np.interp(at, borders, np.arange(len(borders), dtype=np.float64)))
 
     def _at(self, row: Array, column: Array) -> Array:
         row, column = np.broadcast_arrays(row, column)
@@ -162,8 +162,9 @@ def _common(one: Array, other: Array) -> Array:
     low, high = max(one[0], other[0]), min(one[-1], other[-1])
     borders = np.unique(np.concatenate([one, other]))
     borders = borders[(borders >= low) & (borders <= high)]
-    apart = np.concatenate([[True], np.diff(borders) > 1e-9 * (one[-1] - one[0])]) if borders.size else borders > 0
-    return borders[apart]
+    apart = np.ones(borders.size, dtype=bool)
+    apart[1:] = np.diff(borders) > 1e-9 * (one[-1] - one[0])
+    return np.asarray(borders[apart])
 
 
 @dataclass(frozen=True)
@@ -214,8 +215,8 @@ class Product(Pattern):
             inside = [_product(factors, x + a * width, y + b * height, *part) for a in steps for b in steps]
             return np.asarray(np.mean(np.broadcast_arrays(*inside), axis=0))
         columns, rows = (int(n or 1) for n in points)
-        grid_x = left + (np.arange(columns) + 0.5) * (extent[0] / columns)
-        grid_y = top + (np.arange(rows) + 0.5) * (extent[1] / rows)
+        grid_x: Array = np.asarray(left + (np.arange(columns) + 0.5) * (extent[0] / columns))
+        grid_y: Array = np.asarray(top + (np.arange(rows) + 0.5) * (extent[1] / rows))
         values = _product(factors, grid_x[None, :], grid_y[:, None], extent[0] / columns, extent[1] / rows)
         middle = left + extent[0] / 2, top + extent[1] / 2
         raster = Cells(np.clip(np.broadcast_to(values, (rows, columns)), 0.0, 1.0), *extent, middle=middle)
@@ -253,7 +254,7 @@ def _parts(patterns: Iterable[Pattern], middle: tuple[float, float]) -> Iterable
 
 def _product(factors: tuple[Pattern, ...], x: Array, y: Array, width: float, height: float) -> Array:
     """The product of means over small rectangles; functions, whose means are rasters again, at a point."""
-    total = np.asarray(1.0)
+    total: Array = np.ones(1)
     for factor in factors:
         plain = factor.pattern if isinstance(factor, Shifted) else factor
         pointwise = isinstance(plain, FunctionPattern) or type(plain).mean is Pattern.mean

@@ -37,7 +37,8 @@ def run(plan: Plan, values: NDArray[Any], progress: Progress | None = None) -> N
     rows, columns = plan.raster_shape
     raster = np.zeros((rows, columns, channels), dtype=np.float32)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        if plan.separable:
+        alike = all(np.ptp(m.column, axis=0).max() < 1e-6 > np.ptp(m.row, axis=1).max() for m in plan.masks)
+        if plan.separable and alike:
             separable = _Separable(plan, channels)
             separable.add(values, raster.reshape(rows, -1), pool, progress)
             if separable.mirrored:

@@ -115,7 +115,7 @@ class OpenParts:
 def open_parts(
     planes: list[Plane], index: Array, shift: Array, motion: Array, samples: tuple[int, int], divide: int
 ) -> OpenParts:
-    """The open share of each tap's cell behind planes that tell views apart only, and where it lies; see `tap_origin`.
+    """What of each tap's cell is open behind planes that tell views apart only; see `tap_origin`.
 
     A cell that a rim cuts is lit through a part of it, and what other masks do to that light they do around the
     middle of that part.
