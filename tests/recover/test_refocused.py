@@ -101,8 +101,8 @@ def test_a_hole_within_one_view_shows_that_view():
     kept = np.sinc(1 / PERIOD) * np.sinc(0.5 / PERIOD)
     # FOCUS is where views are not moved, so that only the footprint's loss of contrast is left.
     # Linear interpolation and the mean over a pixel leave 1 − s/2 of samples that lie on pixels, s = sin² x,
-    # x = πf; given back is 1 + s/3 + 8/45 s². That is sinc(f) and 0.0583 x⁴: 8.7e-5 at f = 1/16 and 0.5e-5 at 1/32,
-    # and the next terms 2 % of it.
+    # x = πf; given back is 1 + s/3 + 8/45 s². That is sinc(f) and 0.0583 x⁴: 8.7e-5 at f = 1/16, 0.5e-5 at
+    # 1/32, and the next terms 2 % of it.
     np.testing.assert_allclose(middle(image, 3) - 0.5, kept * (middle(view, 3) - 0.5), atol=0.4 * 9.4e-5)
 
 
