@@ -3,12 +3,12 @@
     python benchmarks/thin_lens.py --renders FOLDER        # renders once (half an hour), then compares (a minute)
 
 A scene with detail from 0.5 to 4 m is rendered by Mitsuba (scalar_rgb) twice: as views of pinholes that fill the
-square around the stop, and by its ``thinlens`` sensor focused at several distances. Both have box pixels, so that a
-pixel is the mean over its area. All surfaces shine by themselves, so that only edges and textures within pixels and
-the lens leave noise; it is measured, from two renders of other seeds.
+square around the stop, and by its ``thinlens`` sensor focused at several distances. Both have box pixels: a pixel
+is the mean over its area. All surfaces shine by themselves, so that only edges and textures within pixels and the
+lens leave noise; it is measured, from two renders of other seeds.
 
-Compared with the thin lens's picture are a camera of this package by default options (a lens with a round stop, and
-a sensor of pixels as large as the views') and naive shift-and-add: each view's pixels as squares moved to where they
+Compared with the thin lens's picture are a camera of this package by default options (a lens with a round stop, a
+sensor of pixels as large as the views') and naive shift-and-add: each view's pixels as squares moved to where they
 are seen at the focused distance, their light given to the sensor's pixels by area, and each view weighted by the
 open share of its cell of the stop. The peak of PSNR is the picture's largest value.
 """
@@ -30,10 +30,10 @@ from vcc.store import open_store
 from vcc.units import mm
 
 FOCAL_LENGTH, STOP = 50 * mm, 30 * mm
-WIDE = 0.72
-"""Of the views' field, as a slope from border to border."""
-VIEWS, PIXELS, BORDER = 17, (200, 300), 12
-"""A side; of a view; and by how many pixels the thin lens's picture is smaller on each side."""
+VIEWS, PIXELS, PIXEL = 17, (200, 300), 2.4e-3
+"""A side; of a view; and the slope of one."""
+BORDER = 12
+"""By how many pixels the thin lens's picture is smaller on each side: no view lacks what it shows."""
 FOCUS_DISTANCES = (0.6, 0.9, 1.3, 2.0, 3.0, 4.0)
 CONVERGENCE = 1.2
 VIEW_SAMPLES, LENS_SAMPLES = 64, 1024
@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 
 def cameras(views: int = VIEWS, pixels: tuple[int, int] = PIXELS) -> CameraArray:
     """Views that fill the square around the stop."""
-    return CameraArray((views, views), pixels, STOP / views, WIDE / PIXELS[1], CONVERGENCE)
+    return CameraArray((views, views), pixels, STOP / views, PIXEL, CONVERGENCE)
 
 
 # -- the scene
@@ -174,17 +174,18 @@ def _bricks(random: np.random.Generator) -> Array:
 
 
 def render(folder: Path) -> None:
-    """Render what the folder does not hold yet: ``views.zarr``, and ``lens-DISTANCE-SEED.npy`` for seeds 1 and 2."""
+    """Render what the folder does not hold yet: ``views.zarr``, ``lens-DISTANCE-SEED.npy`` for two seeds."""
     from vcc.sources import synthesize
     from vcc.sources.mitsuba import MitsubaRenderer
 
     folder.mkdir(parents=True, exist_ok=True)
+    shape = PIXELS[0] - 2 * BORDER, PIXELS[1] - 2 * BORDER
     for seed in (1, 2):
         for distance in FOCUS_DISTANCES:
             path = folder / f"lens-{distance:g}-{seed}.npy"
             if not path.exists():
                 start = time.perf_counter()
-                np.save(path, through_thin_lens(scene(), distance, LENS_SAMPLES, seed))
+                np.save(path, through_thin_lens(scene(), distance, shape, LENS_SAMPLES, seed))
                 print(f"{path.name}: {time.perf_counter() - start:.0f} s", flush=True)
         if seed == 1:
             synthesize(
@@ -195,18 +196,20 @@ def render(folder: Path) -> None:
             )
 
 
-def through_thin_lens(plugin: dict[str, Any], distance: float, samples: int, seed: int) -> NDArray[np.float32]:
+def through_thin_lens(
+    plugin: dict[str, Any], distance: float, shape: tuple[int, int], samples: int, seed: int
+) -> NDArray[np.float32]:
     """The picture of a thin lens with a round stop, focused at a distance: mean radiance, (rows, columns, 3)."""
-    from vcc.sources.mitsuba.renderer import _for_mitsuba, mitsuba_library
+    from vcc.sources.mitsuba.renderer import for_mitsuba, mitsuba_library
 
     mitsuba = mitsuba_library()
     mitsuba.set_variant("scalar_rgb")
-    rows, columns = (side - 2 * BORDER for side in PIXELS)
+    rows, columns = shape
     pose = _at((0, 0, 0), (1, 1, 1), turn=180)
     given = {
         "type": "thinlens",
         "to_world": mitsuba.ScalarTransform4f(pose),
-        "fov": math.degrees(2 * math.atan(WIDE * columns / PIXELS[1] / 2)),
+        "fov": math.degrees(2 * math.atan(PIXEL * columns / 2)),
         "fov_axis": "x",
         "aperture_radius": STOP / 2,
         "focus_distance": distance,
@@ -221,7 +224,7 @@ def through_thin_lens(plugin: dict[str, Any], distance: float, samples: int, see
             "rfilter": {"type": "box"},
         },
     }
-    world = mitsuba.load_dict(_for_mitsuba(mitsuba, plugin))
+    world = mitsuba.load_dict(for_mitsuba(mitsuba, plugin))
     return np.array(
         mitsuba.render(world, sensor=mitsuba.load_dict(given), spp=samples, seed=seed), dtype=np.float32
     )
@@ -233,7 +236,7 @@ def through_thin_lens(plugin: dict[str, Any], distance: float, samples: int, see
 def by_default(field: vcc.LightField, distance: float, shape: tuple[int, int], **options: Any) -> Array:
     """What a camera of this package takes, focused at a distance: mean radiance, upright."""
     to_sensor = 1 / (1 / FOCAL_LENGTH - 1 / distance)
-    camera = vcc.Camera([vcc.Lens(FOCAL_LENGTH, STOP)], vcc.Sensor(to_sensor, shape, to_sensor * WIDE / PIXELS[1]))
+    camera = vcc.Camera([vcc.Lens(FOCAL_LENGTH, STOP)], vcc.Sensor(to_sensor, shape, to_sensor * PIXEL))
     solid_angle = math.pi * (STOP / 2 / to_sensor) ** 2
     return camera.capture(field, **options).upright().to_numpy().astype(np.float64) / solid_angle
 
@@ -249,8 +252,7 @@ def shifted_and_added(field: vcc.LightField, distance: float, shape: tuple[int, 
         if share == 0:
             continue
         # The middle of the view's picture is seen on the plane in focus at u/Z − s, in pixels of the sensor:
-        pixel = WIDE / PIXELS[1]
-        down, across = (v / distance - t) / pixel, (u / distance - s) / pixel
+        down, across = (v / distance - t) / PIXEL, (u / distance - s) / PIXEL
         moved = _by_area(_by_area(values[row, column].astype(np.float64), down, shape[0], 0), across, shape[1], 1)
         total += share * moved
         weight += share
@@ -276,9 +278,9 @@ def psnr(picture: Array, truth: Array) -> float:
     return float(10 * np.log10(truth.max() ** 2 / np.mean((picture - truth) ** 2)))
 
 
-def rows(folder: Path) -> list[tuple[float, float, float, float]]:
-    """(focus distance, noise floor, ours, naive) in dB, for each distance."""
-    field = open_store(folder / "views.zarr").read()
+def compared(folder: Path, every: int) -> list[tuple[float, float, float, float]]:
+    """(focus distance, noise floor, ours, naive) in dB, for each distance, by every so many views."""
+    field = open_store(folder / "views.zarr").read()[::every, ::every]
     found = []
     for distance in FOCUS_DISTANCES:
         one, other = (np.load(folder / f"lens-{distance:g}-{seed}.npy").astype(np.float64) for seed in (1, 2))
@@ -296,9 +298,12 @@ def main() -> None:
     parser.add_argument("--renders", type=Path, required=True, help="folder that keeps the renders")
     given = parser.parse_args()
     render(given.renders)
-    print("\n| focus | noise of the render | ours | shift and add | difference |\n|---|---|---|---|---|")
-    for distance, floor, ours, naive in rows(given.renders):
-        print(f"| {distance:g} m | {floor:.1f} dB | {ours:.1f} dB | {naive:.1f} dB | {ours - naive:+.1f} dB |")
+    for every in (1, 2):
+        side = len(range(0, VIEWS, every))
+        print(f"\n{side}×{side} views\n\n| focus | noise of the render | ours | shift and add | difference |")
+        print("|---|---|---|---|---|")
+        for distance, floor, ours, naive in compared(given.renders, every):
+            print(f"| {distance:g} m | {floor:.1f} dB | {ours:.1f} dB | {naive:.1f} dB | {ours - naive:+.1f} dB |")
 
 
 if __name__ == "__main__":
