@@ -13,9 +13,13 @@ import numpy as np
 from numba import njit
 
 from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add_views_of_4
+from vcc.plan.rays import DIGITS
 
 PACKET = 256
 """Rays at a time: six numbers each, which stay in the first-level cache."""
+
+DIGITS_ABOVE, DIGITS_BELOW = np.float32(2.0**DIGITS), 2.0**-DIGITS
+"""What takes a point to its digits as a whole number, and back."""
 
 INLINED = {"nogil": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy", "inline": "always"}
 OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy"}
@@ -445,33 +449,38 @@ def cells_seen(cells, cell_kinds, cell_whole, x, y, pixels, near):  # type: igno
 
 
 @njit(**INLINED)
-def at_pixel(points, start, n, moved, middle_x, middle_y, wide, high, x, y):  # type: ignore[no-untyped-def]
+def unit(point, flipped):  # type: ignore[no-untyped-def]
+    """A number 0 … 1 of `DIGITS` binary digits, some of them flipped; see `vcc.plan.rays.RayPlan._moved`."""
+    return (np.float64(np.int32(point * DIGITS_ABOVE) ^ flipped) + 0.5) * DIGITS_BELOW
+
+
+@njit(**INLINED)
+def at_pixel(points, start, n, flipped, middle_x, middle_y, wide, high, x, y):  # type: ignore[no-untyped-def]
     """Places of n rays over the sensitive area of a pixel."""
-    right, down = moved[0], moved[1]
+    across, down = np.int32(flipped[0]), np.int32(flipped[1])
     for p in range(n):
-        a = points[0, start + p] + right
-        x[p] = middle_x + (a - math.floor(a + 0.5)) * wide
-        b = points[1, start + p] + down
-        y[p] = middle_y + (b - math.floor(b + 0.5)) * high
+        x[p] = middle_x + (unit(points[0, start + p], across) - 0.5) * wide
+        y[p] = middle_y + (unit(points[1, start + p], down) - 0.5) * high
 
 
 @njit(**INLINED)
 def through_window(  # type: ignore[no-untyped-def]
-    points, start, n, moved, window, scatter, x, y, s, t, share
+    points, start, n, flipped, window, scatter, x, y, s, t, share
 ):  # fmt: skip
     """Slopes and weights of n rays towards a window, making up for diffusers; see `vcc.plan.rays.Window`."""
     f0, f1, f2, f3, f4 = window[0, 0], window[0, 1], window[0, 2], window[0, 3], window[0, 4]
     g0, g1, g2, g3, g4 = window[1, 0], window[1, 1], window[1, 2], window[1, 3], window[1, 4]
-    solid_angle, right, down, side = window[2, 0], 2.0 * moved[2], 2.0 * moved[3], 2.0
-    if window[2, 1] == 1.0:  # a disc is turned, not shifted
-        turn = 2.0 * math.pi * moved[2]
+    solid_angle, disc = window[2, 0], window[2, 1] == 1.0
+    if disc:  # turned
+        turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
         cosine, sine = math.cos(turn), math.sin(turn)
         f0, f1 = f0 * cosine + f1 * sine, f1 * cosine - f0 * sine
         g0, g1 = g0 * cosine + g1 * sine, g1 * cosine - g0 * sine
-        right = down = side = 0.0
+    across, down = np.int32(flipped[2]), np.int32(flipped[3])
     for p in range(n):
-        a, b = points[2, start + p] + right, points[3, start + p] + down
-        a, b = a - side * math.floor(0.5 * a + 0.5), b - side * math.floor(0.5 * b + 0.5)
+        a, b = np.float64(points[2, start + p]), np.float64(points[3, start + p])
+        if not disc:
+            a, b = 2.0 * unit(points[2, start + p], across) - 1.0, 2.0 * unit(points[3, start + p], down) - 1.0
         s[p] = f0 * a + f1 * b + f2 * x[p] + f3 * y[p] + f4
         t[p] = g0 * a + g1 * b + g2 * x[p] + g3 * y[p] + g4
         share[p] = solid_angle
@@ -485,17 +494,16 @@ def through_window(  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINED)
-def through_cell(points, start, n, moved, boxes, cells, x, y, s, t, share):  # type: ignore[no-untyped-def]
+def through_cell(points, start, n, flipped, boxes, cells, x, y, s, t, share):  # type: ignore[no-untyped-def]
     """Slopes and weights of n rays through the part of a cell that the stop is seen through, along each axis."""
     for axis in range(2):
         place, slope = (x, s) if axis == 0 else (y, t)
         middle, along, half = boxes[axis, 0], boxes[axis, 1], boxes[axis, 2]
         left, right = boxes[axis, 3], boxes[axis, 4]
         from_sensor, offset, per_slope = cells[3, axis], cells[5, axis], 1 / cells[4, axis]
-        weight, shift = abs(per_slope), 2.0 * moved[2 + axis]
+        weight, digits = abs(per_slope), np.int32(flipped[2 + axis])
         for p in range(n):
-            point = points[2 + axis, start + p] + shift
-            point -= 2.0 * math.floor(0.5 * point + 0.5)
+            point = 2.0 * unit(points[2 + axis, start + p], digits) - 1.0
             centre = middle + along * place[p]
             low = max(centre - half, left)
             high = max(min(centre + half, right), low)
@@ -559,7 +567,7 @@ def add_tile(  # type: ignore[no-untyped-def]
     blocks = points.shape[1] // samples
     near = np.empty((256, 2), dtype=np.int64)
     turn = cells[0:3].ravel()
-    boxes, moved = np.empty((2, 5)), np.empty(4)
+    boxes, flipped = np.empty((2, 5)), np.empty(4, dtype=np.int64)
     for row in range(tile[0], min(tile[1], rows_there)):
         for column in range(tile[2], min(tile[3], columns_there)):
             middle_x = pixels[0, 0] + column * pixels[0, 1]
@@ -567,7 +575,7 @@ def add_tile(  # type: ignore[no-untyped-def]
             block = (np.int64(hashed(row * columns_there + column, seed)) * blocks) >> 32
             first = (block ^ block_shift) * samples
             for n in range(4):
-                moved[n] = hashed(row * columns_there + column, seed + 1 + n) * 2.0**-32
+                flipped[n] = hashed(row * columns_there + column, seed + 1 + n) >> np.uint32(32 - DIGITS)
             totals[:] = 0
             cells_near = 1
             if by_cell:
@@ -581,13 +589,13 @@ def add_tile(  # type: ignore[no-untyped-def]
                 for done in range(0, samples, PACKET):
                     n = min(PACKET, samples - done)
                     start = first + done
-                    at_pixel(points, start, n, moved, middle_x, middle_y, pixels[0, 2], pixels[1, 2], x, y)
+                    at_pixel(points, start, n, flipped, middle_x, middle_y, pixels[0, 2], pixels[1, 2], x, y)
                     if by_cell:
-                        through_cell(points, start, n, moved, boxes, cells, x, y, s, t, share)
+                        through_cell(points, start, n, flipped, boxes, cells, x, y, s, t, share)
                         if cell_whole[0] == 1 or turn[1] != 0.0:  # a cell is not the rectangle around it
                             keep_own(cells, cell_whole, near[q, 0], near[q, 1], n, x, y, s, t, share)
                     else:
-                        through_window(points, start, n, moved, window, scatter, x, y, s, t, share)
+                        through_window(points, start, n, flipped, window, scatter, x, y, s, t, share)
                     traced = 0
                     for p in range(n):
                         traced += share[p] > 0.0

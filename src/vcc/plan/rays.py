@@ -6,7 +6,7 @@ the sensor is the integral over the slopes at which light arrives,
     I(x) = ∫∫ L(ray traced back to the light field) · Π T ds dt,
 
 and a pixel holds the mean over its sensitive area. Both integrals are taken at once by a fixed number of rays a
-pixel, spread evenly (a scrambled Sobol' sequence) over the pixel, over the part of the optics that its light can
+pixel, spread evenly (a Sobol' sequence, scrambled as Owen does) over the pixel, over the part of the optics that its light can
 come through (the aim) and over what diffusers do. The engine knows nothing of optics.
 """
 
@@ -27,6 +27,8 @@ TABLE = 2**16
 """Points of the sequence that all pixels share; a pixel takes an aligned block of them."""
 FIRST_COLUMNS = 4
 """Columns of the table that every plan has: place in the pixel (x, y), place in the aim (x, y)."""
+DIGITS = 24
+"""Binary digits of a point: as many as float32 holds of numbers below 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +174,8 @@ class RayPlan:
         scale: turns stored samples into radiance.
         samples: rays a pixel, a power of two (through an array of lenses: a cell).
         seed: of the choice of points for each pixel.
-        points: the table, (`TABLE`, columns) float32: place in the pixel (−½ … ½, twice), place in the window
-            (−1 … 1, twice), then what diffusers need.
+        points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
+            (0 … 1, twice, in `DIGITS` binary digits; of a disc −1 … 1), then what diffusers need.
         views_may_end: rays outside the grid of views are missing: a stop at the views says that they are wanted.
         cautions: what a user should be warned of, in words.
         notes: what was decided and why, in words.
@@ -244,23 +246,27 @@ class RayPlan:
         return index, rays.share
 
     def _moved(self, points: NDArray[np.float32], pixel: NDArray[np.int64]) -> Array:
-        """Points (pixels, samples, columns) with each pixel's places in it and in the window shifted as one.
+        """Points (pixels, samples, columns): places in the pixel −½ … ½, in the window −1 … 1, each pixel's its own.
 
-        There are fewer blocks than pixels: without the shift, pixels with one block would err alike, and an even
-        surface would show it. What leaves on one side comes back on the other; a disc is turned.
+        There are fewer blocks than pixels: pixels with one block would err alike, and an even surface would show
+        it. So each pixel flips digits of its own in all of its points: boxes with sides of powers of ½ change
+        places as wholes, so that the points stay as even as they were, and none crosses from one border to the
+        other, where what is seen may jump (a digital shift; Owen 1995). A disc is turned.
         """
         moved = points.astype(np.float64)
-        shift = np.stack([hashed(pixel, self.seed + 1 + n) * 2.0**-32 for n in range(4)], axis=-1)
-        place = moved[..., :2] + shift[:, None, :2]
-        moved[..., :2] = place - np.floor(place + 0.5)
-        a, b = moved[..., 2], moved[..., 3]
-        if isinstance(self.aim, Window) and self.aim.disc:
-            turn = 2 * np.pi * shift[:, 2:3]
+        flipped = np.stack([hashed(pixel, self.seed + 1 + n) >> (32 - DIGITS) for n in range(4)], axis=-1)
+        disc = isinstance(self.aim, Window) and self.aim.disc
+        columns = 2 if disc else 4
+        digits = (points[..., :columns] * 2**DIGITS).astype(np.uint32) ^ flipped[:, None, :columns]
+        places = (digits + 0.5) * 2.0**-DIGITS
+        moved[..., :2] = places[..., :2] - 0.5
+        if disc:
+            a, b = moved[..., 2], moved[..., 3]
+            turn = 2 * np.pi * 2.0**-DIGITS * flipped[:, 2:3]
             cosine, sine = np.cos(turn), np.sin(turn)
             moved[..., 2], moved[..., 3] = cosine * a - sine * b, sine * a + cosine * b
         else:
-            aimed = moved[..., 2:4] + 2 * shift[:, None, 2:]
-            moved[..., 2:4] = aimed - 2 * np.floor(0.5 * aimed + 0.5)
+            moved[..., 2:4] = 2 * places[..., 2:] - 1
         return moved
 
     def _through_cells(
