@@ -6,7 +6,7 @@ the sensor is the integral over the slopes at which light arrives,
     I(x) = ∫∫ L(ray traced back to the light field) · Π T ds dt,
 
 and a pixel holds the mean over its sensitive area. Both integrals are taken at once by a fixed number of rays a
-pixel, spread evenly (a Sobol' sequence, scrambled as Owen does) over the pixel, over the part of the optics that its light can
+pixel, spread evenly (a scrambled Sobol' sequence) over the pixel, over the part of the optics that its light can
 come through (the aim) and over what diffusers do. The engine knows nothing of optics.
 """
 
@@ -246,7 +246,7 @@ class RayPlan:
         return index, rays.share
 
     def _moved(self, points: NDArray[np.float32], pixel: NDArray[np.int64]) -> Array:
-        """Points (pixels, samples, columns): places in the pixel −½ … ½, in the window −1 … 1, each pixel's its own.
+        """Points (pixels, samples, columns), each pixel's its own: in the pixel −½ … ½, in the window −1 … 1.
 
         There are fewer blocks than pixels: pixels with one block would err alike, and an even surface would show
         it. So each pixel flips digits of its own in all of its points: boxes with sides of powers of ½ change
