@@ -221,7 +221,7 @@ def _in_library(plan: RayPlan, values: Any, beside: int, kind: Any, progress: Pr
     weights, missing, rays = 0.0, 0.0, 0
     for pixel in _pieces(plan):
         index, share = plan.looked_up(pixel, plan.block(pixel) ^ beside)
-        inside, held = _held(plan, index)
+        inside, held = plan.held(index)
         weights += float((share * (inside | plan.views_may_end)).sum())
         missing += float((share * (~held) * (inside | plan.views_may_end)).sum())
         rays += int(np.count_nonzero(share))
@@ -248,14 +248,6 @@ def _pieces(plan: RayPlan) -> Iterator[NDArray[np.int64]]:
     total = plan.sensor_shape[0] * plan.sensor_shape[1]
     for first in range(0, total, at_once):
         yield np.arange(first, min(first + at_once, total))
-
-
-def _held(plan: RayPlan, index: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which rays fall into the grid of views, and which into their pictures too."""
-    nv, nu, nt, ns = plan.views
-    i, j, k, l = np.moveaxis(index, -1, 0)
-    inside = (i >= -0.5) & (i <= nu - 0.5) & (j >= -0.5) & (j <= nv - 0.5)
-    return inside, inside & (k >= -0.5) & (k <= ns - 0.5) & (l >= -0.5) & (l <= nt - 0.5)
 
 
 def _found(plan: RayPlan, xp: Any, samples: Any, index: Array, share: Array, working: Any) -> Any:

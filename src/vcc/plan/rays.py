@@ -177,6 +177,8 @@ class RayPlan:
         points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
             (0 … 1, twice, in `DIGITS` binary digits; of a disc −1 … 1), then what diffusers need.
         views_may_end: rays outside the grid of views are missing: a stop at the views says that they are wanted.
+        missing_rays: the share of the light asked for that the light field lacks, where the aim is narrower than
+            what is asked for; None where the rays that are traced tell.
         cautions: what a user should be warned of, in words.
         notes: what was decided and why, in words.
     """
@@ -196,6 +198,7 @@ class RayPlan:
     seed: int
     points: NDArray[np.float32]
     views_may_end: bool
+    missing_rays: float | None = None
     cautions: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
 
@@ -244,6 +247,13 @@ class RayPlan:
             step(rays)
         index = self.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
         return index, rays.share
+
+    def held(self, index: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which rays, by indices (…, 4) of the light field, fall into the grid of views, and into pictures too."""
+        nv, nu, nt, ns = self.views
+        i, j, k, l = np.moveaxis(index, -1, 0)
+        inside = (i >= -0.5) & (i <= nu - 0.5) & (j >= -0.5) & (j <= nv - 0.5)
+        return inside, inside & (k >= -0.5) & (k <= ns - 0.5) & (l >= -0.5) & (l <= nt - 0.5)
 
     def _moved(self, points: NDArray[np.float32], pixel: NDArray[np.int64]) -> Array:
         """Points (pixels, samples, columns), each pixel's its own: in the pixel −½ … ½, in the window −1 … 1.
