@@ -538,7 +538,8 @@ def through_cell(points, start, n, flipped, images, cells, borders, x, y, s, t, 
 @njit(**OPTIONS)
 def add_tile(  # type: ignore[no-untyped-def]
     values, views, channels, scale, pixels, tile, samples, block_shift, seed, points, window, scatter, cells,
-    cell_kinds, cell_whole, borders, codes, whole, real, shares, slopes, index, motion, between, ends, picture, tally,
+    cell_kinds, cell_whole, borders, codes, whole, real, shares, slopes, index, motion, between, ends, picture,
+    tally,
 ):  # fmt: skip
     """The pixels of a tile, into picture (rows, columns, channels).
 

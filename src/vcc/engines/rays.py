@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.engines.sharpening import sharpened
 from vcc.errors import InputError, ResultWarning
 from vcc.plan.rays import TABLE, CellWindows, RayPlan, Window
 from vcc.sampled import to_dtype
@@ -68,6 +69,7 @@ def run(
     """
     once = {"numba": _compiled, "array_api": _in_library, "reference": _in_library}[engine]
     kind = np.float64 if engine == "reference" else None
+    plan, values = sharpened(plan, values, engine)
     traced = once(plan, values, 0, kind, progress)
     round_number = 0
     while tolerance is not None and traced.sampling_error > tolerance * abs(_mean(traced.values)):
@@ -173,8 +175,8 @@ def _tile_adder(
         tally = np.zeros(4)
         kernels.add_tile(
             flat, plan.views, channels, plan.scale, pixels, tile, plan.samples, beside, seed, points,
-            window, scatter, cells, kinds, whole, borders, *steps, plan.index_from_ray.matrix[:4].copy(), plan.motion,
-            plan.between_views, plan.views_may_end, picture, tally,
+            window, scatter, cells, kinds, whole, borders, *steps, plan.index_from_ray.matrix[:4].copy(),
+            plan.motion, plan.between_views, plan.views_may_end, picture, tally,
         )  # fmt: skip
         return tally
 

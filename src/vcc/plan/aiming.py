@@ -329,7 +329,7 @@ class Path:
     def bounds_beyond(
         self, n: int, slack: list[Array], everything: bool
     ) -> Iterator[tuple[Affine, slice, Array, Array, bool, str]]:
-        """What bounds rays beyond leg n: coordinates there from rays before it, which, middle, half, disc, words."""
+        """What bounds rays beyond leg n: coordinates from rays before it, which, middle, half, disc, words."""
         way = Affine.identity()
         for m in range(n + 1, len(self.legs)):
             way = self.legs[m].undone @ way

@@ -51,15 +51,18 @@ def compile_best(
         )
     if method == "footprints":
         raise InputError(f"this camera's picture cannot be made by footprints: {reason}. Use method='rays'")
-    for name, given, default in (("interpolation", interpolation, "linear"), ("refine", refine, "auto")):
-        if given != default:
-            raise InputError(
-                f"{name}={given!r} is for pictures made by footprints; this one is made by rays ({reason}): "
-                "leave it out"
-            )
+    by_footprints = [("refine", refine)] if refine != "auto" else []
+    if interpolation in ("nearest", "cubic"):
+        by_footprints.append(("interpolation", interpolation))
+    for name, given in by_footprints:
+        raise InputError(
+            f"{name}={given!r} is for pictures made by footprints; this one is made by rays ({reason}): "
+            "leave it out"
+        )
     return compile_rays(
         camera,
         light_field,
+        interpolation=interpolation,
         between_views=between_views,
         scene_distance=scene_distance,
         samples=samples,

@@ -21,6 +21,7 @@ from vcc.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
 from vcc.plan import steps
 from vcc.plan.aiming import Aimed, Leg, Path, columns_of
 from vcc.plan.parallax_rule import index_motions, vergences
+from vcc.plan.ray_sharpening import sharpening
 from vcc.plan.rays import DIGITS, FIRST_COLUMNS, TABLE, Aim, RayPlan, Window
 from vcc.units import short
 
@@ -47,6 +48,7 @@ def compile_rays(
     camera: Camera,
     light_field: LightField,
     *,
+    interpolation: str = "sharp",
     between_views: str = "auto",
     scene_distance: float | None = None,
     samples: int | None = None,
@@ -63,6 +65,8 @@ def compile_rays(
     """
     if between_views not in ("auto", "none"):
         raise InputError(f"between_views is 'auto' or 'none', not {between_views!r}")
+    if interpolation not in ("sharp", "linear"):
+        raise InputError(f"interpolation by rays is 'sharp' or 'linear', not {interpolation!r}")
     samples = _checked_samples(samples)
     seed = checked_seed(seed)
     path = Path(camera, light_field)
@@ -79,6 +83,11 @@ def compile_rays(
     else:
         motion = np.zeros((2, 2))
         notes.append("each view stands for its cell of the aperture; views are not interpolated, as asked")
+    if interpolation == "sharp":
+        notes.append(
+            "views are made sharper by what interpolating between their samples takes"
+            + (", and by what their pixels' own averaging took" if light_field.sample == "mean" else "")
+        )
     nv, nu, nt, ns = light_field.shape[:4]
     plan = RayPlan(
         sensor_shape=(rows, columns),
@@ -92,6 +101,7 @@ def compile_rays(
         between_views=between_views == "auto",
         views=(nv, nu, nt, ns),
         scale=1.0 / light_field.full_scale,
+        sharpening=sharpening(light_field.sample) if interpolation == "sharp" else None,
         samples=samples,
         seed=seed,
         points=_table(seed, scatters, aimed.aim),

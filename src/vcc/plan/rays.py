@@ -195,6 +195,8 @@ class RayPlan:
         between_views: interpolate between views along the motion; else each view is its cell.
         views: (v, u, t, s) of the light field.
         scale: turns stored samples into radiance.
+        sharpening: weights of the filter by which views are made sharper before rays look them up, as
+            `vcc.plan.ray_sharpening.sharpening` gives them; None looks samples up as they are.
         samples: rays a pixel, a power of two (through an array of lenses: a cell).
         seed: of the choice of points for each pixel.
         points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
@@ -217,6 +219,7 @@ class RayPlan:
     between_views: bool
     views: tuple[int, int, int, int]
     scale: float
+    sharpening: tuple[int, int, int] | None
     samples: int
     seed: int
     points: NDArray[np.float32]
