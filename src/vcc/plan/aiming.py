@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.optics.deflections import CellDeflection
+from vcc.optics.lattice import CellApertures, Lattice
 from vcc.optics.scatter import Scatter
-from vcc.patterns import Circle
+from vcc.patterns import Bounded, Circle, Pattern
 from vcc.plan.beam import Beam
 from vcc.plan.rays import FIRST_COLUMNS, Aim, CellWindows, Window
 
@@ -72,7 +73,7 @@ class Strip:
         middle: of what passes.
         half: half the width of what passes, and by how much rays can stray there from where affine optics lead.
         number: of the leg, or one more than the last for the light field.
-        disc: whether it is one axis of a round hole, widened by nothing.
+        disc: whether it is one axis of a round hole, and of what it becomes widened.
         words: what it is.
     """
 
@@ -238,11 +239,9 @@ class Path:
             low, high = leg.stop
             loose = np.abs(slack[n][:2]).sum(axis=1)
             half = (high - low) / 2
-            pattern = leg.stage.faces.pattern
-            disc = isinstance(pattern, Circle) and not loose.any()
-            if disc:
-                assert isinstance(pattern, Circle)
-                disc = bool(np.allclose(half, pattern.diameter / 2, rtol=1e-12, atol=0))
+            disc = _is_disc(leg)
+            if disc:  # rays stray in any direction: a round hole widened is still round
+                loose = np.full(2, np.linalg.norm(loose))
             strips += [
                 Strip(
                     from_sensor=leg.from_sensor.linear[axis],
@@ -331,23 +330,24 @@ class Path:
 
     def bounds_beyond(
         self, n: int, slack: list[Array], everything: bool
-    ) -> Iterator[tuple[Affine, slice, Array, Array, str]]:
-        """What bounds rays beyond leg n: coordinates there from rays before it, which, middle, half, words."""
+    ) -> Iterator[tuple[Affine, slice, Array, Array, bool, str]]:
+        """What bounds rays beyond leg n: coordinates from rays before it, which, middle, half, disc, words."""
         way = Affine.identity()
         for m in range(n + 1, len(self.legs)):
             way = self.legs[m].undone @ way
             low, high = self.legs[m].stop
             if np.isfinite(high - low).all():
                 loose = np.abs(slack[m][:2]).sum(axis=1) - self.slack_through(n, way)[:2]
-                half = (high - low) / 2 + loose
-                yield way, slice(0, 2), (low + high) / 2, half, self.legs[m].stage.element.label
+                disc = _is_disc(self.legs[m])
+                half = (high - low) / 2 + (np.linalg.norm(loose) if disc else loose)
+                yield way, slice(0, 2), (low + high) / 2, half, disc, self.legs[m].stage.element.label
         way = self.index_from_entrance @ self.last @ way
         loose = np.abs(self.index_from_entrance.linear @ slack[-1]).sum(axis=1) - self.slack_through(n, way)
         middle, half = (self.size - 1) / 2, self.size / 2 + loose
         if everything or not self.stop_at_views:
-            yield way, slice(0, 2), middle[:2], half[:2], GRID_OF_VIEWS
+            yield way, slice(0, 2), middle[:2], half[:2], False, GRID_OF_VIEWS
         if everything:
-            yield way, slice(2, 4), middle[2:], half[2:], PICTURES
+            yield way, slice(2, 4), middle[2:], half[2:], False, PICTURES
 
     def slack_through(self, n: int, way: Affine) -> Array:
         """The part of the slack beyond leg n that comes from leg n itself: cells' windows know it exactly."""
@@ -368,9 +368,10 @@ class Path:
         x, y = (axis.reshape(-1, 1) for axis in np.broadcast_arrays(x, y.transpose(1, 0, 2)))
         row, column = aim.nearest(x, y)
         down, across = np.meshgrid(*(np.arange(-n, n + 1) for n in aim.reach), indexing="ij")
-        low_x, high_x, low_y, high_y = aim.box(x, y, row + down.reshape(-1), column + across.reshape(-1))
-        area = ((high_x - low_x) * (high_y - low_y)).sum(axis=1).mean()
-        return float(area / abs(np.prod(aim.place_from_slope)))
+        cells = (row + down.reshape(-1))[..., None], (column + across.reshape(-1))[..., None]
+        points = np.stack([(np.arange(12) + 0.5) / 6 - 1, np.zeros(12)], axis=-1)
+        _, _, area = aim.aimed(x[..., None], y[..., None], *cells, points)
+        return float(area.mean(axis=2).sum(axis=1).mean() / abs(np.prod(aim.place_from_slope)))
 
     def footprint(self, aim: Aim, leg: Leg) -> Array | None:
         """(width, height) in metres over which the rays of one pixel spread on a leg, by pixel or by window.
@@ -437,6 +438,34 @@ def _stops(stages: tuple[Stage, ...]) -> list[tuple[Array, Array]]:
     return stops
 
 
+def _is_disc(leg: Leg) -> bool:
+    """Whether what passes in a leg's plane is bounded by a round hole alone."""
+    pattern = leg.stage.faces.pattern
+    low, high = leg.stop
+    return isinstance(pattern, Circle) and np.allclose((high - low) / 2, pattern.diameter / 2, rtol=1e-12, atol=0)
+
+
+def _opening(pattern: Pattern | None, lattice: Lattice) -> CellApertures:
+    """The openings of a lattice's cells: whole cells, where nothing stands before them."""
+    if isinstance(pattern, Bounded):
+        return _opening(pattern.pattern, lattice)
+    if isinstance(pattern, CellApertures) and pattern.lattice == lattice:
+        return pattern
+    return CellApertures(lattice)
+
+
+def _borders(opening: CellApertures) -> Array:
+    """The strips that cut out an opening in the shape of its cell; see `CellWindows.borders`."""
+    if opening.circular:
+        return np.zeros((0, 2))
+    sides = 2 if opening.lattice.layout == "square" else 3
+    across = opening.lattice.rotation + np.arange(sides) * math.pi / sides  # to the sides, from the centre
+    x, y = np.cos(across), np.sin(across)
+    bounding = np.abs(y) > 1e-9  # others are the rectangle's own sides
+    half = opening.scale * opening.lattice.pitch / 2
+    return np.stack([-x[bounding] / y[bounding], half / np.abs(y[bounding])], axis=-1)
+
+
 def _mixed(ray_map: Affine) -> bool:
     """Whether x and y mix."""
     return bool(ray_map.matrix[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]].any())
@@ -455,6 +484,7 @@ def _cell_windows(
     part: slice,
     middle: Array,
     half: Array,
+    disc: bool,
     words: str,
 ) -> CellWindows | None:
     """Windows in the cells of an array towards a bound beyond it; None where they would be no help.
@@ -480,10 +510,11 @@ def _cell_windows(
             bending.lattice.offset[1] + leg.stage.element.decentre[1],
         ),
     )
-    corner = np.array(lattice.half_size)
+    opening = _opening(leg.stage.faces.pattern, bending.lattice)
+    radius = opening.scale * lattice.pitch / 2 if opening.circular else math.inf
     turned = np.array([[abs(math.cos(lattice.rotation)), abs(math.sin(lattice.rotation))]])
     turned = np.concatenate([turned, turned[:, ::-1]])
-    cell_half = turned @ corner
+    cell_half = np.minimum(np.array(lattice.reach) * (1 if opening.circular else opening.scale), radius)
     gain = np.abs(beyond)
     # |p(centre)| ≤ half + |gain of the cell|·cell + |prism|, in cells
     power_gain = np.abs(a + b / from_slope + bending.powers.reshape(-1, 1) * b).max(axis=0)
@@ -513,7 +544,10 @@ def _cell_windows(
         beyond_offset=way.offset[part] - b / from_slope * offset,
         middle=middle,
         half=half,
+        disc=disc,
         cell_half=cell_half,
+        borders=_borders(opening),
+        opening_radius=radius,
         reach=reach,
         words=f"{words} through each cell of {leg.stage.element.label}",
     )

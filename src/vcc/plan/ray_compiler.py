@@ -21,7 +21,8 @@ from vcc.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
 from vcc.plan import steps
 from vcc.plan.aiming import Aimed, Leg, Path, columns_of
 from vcc.plan.parallax_rule import index_motions, vergences
-from vcc.plan.rays import FIRST_COLUMNS, TABLE, Aim, RayPlan, Window
+from vcc.plan.ray_sharpening import sharpening
+from vcc.plan.rays import DIGITS, FIRST_COLUMNS, TABLE, Aim, RayPlan, Window
 from vcc.plan.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
 from vcc.sheets import Product
 from vcc.units import short
@@ -42,6 +43,7 @@ def compile_rays(
     camera: Camera,
     light_field: LightField,
     *,
+    interpolation: str = "sharp",
     between_views: str = "auto",
     scene_distance: float | None = None,
     samples: int | None = None,
@@ -58,6 +60,8 @@ def compile_rays(
     """
     if between_views not in ("auto", "none"):
         raise InputError(f"between_views is 'auto' or 'none', not {between_views!r}")
+    if interpolation not in ("sharp", "linear"):
+        raise InputError(f"interpolation by rays is 'sharp' or 'linear', not {interpolation!r}")
     samples = _checked_samples(samples)
     seed = checked_seed(seed)
     path = Path(camera, light_field)
@@ -74,6 +78,11 @@ def compile_rays(
     else:
         motion = np.zeros((2, 2))
         notes.append("each view stands for its cell of the aperture; views are not interpolated, as asked")
+    if interpolation == "sharp":
+        notes.append(
+            "views are made sharper by what interpolating between their samples takes"
+            + (", and by what their pixels' own averaging took" if light_field.sample == "mean" else "")
+        )
     nv, nu, nt, ns = light_field.shape[:4]
     plan = RayPlan(
         sensor_shape=(rows, columns),
@@ -87,6 +96,7 @@ def compile_rays(
         between_views=between_views == "auto",
         views=(nv, nu, nt, ns),
         scale=1.0 / light_field.full_scale,
+        sharpening=sharpening(light_field.sample) if interpolation == "sharp" else None,
         samples=samples,
         seed=seed,
         points=_table(seed, scatters, aimed.aim),
@@ -325,12 +335,11 @@ def _table(seed: int, scatters: list[Scatter], aim: Aim) -> NDArray[np.float32]:
     """The points that all pixels share; see `RayPlan.points`."""
     dimensions = FIRST_COLUMNS + sum(2 + (scatter.weights is not None) for scatter in scatters)
     even = _sobol(dimensions, seed)
-    columns = [even[:, 0] - 0.5, even[:, 1] - 0.5]
     disc = isinstance(aim, Window) and aim.disc
-    columns += _on_disc(even[:, 2], even[:, 3]) if disc else [2 * even[:, 2] - 1, 2 * even[:, 3] - 1]
+    columns = [even[:, 0], even[:, 1], *(_on_disc(even[:, 2], even[:, 3]) if disc else even[:, 2:4].T)]
     next_one = FIRST_COLUMNS
     for scatter in scatters:
-        xi, eta = even[:, next_one], even[:, next_one + 1]
+        xi, eta = (even[:, next_one + n] + 2.0 ** -(DIGITS + 1) for n in range(2))  # neither 0 nor 1
         next_one += 2
         for kernel in scatter.kernels:
             columns += list(kernel.deflections(xi, eta))
@@ -342,10 +351,27 @@ def _table(seed: int, scatters: list[Scatter], aim: Aim) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=4)
 def _sobol(dimensions: int, seed: int) -> Array:
-    """`TABLE` points of a scrambled Sobol' sequence: any aligned block of 2ⁿ of them is evenly spread."""
+    """`TABLE` points of a scrambled Sobol' sequence: any aligned block of 2ⁿ of them is evenly spread.
+
+    (`TABLE`, dimensions) of numbers 0 … 1 of `DIGITS` binary digits. Each digit is flipped or not by chance, by
+    all digits before it (Owen 1995). A linear scrambling would make all blocks alike but for a shift, and pixels
+    would err alike.
+    """
     from scipy.stats import qmc
 
-    points = np.asarray(qmc.Sobol(dimensions, scramble=True, seed=seed).random(TABLE))
+    depth = TABLE.bit_length() - 1  # digits in which the first points of the sequence differ
+    plain = (qmc.Sobol(dimensions, scramble=False).random(TABLE) * TABLE).astype(np.int64)
+    generator = np.random.default_rng(seed)
+    points = np.empty((TABLE, dimensions))
+    for column in range(dimensions):
+        number = plain[:, column]
+        scrambled = np.zeros(TABLE, dtype=np.int64)
+        for before in range(depth):
+            flips = generator.integers(0, 2, 2**before)
+            digit = (number >> (depth - 1 - before)) & 1
+            scrambled = 2 * scrambled + (digit ^ flips[number >> (depth - before)])
+        rest = DIGITS - depth  # no two points share all digits so far
+        points[:, column] = (scrambled * 2**rest + generator.integers(0, 2**rest, TABLE)) * 2.0**-DIGITS
     points.flags.writeable = False
     return points
 
