@@ -391,7 +391,22 @@ class LightField:
         # Views near the middle are all that is looked at: no need to bring the others from another device.
         rows, columns = (slice(max(n // 2 - 4, 0), n // 2 + 5) for n in self.shape[:2])
         views = known(self.values[rows, columns, ...])
-        return None if views is None else disparity_range(views)
+        if views is None:
+            return None
+        # Along both axes, so that a light field turned by 90° shows the same scene, each told along u.
+        across = disparity_range(views, "u") if views.shape[1] > 1 else None
+        down = disparity_range(views, "v") if views.shape[0] > 1 else None
+        found = [*(across or ()), *(told for shown in down or () if (told := self._along_u(shown)) is not None)]
+        return (min(found), max(found)) if found else None
+
+    def _along_u(self, disparity: float) -> float | None:
+        """The disparity along u of what shows ``disparity`` along v, pixels per view; None where u shows none."""
+        position, slope = self.frame.linear[1], self.frame.linear[3]
+        numerator, denominator = slope[1] - disparity * slope[3], position[1] - disparity * position[3]
+        place, angle = self.frame.linear[0], self.frame.linear[2]
+        # 1/Z = numerator / denominator; as `disparity_of`, without the quotient, which may be infinite
+        moved = angle[2] * denominator - place[2] * numerator
+        return None if moved == 0 else float((angle[0] * denominator - place[0] * numerator) / moved)
 
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))

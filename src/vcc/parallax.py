@@ -104,20 +104,20 @@ def block_disparities(values: NDArray[Any], axis: Axis) -> BlockDisparities:
     return _measure(values, axis, "s" if axis == "u" else "t").found
 
 
-def disparity_range(values: NDArray[Any]) -> tuple[float, float] | None:
-    """(lowest, highest) disparity that the pictures show along u, pixels per view.
+def disparity_range(values: NDArray[Any], axis: Axis | None = None) -> tuple[float, float] | None:
+    """(lowest, highest) disparity that the pictures show along one view axis, pixels per view.
 
-    From the 2nd to the 98th percentile of the trusted blocks. A light field of one column of views
-    is measured along v. See `block_disparities` for the limits.
+    From the 2nd to the 98th percentile of the trusted blocks. See `block_disparities` for the limits.
 
     Args:
         values: shape (v, u, t, s) or (v, u, t, s, channels).
+        axis: "u" or "v"; None takes u, and v where there is a single column of views.
 
     Returns:
         None for a single view, or where too few blocks have texture.
     """
     _check(values)
-    blocks = block_disparities(values, "u" if values.shape[1] > 1 else "v")
+    blocks = block_disparities(values, axis or ("u" if values.shape[1] > 1 else "v"))
     trusted = blocks.disparity[blocks.confident]
     if len(trusted) < min(_FEWEST_BLOCKS, len(blocks.disparity)) or len(trusted) == 0:
         return None

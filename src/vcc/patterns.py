@@ -58,23 +58,12 @@ class Pattern(abc.ABC):
             width: of every rectangle, metres.
             height: of every rectangle, metres.
         """
-        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        left, right = x.min() - width / 2, x.max() + width / 2
-        top, bottom = y.min() - height / 2, y.max() + height / 2
-        columns = _raster_points(right - left, width)
-        rows = _raster_points(bottom - top, height)
-        if columns is None or rows is None:  # few small rectangles far apart: look inside each
-            return self._mean_of_points(x, y, width, height)
-        grid_x = left + (np.arange(columns) + 0.5) * ((right - left) / columns)
-        grid_y = top + (np.arange(rows) + 0.5) * ((bottom - top) / rows)
-        values = np.asarray(self(grid_x[None, :], grid_y[:, None]), dtype=np.float64)
-        raster = Cells(
-            np.broadcast_to(values, (rows, columns)),
-            right - left,
-            bottom - top,
-            middle=((left + right) / 2, (top + bottom) / 2),
+        found = mean_by_raster(lambda a, b, _: self(a, b), self.size, x, y, width, height)
+        return (
+            self._mean_of_points(np.asarray(x, float), np.asarray(y, float), width, height)
+            if found is None
+            else found
         )
-        return raster.mean(x, y, width, height)
 
     def _mean_of_points(self, x: Array, y: Array, width: float, height: float) -> Array:
         steps = (np.arange(4) + 0.5) / 4 - 0.5
@@ -82,11 +71,54 @@ class Pattern(abc.ABC):
         return np.asarray(np.mean(np.broadcast_arrays(*points), axis=0))
 
 
-def _raster_points(extent: float, cell: float) -> int | None:
-    if cell <= 0:
-        return None
-    points = math.ceil(extent / cell * RASTER_PER_CELL)
-    return points if points <= RASTER_LIMIT else None
+def mean_by_raster(
+    values: Callable[[Array, Array, tuple[float, float]], ArrayLike],
+    size: tuple[float, float],
+    x: ArrayLike,
+    y: ArrayLike,
+    width: float,
+    height: float,
+    fewest: int = RASTER_PER_CELL,
+) -> Array | None:
+    """Means over rectangles by way of a raster, whose points lie the same whichever rectangles are asked for.
+
+    Args:
+        values: of raster points at (x, y), whose own size (x, y) is the third argument, metres.
+        size: (width, height) around the origin outside which nothing passes, metres.
+        x: centres of the rectangles, metres.
+        y: likewise.
+        width: of every rectangle, metres.
+        height: of every rectangle, metres.
+        fewest: points across a rectangle with which to make do where `RASTER_PER_CELL` would be too many.
+
+    Returns:
+        The means; None where even the fewest points across each rectangle are more than `RASTER_LIMIT`.
+    """
+    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    places: list[Array] = []
+    points: list[tuple[float, float]] = []
+    steps: list[float] = []
+    for centre, length, bound in ((x, width, size[0]), (y, height, size[1])):
+        low = max(float(centre.min()) - length / 2, -bound / 2)
+        high = max(min(float(centre.max()) + length / 2, bound / 2), low)
+        across = RASTER_PER_CELL
+        # By the pattern's own size where it has one, so that pieces of a light field see the same raster.
+        extent = bound if math.isfinite(bound) else high - low
+        while across > fewest and length > 0 and extent / length * across > RASTER_LIMIT:
+            across //= 2
+        step = length / across
+        if step <= 0 or (high - low) / step > RASTER_LIMIT:
+            return None
+        first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
+        places.append(np.asarray((np.arange(first, last) + 0.5) * step, dtype=np.float64))
+        points.append((first * step, last * step))
+        steps.append(step)
+    rows, columns = places[1].size, places[0].size
+    found = np.asarray(values(places[0][None, :], places[1][:, None], (steps[0], steps[1])), dtype=np.float64)
+    (left, right), (top, bottom) = points
+    middle = (left + right) / 2, (top + bottom) / 2
+    raster = Cells(np.broadcast_to(found, (rows, columns)), right - left, bottom - top, middle)
+    return raster.mean(x, y, width, height)
 
 
 def _mean_from_integral(

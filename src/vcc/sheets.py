@@ -17,14 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.errors import InputError
 from vcc.patterns import (
-    RASTER_LIMIT,
-    RASTER_PER_CELL,
     Bounded,
     Cells,
     Circle,
     FunctionPattern,
     Open,
     Pattern,
+    Polygon,
+    mean_by_raster,
 )
 
 Array = NDArray[np.float64]
@@ -215,26 +215,27 @@ class Product(Pattern):
             return np.ones(np.broadcast_shapes(x.shape, y.shape))
         if len(factors) == 1:
             return factors[0].mean(x, y, width, height)
-        left, top = float(x.min()) - width / 2, float(y.min()) - height / 2
-        extent = float(x.max()) + width / 2 - left, float(y.max()) + height / 2 - top
-        points = [_raster_points(extent[n], size) for n, size in enumerate((width, height))]
-        if None in points:  # few small rectangles far apart: look inside each
+
+        def values(px: Array, py: Array, point: tuple[float, float]) -> Array:
+            return np.clip(_product(factors, px, py, *point), 0.0, 1.0)
+
+        found = mean_by_raster(values, self.size, x, y, width, height, FEWEST_PER_CELL)
+        if found is None:  # few small rectangles far apart: look inside each
             steps = (np.arange(FEWEST_PER_CELL) + 0.5) / FEWEST_PER_CELL - 0.5
             part = width / FEWEST_PER_CELL, height / FEWEST_PER_CELL
             inside = [_product(factors, x + a * width, y + b * height, *part) for a in steps for b in steps]
             return np.asarray(np.mean(np.broadcast_arrays(*inside), axis=0))
-        columns, rows = (int(n or 1) for n in points)
-        grid_x: Array = np.asarray(left + (np.arange(columns) + 0.5) * (extent[0] / columns))
-        grid_y: Array = np.asarray(top + (np.arange(rows) + 0.5) * (extent[1] / rows))
-        values = _product(factors, grid_x[None, :], grid_y[:, None], extent[0] / columns, extent[1] / rows)
-        middle = left + extent[0] / 2, top + extent[1] / 2
-        raster = Cells(np.clip(np.broadcast_to(values, (rows, columns)), 0.0, 1.0), *extent, middle=middle)
-        return raster.mean(x, y, width, height)
+        return found
 
     @cached_property
     def _factors(self) -> tuple[Pattern, ...]:
         """The patterns, all that are made of rectangles multiplied to one, and what is clear left out."""
-        simple = list(_parts(self.patterns, (0.0, 0.0)))
+        # What is open or opaque is the same twice: two equal rims in one plane are one.
+        once: list[Pattern] = []
+        for part in _parts(self.patterns, (0.0, 0.0)):
+            if not (isinstance(part, Circle | Polygon) and part in once):
+                once.append(part)
+        simple = once
         tiles = [one for one in simple if isinstance(one, Tiles)]
         rest = tuple(one for one in simple if not isinstance(one, Tiles))
         return (reduce(Tiles.times, tiles), *rest) if tiles else rest
@@ -269,14 +270,6 @@ def _product(factors: tuple[Pattern, ...], x: Array, y: Array, width: float, hei
         pointwise = isinstance(plain, FunctionPattern) or type(plain).mean is Pattern.mean
         total = total * (factor(x, y) if pointwise else factor.mean(x, y, width, height))
     return np.asarray(total)
-
-
-def _raster_points(extent: float, cell: float) -> int | None:
-    """Points of a raster over an extent: 16 across a cell, fewer where that would be too many; None below four."""
-    if cell <= 0:
-        return None
-    across = min(RASTER_PER_CELL, RASTER_LIMIT * cell / extent)
-    return math.ceil(extent / cell * across) if across >= FEWEST_PER_CELL else None
 
 
 def clear_over(pattern: Pattern, low: Array, high: Array) -> bool:

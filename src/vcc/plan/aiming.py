@@ -292,7 +292,7 @@ class Path:
                 offset=back @ np.array([strip.middle for strip in pair]),
                 disc=same and pair[0].disc,
                 words=" and ".join(dict.fromkeys(strip.words for strip in pair)),
-                slope_from_scatter=self._made_up(pair, back),
+                slope_from_scatter=self._made_up(pair, np.asarray(back, dtype=np.float64)),
             )
 
     def _made_up(self, pair: tuple[Strip, ...], back: Array) -> tuple[tuple[int, Array], ...]:
