@@ -67,8 +67,8 @@ def test_two_square_roots_in_one_plane_are_the_mask(z):
 @pytest.mark.parametrize("interpolation", ["sharp", "linear", "cubic"])
 @pytest.mark.parametrize("z", [0.3, 0.5, 0.8])
 def test_a_mask_behind_a_rim_that_cuts_cells_matches_brute_force_to_60_dB(z, interpolation):
-    # A stop of 10.3 views across cuts 36 cells; lit from their middles they cost 30 dB and 2 % of the light. Linear
-    # interpolation leaves 60 dB on such textures (test_textured_planes), which is why they are this coarse.
+    # A stop of 10.3 views across cuts 36 cells; lit from their middles they cost 30 dB and 2 % of the light.
+    # Linear interpolation leaves 60 dB on such textures (test_textured_planes), which is why they are this coarse.
     spacing, slope, period = 1 * mm, 1e-3, 4 * mm * (1 - z) + 1 * mm
     texture = cosines(1, np.array([30.0, 45.0]) * slope * FOCUS)
     scene = Scene([Layer(FOCUS, texture)])
