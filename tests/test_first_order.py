@@ -231,3 +231,30 @@ def test_the_ray_transfer_matrix_as_a_map_of_rays():
     np.testing.assert_array_equal(Affine.abcd(((5, 6), (7, 8)))(ray), [23, 34, 31, 46])
     with pytest.raises(InputError, match=r"2×2, not 3"):
         Affine.abcd([1, 2, 3])
+
+
+@pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+@pytest.mark.parametrize("method", ["footprints", "rays"])
+def test_places_that_differ_by_rounding_are_one_place(method):
+    """0.1 + 0.2 is more than 0.3: a lens that ends at the sensor, and thin ones at both of its ends."""
+    light_field = vcc.LightField.from_views(
+        np.random.default_rng(0).random((4, 4, 12, 12)).astype(np.float32), 2 * mm, 0.02, disparity_range=(0, 0)
+    )
+    assert 0.1 + 0.2 > 0.3
+
+    def picture(start, length, end, around):
+        thin = FirstOrder(np.array([[1.0, length], [0.0, 1.0]]) @ np.array(THIN), length, z=start)
+        elements = [thin, vcc.Prism((0.003, 0.0), z=around[0]), vcc.Prism((0.0, 0.002), z=around[1])]
+        camera = vcc.Camera(elements, vcc.Sensor(end, (6, 7), 1 * mm))
+        assert [element.z for element in camera.elements] == [around[0], start, around[1]]
+        return camera.capture(light_field, method=method).values
+
+    up, down = np.nextafter(0.1, 1), np.nextafter(0.3, 0)
+    exact = picture(0.1, 0.3 - 0.1, 0.3, (0.1, 0.3))
+    assert exact.any()
+    for rounded in ((0.1, 0.2, 0.3, (up, 0.3)), (0.1, 0.2, 0.3, (0.1, down)), (0.1, 0.2, down, (up, 0.3))):
+        np.testing.assert_allclose(picture(*rounded), exact, rtol=1e-4, atol=1e-6 * exact.max())
+    with pytest.raises(InputError, match="ends at z = 300"):
+        picture(0.1, 0.2, 0.3 - 1e-6, (0.1, 0.1))
+    with pytest.raises(InputError, match="stands inside"):
+        picture(0.1, 0.2, 0.3, (0.1, 0.3 - 1e-6))

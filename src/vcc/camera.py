@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, cmp_to_key
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -92,6 +93,22 @@ def _outline(light_field: LightField | StoredLightField) -> LightField:
     return light_field.outline
 
 
+def touch(one: float, other: float) -> bool:
+    """Whether two places on the axis, metres, are the same but for rounding: to a billionth, or a picometre."""
+    return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-12)
+
+
+def _order(one: Element, other: Element) -> int:
+    """−1 where light meets ``one`` first, 1 where ``other``: by z, and in one plane what is thin first."""
+    difference = one.length - other.length if touch(one.z, other.z) else one.z - other.z
+    return int(np.sign(difference))
+
+
+def _distance(start: float, end: float) -> float:
+    """The way along the axis, metres; 0 where only rounding lies between."""
+    return 0.0 if touch(start, end) else end - start
+
+
 def about(middle: tuple[float, float], ray_map: Affine) -> Affine:
     """A map of rays given in coordinates centred on ``middle``, on rays of the camera."""
     x, y = middle
@@ -125,12 +142,12 @@ class Camera:
                     f"{element.label} stands before the entrance plane z = 0, where the light field is given: "
                     "move the whole camera towards +z"
                 )
-            if element.z > sensor.z:
+            if element.z > sensor.z and not touch(element.z, sensor.z):
                 raise InputError(
                     f"{element.label} (z = {element.z * 1e3:g} mm) stands behind the sensor "
                     f"(z = {sensor.z * 1e3:g} mm): light never reaches it"
                 )
-            if element.z + element.length > sensor.z:
+            if element.z + element.length > sensor.z and not touch(element.z + element.length, sensor.z):
                 raise InputError(
                     f"{element.label} ends at z = {(element.z + element.length) * 1e3:g} mm, behind the sensor "
                     f"at z = {sensor.z * 1e3:g} mm"
@@ -141,9 +158,9 @@ class Camera:
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f'{names.count(name)} elements are named "{name}": names must differ')
-        ordered = tuple(sorted(listed, key=lambda element: (element.z, element.length)))
+        ordered = tuple(sorted(listed, key=cmp_to_key(_order)))
         for before, after in itertools.pairwise(ordered):
-            if after.z < before.z + before.length:
+            if after.z < before.z + before.length and not touch(after.z, before.z + before.length):
                 raise InputError(
                     f"{after.label} stands inside {before.label}, which reaches from z = {before.z * 1e3:g} mm to "
                     f"{(before.z + before.length) * 1e3:g} mm"
@@ -156,7 +173,7 @@ class Camera:
         stages = []
         approach, here = Affine.identity(), 0.0
         for element in self.elements:
-            approach = Affine.propagation(element.z - here) @ approach
+            approach = Affine.propagation(_distance(here, element.z)) @ approach
             here = element.z
             for part in element.parts():
                 if isinstance(part, Affine):
@@ -165,7 +182,7 @@ class Camera:
                 stages.append(Stage(element, here, approach, part))
                 approach = Affine.identity()
             here += element.length
-        return tuple(stages), Affine.propagation(self.sensor.z - here) @ approach
+        return tuple(stages), Affine.propagation(_distance(here, self.sensor.z)) @ approach
 
     @property
     def stages(self) -> tuple[Stage, ...]:
@@ -193,19 +210,20 @@ class Camera:
             raise InputError(f"z = {z * 1e3:g} mm lies before the entrance plane of the camera")
         ray, here = Affine.identity(), 0.0
         for element in self.elements:
-            if element.z > z or (before and element.z == z):
+            here_too = touch(element.z, z)
+            if (here_too and before) or (element.z > z and not here_too):
                 break
-            if z < element.z + element.length:
+            if z < element.z + element.length and not touch(z, element.z + element.length):
                 raise InputError(
                     f"z = {z * 1e3:g} mm lies inside {element.label}, which is known by its two ends only"
                 )
-            ray = Affine.propagation(element.z - here) @ ray
+            ray = Affine.propagation(_distance(here, element.z)) @ ray
             here = element.z + element.length
             for part in element.parts():
                 step = part if isinstance(part, Affine) else part.affine
                 if step is not None:
                     ray = about(element.decentre, step) @ ray
-        return Affine.propagation(z - here) @ ray
+        return Affine.propagation(_distance(here, z)) @ ray
 
     def compile(
         self,

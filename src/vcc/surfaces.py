@@ -198,6 +198,11 @@ class Cubic(Surface):
         x, y = _places(x, y)
         return 3 * self.strength * x**2, 3 * self.strength * y**2
 
+    @property
+    def affine(self) -> Affine | None:
+        """Nothing where the strength is 0."""
+        return Affine.identity() if self.strength == 0 else None
+
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
         """The slopes at the edges."""
         return 3 * abs(self.strength) * half_width**2, 3 * abs(self.strength) * half_height**2
@@ -238,6 +243,11 @@ class Axicon(Surface):
         r = np.hypot(x, y)
         r = np.where(r == 0, 1.0, r)  # x and y are 0 there, and so are the slopes
         return -self.slope * (x / r), -self.slope * (y / r)
+
+    @property
+    def affine(self) -> Affine | None:
+        """Nothing where the slope is 0."""
+        return Affine.identity() if self.slope == 0 else None
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
         """The slope, along both axes."""
@@ -427,6 +437,15 @@ class Sheet(Surface):
     def _gradient(self) -> tuple[Any, Any]:
         """Splines of (∂OPL/∂x, ∂OPL/∂y)."""
         return self._spline.partial_derivative(0, 1), self._spline.partial_derivative(1, 0)
+
+    @property
+    def affine(self) -> Affine | None:
+        """Nothing where the sheet is flat."""
+        return Affine.identity() if self._flat else None
+
+    @cached_property
+    def _flat(self) -> bool:
+        return not np.ptp(self._samples()[2])
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The spline on the sheet, metres; 0 beyond it."""
@@ -638,6 +657,11 @@ class Rough(Sheet):
     def slope_rms(self) -> float:
         """Root mean square of Δs, and of Δt, over all such surfaces: (n − 1)·√2·σ/l."""
         return (self.refractive_index - 1) * math.sqrt(2) * self.height_rms / self.correlation_length
+
+    @property
+    def affine(self) -> Affine | None:
+        """Nothing where the glass is smooth."""
+        return Affine.identity() if self.height_rms == 0 else None
 
     def _samples(self) -> tuple[Array, Array, Array]:
         from scipy.ndimage import convolve1d

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.optics.lattice import Lattice
 
@@ -31,6 +32,11 @@ class Deflection(abc.ABC):
     @abc.abstractmethod
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
         """Bounds of (|Δs|, |Δt|) over the rectangle of these half sizes around the middle, metres."""
+
+    @property
+    def affine(self) -> Affine | None:
+        """The same as a 5×5 map of rays, where its parameters make it one (a biprism of 0); None otherwise."""
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +66,11 @@ class CellDeflection(Deflection):
             raise InputError("powers and slopes of cells must be finite numbers")
         object.__setattr__(self, "powers", powers)
         object.__setattr__(self, "slopes", slopes)
+
+    @property
+    def affine(self) -> Affine | None:
+        """A prism where no cell is a lens and all are the same prism."""
+        return None if self.powers.any() else _one_prism(self.slopes.reshape(-1, 2))
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """The deflection by the cells that hold the places."""
@@ -97,6 +108,11 @@ class FacetDeflection(Deflection):
         if len(self.directions) != len(self.slopes) or len(self.directions) < 1:
             raise InputError("facets have as many directions as slopes, at least one")
 
+    @property
+    def affine(self) -> Affine | None:
+        """A prism where all facets are the same one."""
+        return _one_prism(self.slopes)
+
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """The slopes of the facet that each place lies on."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
@@ -132,6 +148,11 @@ class SlopeFunction(Deflection):
         x, y = np.linspace(-half_width, half_width, 257), np.linspace(-half_height, half_height, 257)
         s, t = self(x[None, :], y[:, None])
         return 1.05 * float(np.abs(s).max()), 1.05 * float(np.abs(t).max())
+
+
+def _one_prism(slopes: Array) -> Affine | None:
+    """The prism that all (δs, δt), (n, 2), are; None where they differ."""
+    return Affine.prism((float(slopes[0, 0]), float(slopes[0, 1]))) if (slopes == slopes[0]).all() else None
 
 
 def checked_slopes(

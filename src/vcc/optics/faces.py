@@ -34,7 +34,8 @@ class Faces:
     Args:
         deflection: what is added to the slopes of rays, by position: a 5×5 `Affine` that leaves positions
             alone (lens, prism), a `Deflection` (arrays, plates), or a function of (x, y) in metres that
-            returns (Δs, Δt); None deflects nothing.
+            returns (Δs, Δt); None deflects nothing. A `Deflection` whose parameters make it affine, or nothing
+            (`Deflection.affine`), is kept as that.
         transmission: the share of light that passes, by position: a `vcc.patterns.Pattern` or a function of
             (x, y) in metres; None lets all light pass.
         scatter: how light is spread over slopes: a `Kernel`, or a `Scatter` whose kernel varies with the
@@ -53,7 +54,8 @@ class Faces:
         if isinstance(self.deflection, Affine):
             _check_thin(self.deflection)
         elif self.deflection is not None:
-            object.__setattr__(self, "deflection", as_deflection(self.deflection))
+            deflection = as_deflection(self.deflection)
+            object.__setattr__(self, "deflection", _simplest(deflection))
         if self.transmission is not None:
             object.__setattr__(self, "transmission", as_pattern(self.transmission))
         if isinstance(self.scatter, Kernel):
@@ -80,6 +82,14 @@ class Faces:
     def spread(self) -> Scatter | None:
         """The scatter, a single kernel made uniform over the surface."""
         return self.scatter if isinstance(self.scatter, Scatter) else None
+
+
+def _simplest(deflection: Deflection) -> Affine | Deflection | None:
+    """The same deflection as an affine map where it is one, and as None where it does nothing."""
+    affine = deflection.affine
+    if affine is None:
+        return deflection
+    return None if affine == Affine.identity() else affine
 
 
 def _check_thin(deflection: Affine) -> None:

@@ -134,7 +134,7 @@ class LensArray(Element):
         """A lens in each cell, and what is clear where not all is."""
         powers = (1 / np.array(self.focal_lengths))[self.kinds]
         deflection = CellDeflection(self.lattice, powers, np.zeros((*powers.shape, 2)))
-        return Faces(deflection=deflection if powers.any() else None, transmission=self._transmission())
+        return Faces(deflection=deflection, transmission=self._transmission())
 
     def _transmission(self) -> Pattern | None:
         opening: Pattern = Open()

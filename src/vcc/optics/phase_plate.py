@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.affine import Affine
 from vcc.describe import parameters_in_words
 from vcc.errors import InputError
 from vcc.optics.deflections import Deflection, SlopeFunction, checked_slopes
@@ -30,6 +31,11 @@ class SurfaceDeflection(Deflection):
     """
 
     surface: Surface
+
+    @property
+    def affine(self) -> Affine | None:
+        """A prism or a lens where the surface's slopes are linear in x and y."""
+        return self.surface.affine
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """The gradient of the surface's optical path, checked."""
@@ -114,11 +120,10 @@ class PhasePlate(Element):
         """A deflection, affine where the surface's slopes are linear, and an opening if there is a rim."""
         return Faces(deflection=self._deflection(), transmission=self._opening())
 
-    def _deflection(self) -> Any:
-        if not isinstance(self.surface, Surface):
-            return SlopeFunction(_given_whole_arrays(self.surface))
-        affine = self.surface.affine
-        return SurfaceDeflection(self.surface) if affine is None else affine
+    def _deflection(self) -> Deflection:
+        if isinstance(self.surface, Surface):
+            return SurfaceDeflection(self.surface)
+        return SlopeFunction(_given_whole_arrays(self.surface))
 
     def _opening(self) -> Pattern | None:
         if self.diameter is not None:

@@ -295,7 +295,7 @@ class Path:
                 slope_from_scatter=self._made_up(pair, np.asarray(back, dtype=np.float64)),
             )
 
-    def _made_up(self, pair: tuple[Strip, ...], back: Array) -> tuple[tuple[int, Array], ...]:
+    def _made_up(self, pair: tuple[Strip, ...], back: NDArray[np.floating]) -> tuple[tuple[int, Array], ...]:
         """How slopes make up for the uniform diffusers before the planes of the strips; see `Window`."""
         terms, column = [], FIRST_COLUMNS
         for n, leg in enumerate(self.legs[: max(strip.number for strip in pair)]):
