@@ -364,9 +364,8 @@ class Path:
         x = (sensor.decentre[0] + width * place)[:, None, None]
         y = (sensor.decentre[1] + height * place)[:, None, None]
         x, y = (axis.reshape(-1, 1) for axis in np.broadcast_arrays(x, y.transpose(1, 0, 2)))
-        row, column = aim.nearest(x, y)
-        down, across = np.meshgrid(*(np.arange(-n, n + 1) for n in aim.reach), indexing="ij")
-        cells = (row + down.reshape(-1))[..., None], (column + across.reshape(-1))[..., None]
+        row, column = aim.around(x[..., 0], y[..., 0])
+        cells = row[..., None], column[..., None]
         points = np.stack([(np.arange(12) + 0.5) / 6 - 1, np.zeros(12)], axis=-1)
         _, _, area = aim.aimed(x[..., None], y[..., None], *cells, points)
         return float(area.mean(axis=2).sum(axis=1).mean() / abs(np.prod(aim.place_from_slope)))
