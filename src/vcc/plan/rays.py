@@ -105,6 +105,7 @@ class CellWindows:
         opening_radius: of round openings, infinite for others.
         reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are looked at.
         words: what is aimed at.
+        halvings: how many times a pixel's rays are halved for each of the cells that it sees.
     """
 
     place_from_sensor: Array
@@ -125,6 +126,7 @@ class CellWindows:
     opening_radius: float
     reach: tuple[int, int]
     words: str
+    halvings: int = 0
 
     def nearest(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(row, column) of the cell through whose centre the middle of the stop is seen from x, y, nearly."""
@@ -212,7 +214,7 @@ class RayPlan:
         scale: turns stored samples into radiance.
         sharpening: weights of the filter by which views are made sharper before rays look them up, as
             `vcc.plan.ray_sharpening.sharpening` gives them; None looks samples up as they are.
-        samples: rays a pixel, a power of two (through an array of lenses: a cell).
+        samples: rays a pixel, a power of two (through an array: through each cell).
         seed: of the choice of points for each pixel.
         points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
             (0 … 1, twice, in `DIGITS` binary digits; of a disc −1 … 1), then what diffusers need.
