@@ -250,7 +250,7 @@ def test_what_explain_says_of_rays():
     for words in (
         'lens array "lenslets" bends rays by a function of position that is not affine',
         'aimed at lens at z = 0 mm through each cell of lens array "lenslets"',
-        "32 rays for each pixel and lenslet that it sees, evenly spread, seed 7",
+        "32 rays for each pixel and cell of the array that it sees, evenly spread, seed 7",
         "expected sampling error",
         "million rays",
         "s expected",

@@ -587,13 +587,16 @@ def add_tile(  # type: ignore[no-untyped-def]
             middle_y = pixels[1, 0] + row * pixels[1, 1]
             block = (np.int64(hashed(row * columns_there + column, seed)) * blocks) >> 32
             first = (block ^ block_shift) * samples
-            for n in range(4):
-                flipped[n] = hashed(row * columns_there + column, seed + 1 + n) >> np.uint32(32 - DIGITS)
             totals[:] = 0
             cells_near = 1
             if by_cell:
                 cells_near = cells_seen(cells, cell_kinds, cell_whole, middle_x, middle_y, pixels, near)
             for q in range(cells_near):
+                number = np.int64(row * columns_there + column)
+                if by_cell:
+                    number ^= np.int64(hashed(near[q, 0] * 65537 + near[q, 1], seed))
+                for n in range(4):
+                    flipped[n] = hashed(number, seed + 1 + n) >> np.uint32(32 - DIGITS)
                 if by_cell:
                     centre_x, centre_y = centre_of(cell_whole[0], turn, near[q, 0], near[q, 1])
                     kind = kind_of(cell_whole, near[q, 0], near[q, 1])

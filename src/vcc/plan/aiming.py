@@ -111,8 +111,8 @@ class _Slack:
 class Path:
     """A camera from the sensor back to the light field, and what bounds its rays."""
 
-    def __init__(self, camera: Camera, light_field: LightField) -> None:
-        self.camera = camera
+    def __init__(self, camera: Camera, light_field: LightField, samples: int) -> None:
+        self.camera, self.samples = camera, samples
         self.legs: list[Leg] = []
         here, undone = Affine.identity(), camera.approach_to_sensor.inverse()
         stops = _stops(camera.stages)
@@ -215,15 +215,22 @@ class Path:
         return regions, slack
 
     def best(self, slack: _Slack, everything: bool) -> Aim:
-        """The aim that takes in the smallest solid angle."""
+        """The aim that takes in the smallest solid angle, or parts it where elements are not smooth.
+
+        Windows of cells are aimed at where they save rays, and where a pixel's rays are enough for all cells that
+        it sees: what a pixel sees jumps from cell to cell, and is smooth in each.
+        """
         windows = list(self.windows(self.strips(slack.unknown, everything)))
         if not windows:
             raise InputError("nothing bounds the rays of this camera: give a lens or a mask a size")
         best = min(windows, key=lambda window: window.solid_angle)
         cells = self.cell_windows(slack.whole, everything)
-        if cells is not None and self.solid_angle(cells) < WORTH_NARROWING * best.solid_angle:
+        if cells is None:
+            return best
+        if self.solid_angle(cells) < WORTH_NARROWING * best.solid_angle:
             return cells
-        return best
+        halvings = round(math.log2(max(self._cells_seen(cells), 1.0)))
+        return replace(cells, halvings=halvings) if 2 ** (halvings + 1) <= self.samples else best
 
     def strips(self, slack: list[Array], everything: bool) -> list[Strip]:
         """Everything that rays from the sensor must pass and that bounds them.
@@ -360,18 +367,25 @@ class Path:
         """∫∫ ds dt over the aim; through all cells' windows, the mean over some places on the sensor."""
         if isinstance(aim, Window):
             return aim.solid_angle
+        return float(self._areas(aim).sum(axis=1).mean() / abs(np.prod(aim.place_from_slope)))
+
+    def _cells_seen(self, aim: CellWindows) -> float:
+        """Through how many cells light comes to a place on the sensor, the mean over some places."""
+        return float((self._areas(aim) > 0).sum(axis=1).mean())
+
+    def _areas(self, aim: CellWindows) -> Array:
+        """Areas of the windows of cells seen from some places on the sensor, m², (places, cells)."""
         sensor = self.camera.sensor
         height, width = sensor.size
         place = (np.arange(12) + 0.37) / 12 - 0.5
         x = (sensor.decentre[0] + width * place)[:, None, None]
         y = (sensor.decentre[1] + height * place)[:, None, None]
         x, y = (axis.reshape(-1, 1) for axis in np.broadcast_arrays(x, y.transpose(1, 0, 2)))
-        row, column = aim.nearest(x, y)
-        down, across = np.meshgrid(*(np.arange(-n, n + 1) for n in aim.reach), indexing="ij")
-        cells = (row + down.reshape(-1))[..., None], (column + across.reshape(-1))[..., None]
+        row, column = aim.around(x[..., 0], y[..., 0])
+        cells = row[..., None], column[..., None]
         points = np.stack([(np.arange(12) + 0.5) / 6 - 1, np.zeros(12)], axis=-1)
         _, _, area = aim.aimed(x[..., None], y[..., None], *cells, points)
-        return float(area.mean(axis=2).sum(axis=1).mean() / abs(np.prod(aim.place_from_slope)))
+        return np.asarray(area.mean(axis=2))
 
     def footprint(self, aim: Aim, leg: Leg) -> Array | None:
         """(width, height) in metres over which the rays of one pixel spread on a leg, by pixel or by window.

@@ -93,7 +93,7 @@ def _patches(plan: RayPlan, threads: int) -> Iterator[RayPlan]:
 
 def _sampling(plan: RayPlan, pilot: Any, tolerance: float | None) -> str:
     lines = [f"  met on the way back from the sensor: {plan.met}"]
-    through = " and lenslet that it sees" if isinstance(plan.aim, CellWindows) else ""
+    through = " and cell of the array that it sees" if isinstance(plan.aim, CellWindows) else ""
     lines.append(f"  {plan.samples} rays for each pixel{through}, evenly spread, seed {plan.seed}")
     if pilot is not None:
         lines.append(

@@ -22,7 +22,7 @@ from vcc.plan import steps
 from vcc.plan.aiming import Aimed, Leg, Path, columns_of
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.ray_sharpening import sharpening
-from vcc.plan.rays import DIGITS, FIRST_COLUMNS, TABLE, Aim, RayPlan, Window
+from vcc.plan.rays import DIGITS, FIRST_COLUMNS, TABLE, Aim, CellWindows, RayPlan, Window
 from vcc.plan.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
 from vcc.sheets import Product
 from vcc.units import short
@@ -64,7 +64,7 @@ def compile_rays(
         raise InputError(f"interpolation by rays is 'sharp' or 'linear', not {interpolation!r}")
     samples = _checked_samples(samples)
     seed = checked_seed(seed)
-    path = Path(camera, light_field)
+    path = Path(camera, light_field, samples)
     aimed, asked = path.aimed()
     notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {aimed.aim.words}"]
     made, index_from_ray, scatters = _steps(path, aimed, notes)
@@ -78,6 +78,8 @@ def compile_rays(
     else:
         motion = np.zeros((2, 2))
         notes.append("each view stands for its cell of the aperture; views are not interpolated, as asked")
+    if isinstance(aimed.aim, CellWindows):
+        samples >>= aimed.aim.halvings
     if interpolation == "sharp":
         notes.append(
             "views are made sharper by what interpolating between their samples takes"

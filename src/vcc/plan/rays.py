@@ -105,6 +105,7 @@ class CellWindows:
         opening_radius: of round openings, infinite for others.
         reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are looked at.
         words: what is aimed at.
+        halvings: how many times a pixel's rays are halved for each of the cells that it sees.
     """
 
     place_from_sensor: Array
@@ -125,6 +126,7 @@ class CellWindows:
     opening_radius: float
     reach: tuple[int, int]
     words: str
+    halvings: int = 0
 
     def nearest(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(row, column) of the cell through whose centre the middle of the stop is seen from x, y, nearly."""
@@ -133,6 +135,21 @@ class CellWindows:
             for n, place in enumerate((x, y))
         ]
         return self.lattice.cell_of(*centre)
+
+    def around(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(row, column) of all cells that are looked at from places x, y: (..., cells) each."""
+        row, column = self.nearest(x, y)
+        down, across = np.meshgrid(*(np.arange(-reach, reach + 1) for reach in self.reach), indexing="ij")
+        return row[..., None] + down.reshape(-1), column[..., None] + across.reshape(-1)
+
+    def rays_through(
+        self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64], points: Array
+    ) -> tuple[Array, Array, Array]:
+        """Slopes s, t of rays from places x, y through cells, and the solid angle that they stand for."""
+        a, b, area = self.aimed(x, y, row, column, points)
+        s = (a - self.place_from_sensor[0] * x - self.offset[0]) / self.place_from_slope[0]
+        t = (b - self.place_from_sensor[1] * y - self.offset[1]) / self.place_from_slope[1]
+        return s, t, area / abs(self.place_from_slope[0] * self.place_from_slope[1])
 
     def aimed(
         self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64], points: Array
@@ -197,7 +214,7 @@ class RayPlan:
         scale: turns stored samples into radiance.
         sharpening: weights of the filter by which views are made sharper before rays look them up, as
             `vcc.plan.ray_sharpening.sharpening` gives them; None looks samples up as they are.
-        samples: rays a pixel, a power of two (through an array of lenses: a cell).
+        samples: rays a pixel, a power of two (through an array: through each cell).
         seed: of the choice of points for each pixel.
         points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
             (0 … 1, twice, in `DIGITS` binary digits; of a disc −1 … 1), then what diffusers need.
@@ -258,15 +275,25 @@ class RayPlan:
             radiance 1. The first half of the samples is as good a set as the second.
         """
         number = block[:, None] * self.samples + np.arange(self.samples)
-        points = self._moved(self.points[number], pixel)[:, None]  # (pixels, 1, samples, columns)
+        points = self.points[number][:, None]  # (pixels, 1, samples, columns)
         row, column = np.divmod(pixel, self.sensor_shape[1])
+        middle_x = self.first_pixel[0] + column * self.pitch[0]
+        middle_y = self.first_pixel[1] + row * self.pitch[1]
         shape = (-1, 1, 1)
-        x = self.first_pixel[0] + column.reshape(shape) * self.pitch[0] + points[..., 0] * self.sensitive[0]
-        y = self.first_pixel[1] + row.reshape(shape) * self.pitch[1] + points[..., 1] * self.sensitive[1]
-        if isinstance(self.aim, Window):
-            s, t, weight = self.aim.slopes(x, y, points)
+        if isinstance(self.aim, CellWindows):
+            cell_row, cell_column = self.aim.around(middle_x, middle_y)
+            # What is drawn for a pixel differs from cell to cell.
+            cell = hashed(cell_row * 65537 + cell_column, self.seed).astype(np.int64)
+            points = self._moved(points, pixel[:, None] ^ cell)
         else:
-            x, y, s, t, weight = self._through_cells(pixel, x, y, points)
+            points = self._moved(points, pixel[:, None])
+        x = middle_x.reshape(shape) + points[..., 0] * self.sensitive[0]
+        y = middle_y.reshape(shape) + points[..., 1] * self.sensitive[1]
+        if isinstance(self.aim, CellWindows):
+            cells = cell_row[..., None], cell_column[..., None]
+            s, t, weight = self.aim.rays_through(x, y, *cells, points[..., 2:4])
+        else:
+            s, t, weight = self.aim.slopes(x, y, points)
         points = np.broadcast_to(points, (*s.shape, points.shape[-1]))
         rays = Bundle(x, y, s, t, weight / self.samples, points)
         for step in self.steps:
@@ -281,50 +308,32 @@ class RayPlan:
         inside = (i >= -0.5) & (i <= nu - 0.5) & (j >= -0.5) & (j <= nv - 0.5)
         return inside, inside & (k >= -0.5) & (k <= ns - 0.5) & (l >= -0.5) & (l <= nt - 0.5)
 
-    def _moved(self, points: NDArray[np.float32], pixel: NDArray[np.int64]) -> Array:
-        """Points (pixels, samples, columns), each pixel's its own: in the pixel −½ … ½, in the window −1 … 1.
+    def _moved(self, points: NDArray[np.float32], number: NDArray[np.int64]) -> Array:
+        """Points (pixels, 1, samples, columns), moved by what is drawn for each number (pixels, cells).
+
+        Returns (pixels, cells, samples, columns): places in the pixel −½ … ½, in the window −1 … 1.
 
         There are fewer blocks than pixels: pixels with one block would err alike, and an even surface would show
         it. So each pixel flips digits of its own in all of its points: boxes with sides of powers of ½ change
         places as wholes, so that the points stay as even as they were, and none crosses from one border to the
         other, where what is seen may jump (a digital shift; Owen 1995). A disc is turned.
         """
+        points = np.broadcast_to(points, (*number.shape, *points.shape[2:]))
         moved = points.astype(np.float64)
-        flipped = np.stack([hashed(pixel, self.seed + 1 + n) >> (32 - DIGITS) for n in range(4)], axis=-1)
+        flipped = np.stack([hashed(number, self.seed + 1 + n) >> (32 - DIGITS) for n in range(4)], axis=-1)
         disc = isinstance(self.aim, Window) and self.aim.disc
         columns = 2 if disc else 4
-        digits = (points[..., :columns] * 2**DIGITS).astype(np.uint32) ^ flipped[:, None, :columns]
+        digits = (points[..., :columns] * 2**DIGITS).astype(np.uint32) ^ flipped[..., None, :columns]
         places = (digits + 0.5) * 2.0**-DIGITS
         moved[..., :2] = places[..., :2] - 0.5
         if disc:
             a, b = moved[..., 2], moved[..., 3]
-            turn = 2 * np.pi * 2.0**-DIGITS * flipped[:, 2:3]
+            turn = 2 * np.pi * 2.0**-DIGITS * flipped[..., 2:3]
             cosine, sine = np.cos(turn), np.sin(turn)
             moved[..., 2], moved[..., 3] = cosine * a - sine * b, sine * a + cosine * b
         else:
             moved[..., 2:4] = 2 * places[..., 2:] - 1
         return moved
-
-    def _through_cells(
-        self, pixel: NDArray[np.int64], x: Array, y: Array, points: Array
-    ) -> tuple[Array, Array, Array, Array, Array]:
-        """Rays from places on the sensor through all cells that the stop beyond can be seen through."""
-        aim = self.aim
-        assert isinstance(aim, CellWindows)
-        row, column = np.divmod(pixel, self.sensor_shape[1])
-        nearest = aim.nearest(
-            self.first_pixel[0] + column * self.pitch[0], self.first_pixel[1] + row * self.pitch[1]
-        )
-        down, across = (np.arange(-reach, reach + 1) for reach in aim.reach)
-        cell_row = (nearest[0][:, None, None] + down[:, None]).repeat(len(across), axis=2)
-        cell_column = (nearest[1][:, None, None] + across[None, :]).repeat(len(down), axis=1)
-        cell_row, cell_column = (cells.reshape(len(pixel), -1, 1) for cells in (cell_row, cell_column))
-        a, b, area = aim.aimed(x, y, cell_row, cell_column, points[..., 2:4])
-        s = (a - aim.place_from_sensor[0] * x - aim.offset[0]) / aim.place_from_slope[0]
-        t = (b - aim.place_from_sensor[1] * y - aim.offset[1]) / aim.place_from_slope[1]
-        weight = area / abs(aim.place_from_slope[0] * aim.place_from_slope[1])
-        x, y = np.broadcast_to(x, s.shape), np.broadcast_to(y, s.shape)
-        return x, y, s, t, weight
 
     @property
     def met(self) -> str:

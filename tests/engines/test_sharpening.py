@@ -1,0 +1,182 @@
+"""The filter that gives back to views what looking them up takes, against sinc(f).
+
+Oracles: NumPy's sinc, cosines and their means over pixels in closed form, a view that must give itself back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import array_api_strict
+import numpy as np
+import pytest
+
+import vcc
+from vcc.engines.sharpening import kept_as, sharpened
+from vcc.plan.explain_rays import expected_memory
+from vcc.plan.ray_compiler import compile_rays
+from vcc.plan.ray_sharpening import sharpening
+from vcc.store import save_store
+from vcc.units import mm
+
+FOCUS = 1.0
+D = 1 / (1 / 50e-3 - 1 / FOCUS)
+SLOPE = 2e-3
+LENS = vcc.Lens(focal_length=50 * mm, diameter=6 * mm)
+KINDS = ["uint8", "uint16", "float16", "float32", "float64"]
+
+
+def field(values: np.ndarray, **options) -> vcc.LightField:
+    defaults = {
+        "spacing": 2 * mm,
+        "slope_per_pixel": SLOPE,
+        "focus_distance": FOCUS,
+        "disparity_range": (-0.2, 0.4),
+    }
+    return vcc.LightField.from_views(values, **(defaults | options))
+
+
+def plan_of(lf: vcc.LightField, **options):
+    return compile_rays(vcc.Camera([LENS], vcc.Sensor(D, (6, 7), D * SLOPE)), lf, **options)
+
+
+def random(shape: tuple[int, ...], kind: str) -> np.ndarray:
+    values = np.random.default_rng(3).random(shape)
+    return (values * np.iinfo(kind).max).astype(kind) if kind.startswith("u") else values.astype(kind)
+
+
+@pytest.mark.parametrize(("sample", "power"), [("point", 2), ("mean", 3)])
+def test_the_filter_is_one_over_a_power_of_sinc(sample, power):
+    middle, near, far = np.array(sharpening(sample)) / 1024
+    f = np.array([0.02, 0.05, 0.1, 0.15])
+    factor = middle + 2 * near * np.cos(2 * np.pi * f) + 2 * far * np.cos(4 * np.pi * f)
+    # With h = sin(πf), 1/sinc(f) = arcsin(h)/h = 1 + h²/6 + 3h⁴/40 + 15h⁶/336 + …: its powers have coefficients
+    # that are positive and fall. What is left is at most the sixth order's times 1/(1 − h²), and weights rounded
+    # to 2⁻¹¹.
+    series = np.polynomial.Polynomial([1, 1 / 6, 3 / 40, 15 / 336]) ** power
+    h = np.sin(np.pi * f)
+    left = series.coef[3] * h**6 / (1 - h**2) + 2.0**-11 * (4 * h**2 + 4 * np.sin(2 * np.pi * f) ** 2)
+    assert (np.abs(factor * np.sinc(f) ** power - 1) <= left).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_even_stays_even_to_the_bit(kind):
+    for shape in ((2, 2, 5, 6), (1, 1, 1, 1), (1, 2, 2, 3, 3)):
+        even = np.full(shape, 200 if kind.startswith("u") else 0.75, dtype=kind)
+        for engine in ("numba", "reference"):
+            plan, values = sharpened(plan_of(field(even)), even, engine)
+            assert (values * 1.0 == values.flat[0]).all()
+            assert values.flat[0] * plan.scale == pytest.approx(even.flat[0] / field(even).full_scale, rel=1e-7)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("shape", [(3, 2, 9, 11), (2, 2, 4, 3, 3), (1, 1, 1, 2), (1, 2, 6, 7, 4)])
+def test_engines_make_the_same_samples(kind, shape):
+    values = random(shape, kind)
+    plan = plan_of(field(values))
+    _, expected = sharpened(plan, values, "reference")
+    _, compiled = sharpened(plan, values, "numba")
+    assert compiled.dtype == kept_as(plan, values.dtype)
+    # Single precision rounds six sums of numbers up to 3.4 times the largest.
+    tolerance = 0 if kind == "uint8" else 6 * 3.4 * np.finfo(np.float32).eps * float(values.max())
+    assert np.abs(compiled - expected.astype(float)).max() <= tolerance
+    if kind != "float16":
+        _, library = sharpened(plan, array_api_strict.asarray(values), "array_api")
+        assert np.abs(np.from_dlpack(library) - expected.astype(float)).max() <= tolerance
+
+
+def test_a_single_row_or_column_is_filtered_by_hand():
+    row = np.zeros((1, 1, 1, 9), np.float32)
+    row[..., 4] = 1.0
+    plan = plan_of(field(row, sample="point"))
+    _, values = sharpened(plan, row, "numba")
+    middle, near, far = np.array(plan.sharpening) / 1024
+    # The other axis is one sample long, so even: its filter does nothing.
+    np.testing.assert_allclose(values[0, 0, 0], [0, 0, far, near, middle, near, far, 0, 0], atol=1e-7)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_transposed_or_mirrored_views_are_filtered_alike(kind):
+    values = random((2, 2, 7, 9), kind)
+    plan = plan_of(field(values))
+    _, plain = sharpened(plan, values, "numba")
+    for change in (lambda v: v.transpose(0, 1, 3, 2), lambda v: v[:, :, ::-1], lambda v: v[:, :, :, ::-1]):
+        _, changed = sharpened(plan, change(values), "numba")
+        np.testing.assert_allclose(changed, change(plain), rtol=0, atol=1e-5 * float(plain.max()))
+
+
+@pytest.mark.parametrize("sample", ["point", "mean"])
+def test_one_view_imaged_onto_pixels_of_its_own_size_gives_itself_back(sample):
+    # Cosines of up to 0.12 cycles a sample along both axes. The picture's pixels are means.
+    k = np.arange(40.0)
+    f, g = 0.12, 0.09
+
+    def view(softened: int) -> np.ndarray:
+        """With the means over the pixels taken so many times."""
+        across = np.sinc(f) ** softened * np.cos(2 * np.pi * f * k)
+        down = np.sinc(g) ** softened * np.cos(2 * np.pi * g * k + 1)
+        return 1 + 0.4 * down[:, None] * across[None, :]
+
+    values = view(0 if sample == "point" else 1)[None, None].astype(np.float32)
+    lf = field(values, spacing=7 * mm, sample=sample)
+    camera = vcc.Camera([LENS], vcc.Sensor(D, (40, 40), D * SLOPE))
+    picture = {
+        way: record_upright(camera, lf, samples=256, interpolation=way)[4:-4, 4:-4] for way in ("sharp", "linear")
+    }
+    truth = view(1)[4:-4, 4:-4] * np.pi * (3 * mm) ** 2 / D**2
+    reached = {
+        way: -20 * np.log10(np.sqrt(np.mean((one - truth) ** 2)) / truth.max()) for way, one in picture.items()
+    }
+    print(sample, reached)
+    # The filter's remainder at f, 1e-3 and less, of cosines of 0.4/1.4 of the largest value: 65 dB.
+    assert reached["sharp"] >= 60
+    assert reached["linear"] < 42
+
+
+def record_upright(camera: vcc.Camera, lf: vcc.LightField, **options) -> np.ndarray:
+    from vcc.engines import record
+
+    # A lens turns its picture by half a turn.
+    return record(compile_rays(camera, lf, **options), lf.values).values[::-1, ::-1].astype(float)
+
+
+def test_a_picture_of_an_even_scene_keeps_its_light():
+    lf = field(np.full((4, 4, 9, 9), 200, np.uint8))
+    camera = vcc.Camera([LENS], vcc.Sensor(D, (4, 4), D * SLOPE))
+    expected = 200 / 255 * np.pi * (3 * mm) ** 2 / D**2
+    assert record_upright(camera, lf) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["uint8", "float32"])
+@pytest.mark.parametrize("channels", [(), (3,)])
+def test_pictures_agree_between_engines_and_in_pieces(tmp_path, kind, channels):
+    from vcc.engines import pieces, record
+
+    values = random((4, 5, 14, 16, *channels), kind)
+    lf = field(values)
+    array = vcc.LensArray(focal_length=2 * mm, pitch=1 * mm, z=D - 3 * mm)
+    camera = vcc.Camera([LENS, array], vcc.Sensor(D, (12, 14), D * SLOPE))
+    plan = compile_rays(camera, lf, samples=16)
+    whole = record(plan, lf.values)
+    other = record(plan, lf.values, engine="reference").values
+    assert np.abs(whole.values - other).max() <= 1e-5 * other.max()  # docs/how-it-works: engines agree to 1e-5
+    assert np.abs(record(replace(plan, sharpening=None), values).values - other).max() > 1e-3 * other.max()
+    stored = save_store(lf, tmp_path / "a.zarr", chunks=4)
+    # Blocks of some rows of pixels: what they lack of their neighbours would show.
+    for limit in (10**9, plan.points.nbytes * 3 + 140_000):
+        picture = pieces.record_pieces(plan, stored, memory_limit=limit)
+        assert np.abs(picture.values - whole.values).max() <= 1e-5 * other.max()
+        assert picture.sampling_error == pytest.approx(whole.sampling_error, rel=1e-3)
+
+
+def test_memory_counts_the_filtered_samples():
+    values = random((4, 4, 30, 30), "uint8")
+    lf = field(values)
+    more = expected_memory(plan_of(lf), lf) - expected_memory(plan_of(lf, interpolation="linear"), lf)
+    assert more == 2 * values.size  # 16 bits for 8
+
+
+def test_other_interpolations_are_refused():
+    lf = field(random((2, 2, 4, 4), "float32"))
+    with pytest.raises(vcc.InputError, match="interpolation by rays is 'sharp' or 'linear', not 'cubic'"):
+        plan_of(lf, interpolation="cubic")
