@@ -16,7 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.errors import InputError
-from vcc.patterns import RASTER_LIMIT, RASTER_PER_CELL, Bounded, Cells, FunctionPattern, Open, Pattern
+from vcc.patterns import (
+    RASTER_LIMIT,
+    RASTER_PER_CELL,
+    Bounded,
+    Cells,
+    Circle,
+    FunctionPattern,
+    Open,
+    Pattern,
+)
 
 Array = NDArray[np.float64]
 
@@ -134,7 +143,7 @@ class Tiles(Pattern):
     @staticmethod
     def _place(borders: Array, at: Array) -> Array:
         """Places as numbers of borders, fractions between them."""
-        return np.interp(at, borders, np.arange(len(borders), dtype=np.float64))
+        return np.asarray(np.interp(at, borders, np.arange(len(borders), dtype=np.float64)))
 
     def _at(self, row: Array, column: Array) -> Array:
         row, column = np.broadcast_arrays(row, column)
@@ -162,8 +171,9 @@ def _common(one: Array, other: Array) -> Array:
     low, high = max(one[0], other[0]), min(one[-1], other[-1])
     borders = np.unique(np.concatenate([one, other]))
     borders = borders[(borders >= low) & (borders <= high)]
-    apart = np.concatenate([[True], np.diff(borders) > 1e-9 * (one[-1] - one[0])]) if borders.size else borders > 0
-    return borders[apart]
+    apart = np.ones(borders.size, dtype=bool)
+    apart[1:] = np.diff(borders) > 1e-9 * (one[-1] - one[0])
+    return np.asarray(borders[apart])
 
 
 @dataclass(frozen=True)
@@ -214,8 +224,8 @@ class Product(Pattern):
             inside = [_product(factors, x + a * width, y + b * height, *part) for a in steps for b in steps]
             return np.asarray(np.mean(np.broadcast_arrays(*inside), axis=0))
         columns, rows = (int(n or 1) for n in points)
-        grid_x = left + (np.arange(columns) + 0.5) * (extent[0] / columns)
-        grid_y = top + (np.arange(rows) + 0.5) * (extent[1] / rows)
+        grid_x: Array = np.asarray(left + (np.arange(columns) + 0.5) * (extent[0] / columns))
+        grid_y: Array = np.asarray(top + (np.arange(rows) + 0.5) * (extent[1] / rows))
         values = _product(factors, grid_x[None, :], grid_y[:, None], extent[0] / columns, extent[1] / rows)
         middle = left + extent[0] / 2, top + extent[1] / 2
         raster = Cells(np.clip(np.broadcast_to(values, (rows, columns)), 0.0, 1.0), *extent, middle=middle)
@@ -253,7 +263,7 @@ def _parts(patterns: Iterable[Pattern], middle: tuple[float, float]) -> Iterable
 
 def _product(factors: tuple[Pattern, ...], x: Array, y: Array, width: float, height: float) -> Array:
     """The product of means over small rectangles; functions, whose means are rasters again, at a point."""
-    total = np.asarray(1.0)
+    total: Array = np.ones(1)
     for factor in factors:
         plain = factor.pattern if isinstance(factor, Shifted) else factor
         pointwise = isinstance(plain, FunctionPattern) or type(plain).mean is Pattern.mean
@@ -267,6 +277,27 @@ def _raster_points(extent: float, cell: float) -> int | None:
         return None
     across = min(RASTER_PER_CELL, RASTER_LIMIT * cell / extent)
     return math.ceil(extent / cell * across) if across >= FEWEST_PER_CELL else None
+
+
+def clear_over(pattern: Pattern, low: Array, high: Array) -> bool:
+    """Whether a pattern lets all light pass in a rectangle, as far as that can be told from what it is.
+
+    Args:
+        pattern: any.
+        low: (x, y) of the rectangle's corner, metres from the pattern's middle.
+        high: (x, y) of the opposite corner.
+    """
+    for part in _parts([pattern], (0.0, 0.0)):
+        if isinstance(part, Circle):
+            if np.hypot(*np.maximum(np.abs(low), np.abs(high))) > part.diameter / 2:
+                return False
+        elif isinstance(part, Tiles):
+            inside = part.columns[0] <= low[0] and high[0] <= part.columns[-1]
+            if not (inside and part.rows[0] <= low[1] and high[1] <= part.rows[-1] and (part.values == 1).all()):
+                return False
+        else:
+            return False
+    return True
 
 
 def in_one_plane(patterns: list[tuple[Pattern, tuple[float, float]]]) -> Pattern:

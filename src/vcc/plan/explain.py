@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vcc.light_field import LightField, describe_geometry
+from vcc.light_field import SAMPLES_IN_WORDS, LightField, describe_geometry
 from vcc.plan.model import Plan
 from vcc.plan.parallax_rule import vergences
 from vcc.plan.rays import RayPlan
@@ -92,7 +92,7 @@ def _what(camera: Camera, light_field: LightField) -> str:
     lines = [
         f"Light field: {nv}×{nu} views of {nt}×{ns} pixels, "
         f"{light_field.channels or 1} channel{'s' if (light_field.channels or 1) > 1 else ''}, "
-        f"{to_dtype(light_field.values)}; {describe_geometry(light_field)}"
+        f"{to_dtype(light_field.values)} {SAMPLES_IN_WORDS[light_field.sample]}; {describe_geometry(light_field)}"
     ]
     lines += [
         f"{_place(element.z)}{element.kind}"

@@ -1,14 +1,14 @@
 """Giving back what interpolation takes from sharpness, by one small filter.
 
 A sample's light is spread by a tent one step wide, which leaves sinc²(ν) of a cosine of ν cycles a step; a sample
-that is a mean over its cell has lost sinc(ν) before. Every sample of a light field loses alike, so one filter of the
-finished picture gives back what all of them lost. With x = πν and s = sin² x,
+that is a mean over its cell has lost sinc(ν) before. Every sample of a light field loses alike, so one filter of
+the finished picture gives back what all of them lost. With x = πν and s = sin² x,
 
     (x / sin x)ⁿ = 1 + n/6 s + (11n/180 + n²/72) s² + …,
 
-and s is (minus a quarter of) a second difference. Two terms make a filter of five weights. What is left is of sixth
-order, and the gain ends at 1.8 (n = 3) where the full inverse would go to 3.9: noise and the ringing of hard edges stay
-small.
+and s is (minus a quarter of) a second difference. Two terms make a filter of five weights. What is left is of
+sixth order, and the gain ends at 1.8 (n = 3) where the full inverse would go to 3.9: noise and the ringing of hard
+edges stay small.
 """
 
 from __future__ import annotations
@@ -25,14 +25,10 @@ TENT = 2
 """Powers of sinc that linear interpolation costs."""
 MEAN = 1
 """Powers of sinc that a mean over a cell has cost."""
-WORTH_ALIGNING = 0.1
-"""Share of aligned light from which on a filter heeds it."""
-ALIGNED = 4
-"""Weights on each side of a filter for pictures whose samples lie on the pixels."""
 FREQUENCIES = 96
 """Frequencies at which a filter is fitted, from 0 to half a cycle a pixel."""
 DETAIL = 0.05
-"""Cycles a pixel: below it pictures are taken to hold as much at each frequency, above it less, as 1/ν."""
+"""Cycles a pixel: below it filters are fitted evenly, above it less closely, as 1/ν²."""
 
 
 def gain(losses: float, frequency: Array) -> Array:
@@ -59,40 +55,26 @@ def symmetric(wanted: Callable[[Array], Array], half: int) -> Array:
     order = np.arange(1, half + 1)
     # Gain 1 + Σ hₘ (2 cos 2πmν − 2): even light stays as it is.
     basis = 2 * np.cos(2 * np.pi * frequency[:, None] * order) - 2
-    weight = 1 / np.maximum(frequency, DETAIL)
+    weight = 1 / np.maximum(frequency, DETAIL) ** 2
     side = np.linalg.lstsq(basis * weight[:, None], (wanted(frequency) - 1) * weight, rcond=1e-10)[0]
     return np.concatenate([side[::-1], [1 - 2 * side.sum()], side])
 
 
-def along_axis(losses: float, step: float, aligned: float = 0.0) -> Array:
+def along_axis(losses: float, step: float) -> Array:
     """The filter of a finished picture along one axis.
 
     Args:
         losses: powers of sinc that its samples have lost.
         step: pixels from one sample to the next, of any sign.
-        aligned: the share of the light whose samples lie in the middle of pixels of their own size. There the
-            spectrum's repetitions add up: interpolation takes [1, 6, 1]/8 of neighbours, and that is undone.
 
     Returns:
         An odd number of weights of sum 1; a single one where nothing is lost.
     """
     size = abs(step)
-    if size < 1e-3 or losses == 0:
+    if size < 1e-3 or losses < 1e-9:
         return np.ones(1)
-
-    def wanted(frequency: Array) -> Array:
-        apart = gain(losses, size * frequency)
-        if aligned <= 0:
-            return apart
-        together = 1 - np.sin(np.pi * frequency) ** 2 / 2
-        if losses < TENT + MEAN:  # points: the mean over a pixel is not the point in its middle
-            together = together / np.sinc(frequency)
-        return np.asarray(1 / ((1 - aligned) / apart + aligned * together))
-
-    if aligned > WORTH_ALIGNING:
-        return symmetric(wanted, ALIGNED)
     if size > 1:  # weights that lie between pixels take some more of them
-        return symmetric(wanted, math.ceil(2 * size - 1e-9) + 2)
+        return symmetric(lambda frequency: gain(losses, size * frequency), math.ceil(2 * size - 1e-9) + 2)
     # The series in s of a step of one pixel, which x² = size²·(s + s²/3 + …) makes of that in x.
     first = losses / 6 * size**2
     second = losses / 18 * size**2 + (losses / 180 + losses**2 / 72) * size**4
@@ -105,8 +87,8 @@ def across_plane(losses: list[tuple[float, Array]], half: int) -> Array:
     """The filter (rows, columns) of a picture on which sincs run along any directions.
 
     Args:
-        losses: (power of sinc, vector in pixels over which the light was spread); a negative power stands for light
-            that was spread less than it should.
+        losses: (power of sinc, vector in pixels over which the light was spread); a negative power stands for
+            light that was spread less than it should.
         half: weights on each side of the middle.
     """
     frequency = (np.arange(24) + 0.5) / 24 - 0.5
@@ -117,7 +99,7 @@ def across_plane(losses: list[tuple[float, Array]], half: int) -> Array:
     places = [(n, m) for m in range(half + 1) for n in range(-half, half + 1) if m > 0 or n > 0]
     column, row = np.array(places).T
     basis = 2 * np.cos(2 * np.pi * (fx[:, None] * column + fy[:, None] * row)) - 2
-    weight = 1 / np.maximum(np.hypot(fx, fy), DETAIL)
+    weight = 1 / np.maximum(np.hypot(fx, fy), DETAIL) ** 2
     side = np.linalg.lstsq(basis * weight[:, None], (wanted - 1) * weight, rcond=1e-10)[0]
     kernel = np.zeros((2 * half + 1, 2 * half + 1))
     kernel[half + row, half + column] = kernel[half - row, half - column] = side
