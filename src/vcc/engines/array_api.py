@@ -95,13 +95,13 @@ class _Run:
         column = mask.column[b, a] + mask.step[0, 0] * k[None, :] + mask.step[0, 1] * l[:, None]
         row = mask.row[b, a] + mask.step[1, 0] * k[None, :] + mask.step[1, 1] * l[:, None]
         rows, columns = mask.texture.shape
-        padded = xp.reshape(self.constant(np.pad(mask.texture, 1)), (-1,))
-        column, row = np.clip(column + 1, 0, columns), np.clip(row + 1, 0, rows)
+        padded = xp.reshape(self.constant(np.pad(mask.texture, (1, 2))), (-1,))
+        column, row = np.clip(column + 1, 0, columns + 1), np.clip(row + 1, 0, rows + 1)
         c, r = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
         fc, fr = self.constant(column - c), self.constant(row - r)
 
         def at(r: NDArray[Any], c: NDArray[Any]) -> Any:
-            flat = xp.asarray((r * (columns + 2) + c).reshape(-1), device=self.device)
+            flat = xp.asarray((r * (columns + 3) + c).reshape(-1), device=self.device)
             return xp.reshape(xp.take(padded, flat, axis=0), c.shape)
 
         above = at(r, c) * (1 - fc) + at(r, c + 1) * fc

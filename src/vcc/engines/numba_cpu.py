@@ -72,7 +72,7 @@ def _finished(
     ((down, across),) = finishing_terms(plan) if plan.blur is None else [(np.ones(LONG), np.ones(LONG))]
     if max(len(down), len(across)) >= LONG:
         return finish(plan, raster.reshape(*plan.raster_shape, channels))
-    if len(down) == len(across) == 1 and not plan.guard and plan.sensor_transmission is None:
+    if down.tolist() == across.tolist() == [1.0] and not plan.guard and plan.sensor_transmission is None:
         return raster.reshape(rows, columns, channels)
     picture = np.empty((rows, columns * channels), dtype=np.float32)
     transmission = np.zeros((0, 0)) if plan.sensor_transmission is None else plan.sensor_transmission

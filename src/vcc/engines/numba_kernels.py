@@ -270,10 +270,11 @@ def sample_mask_columns(texture, column, repeat, out):  # type: ignore[no-untype
     before, after = np.zeros(column.size, np.float32), np.zeros(column.size, np.float32)
     for k in range(column.size):
         # A border of dark columns around the texture, by weights of zero on columns that exist.
-        c = int(np.floor(min(max(column[k], -1.0), float(columns))))
+        place = min(max(column[k], -1.0), float(columns))
+        c = int(np.floor(place))
         left[k], right[k] = min(max(c, 0), columns - 1), min(max(c + 1, 0), columns - 1)
-        before[k] = 1 - (column[k] - c) if 0 <= c < columns else 0
-        after[k] = column[k] - c if 0 <= c + 1 < columns else 0
+        before[k] = 1 - (place - c) if 0 <= c < columns else 0
+        after[k] = place - c if 0 <= c + 1 < columns else 0
     for r in range(rows):
         line, to = texture[r], out[r]
         if repeat == 1:

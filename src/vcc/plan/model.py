@@ -45,8 +45,8 @@ class MaskLookup:
         column = self.column[b, a] + self.step[0, 0] * k[None, :] + self.step[0, 1] * l[:, None]
         row = self.row[b, a] + self.step[1, 0] * k[None, :] + self.step[1, 1] * l[:, None]
         rows, columns = self.texture.shape
-        dark_border = np.pad(self.texture.astype(np.float64), 1)
-        column, row = np.clip(column + 1, 0, columns), np.clip(row + 1, 0, rows)
+        dark_border = np.pad(self.texture.astype(np.float64), (1, 2))
+        column, row = np.clip(column + 1, 0, columns + 1), np.clip(row + 1, 0, rows + 1)
         c, r = np.floor(column).astype(int), np.floor(row).astype(int)
         after_c, after_r = column - c, row - r
         above = dark_border[r, c] * (1 - after_c) + dark_border[r, c + 1] * after_c

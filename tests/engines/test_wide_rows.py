@@ -1,0 +1,154 @@
+"""Pictures wide and high enough for the fast engine's vectors, bands and tiles to meet their borders.
+
+The oracle is the plan's sum written out by its tables of shares, as products of matrices in double precision; the
+sums differ by rounding in single precision, 6e-8 of each of some hundred terms that are alike in size: 1e-6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vcc
+from vcc.engines import run_plan
+from vcc.engines.smear import band_matrix
+from vcc.plan.footprint import shares
+from vcc.plan.model import MaskLookup, Plan
+from vcc.units import mm
+
+pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+
+LENS = vcc.Lens(focal_length=50 * mm)
+D = 1 / (1 / 50e-3 - 1)
+TEXTURE = np.random.default_rng(3).random((37, 41))
+
+
+def field(shape, dtype="uint8") -> vcc.LightField:
+    values = np.random.default_rng(0).random(shape)
+    if np.dtype(dtype).kind == "u":
+        values *= np.iinfo(dtype).max
+    return vcc.LightField.from_views(values.astype(dtype), 1 * mm, 1e-3, 1.0, disparity_range=(-0.2, 0.2))
+
+
+def camera(pixels, size, masks=0) -> vcc.Camera:
+    elements = [LENS, *(vcc.Mask(TEXTURE, width=40 * mm, z=(20 + 7 * n) * mm) for n in range(masks))]
+    return vcc.Camera(elements, vcc.Sensor(D, pixels, D * 1e-3 * size))
+
+
+def looked_up(mask: MaskLookup, b: int, a: int, k: np.ndarray, l: np.ndarray) -> np.ndarray:
+    """The mask at samples k, l: linear between its points, zero beyond them, as tents around the points."""
+    rows, columns = (np.arange(n)[:, None] for n in mask.texture.shape)
+    down = np.clip(1 - np.abs(mask.row[b, a] + mask.step[1, 1] * l - rows), 0, None)
+    across = np.clip(1 - np.abs(mask.column[b, a] + mask.step[0, 0] * k - columns), 0, None)
+    return np.einsum("rl,ck,rc->lk", down, across, mask.texture.astype(float), optimize=True)
+
+
+def expected(plan: Plan, values: np.ndarray) -> np.ndarray:
+    """The picture of a plan whose rows and columns part and whose samples are not divided, by matrices."""
+    nt, ns = plan.samples
+    samples = values.reshape(*values.shape[:2], nt, ns, -1).astype(float)
+    k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
+    row, column = (np.arange(n, dtype=float)[:, None] for n in plan.raster_shape)
+    raster = np.zeros((*plan.raster_shape, samples.shape[-1]))
+    for b, a in zip(*np.nonzero(plan.weights), strict=True):
+        down = shares(plan.interpolation, row, plan.y[b, a] + plan.row_step * l, plan.row_step)
+        across = shares(plan.interpolation, column, plan.x[b, a] + plan.column_step * k, plan.column_step)
+        weight = plan.weights[b, a] * np.ones((nt, ns))
+        for mask in plan.masks:
+            weight = weight * looked_up(mask, b, a, k, l)
+        view = samples[plan.view_rows[b], plan.view_columns[a]] * weight[..., None]
+        raster += np.einsum("yl,xk,lkc->yxc", down, across, view, optimize=True)
+    filters = (np.ones(1), np.ones(1)) if plan.sharpen is None else plan.sharpen
+    down, across = (band_matrix(w, n, plan.guard) for w, n in zip(filters, plan.sensor_shape, strict=True))
+    picture = plan.scale * np.einsum("py,qx,yxc->pqc", down, across, raster, optimize=True)
+    return picture.reshape(*plan.sensor_shape, *values.shape[4:])
+
+
+def assert_as_expected(plan: Plan, values: np.ndarray) -> None:
+    truth = expected(plan, values)
+    assert truth.any()
+    picture = run_plan(plan, values, engine="numba")
+    np.testing.assert_allclose(picture, truth, rtol=0, atol=1e-6 * np.abs(truth).max())
+
+
+@pytest.mark.parametrize("masks", [0, 1, 2])
+@pytest.mark.parametrize("channels", [None, 2, 3, 4])
+@pytest.mark.parametrize("columns", [17, 64, 97])
+def test_rows_of_any_length(columns, channels, masks):
+    shape = (3, 2, 13, columns) if channels is None else (3, 2, 13, columns, channels)
+    lf = field(shape)
+    assert_as_expected(camera((13, columns), 0.93, masks).compile(lf, refine=1), lf.values)
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "uint32", "float16", "float32", "float64"])
+@pytest.mark.parametrize("masks", [0, 1])
+def test_samples_of_any_type(dtype, masks):
+    lf = field((2, 3, 11, 70, 3), dtype)
+    assert_as_expected(camera((12, 71), 1.07, masks).compile(lf, refine=1), lf.values)
+
+
+@pytest.mark.parametrize("size", [0.21, 0.5, 1.0, 1.9, 6.3])
+@pytest.mark.parametrize("inverted", [True, False])
+@pytest.mark.parametrize("masks", [0, 1])
+def test_pixels_of_any_size_on_bands_of_rows(size, inverted, masks):
+    # More rows than a band has, and no whole number of tiles; many views, in groups and one left over.
+    lf = field((9, 2, 83, 90))
+    if not inverted:  # samples kept in the order in which they meet the sensor
+        lf = lf[:, :, ::-1, ::-1]
+        lf = lf.replaced(np.ascontiguousarray(lf.values))
+    plan = camera((149, 101), size, masks).compile(lf, refine=1, between_views="none")
+    assert (plan.row_step < 0) == inverted
+    assert_as_expected(plan, lf.values)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_taps_that_look_masks_up_where_others_do_not(channels):
+    """Cells of views cut by a rim are looked up elsewhere than the rest of their row and column of views."""
+    lf = field((5, 4, 21, 66, channels))
+    plan = camera((22, 67), 1.07, 2).compile(lf, refine=1)
+    rng = np.random.default_rng(1)
+    shifted = []
+    for mask in plan.masks:
+        cut = rng.random(mask.column.shape) < 0.3
+        move = [np.where(cut, rng.normal(size=cut.shape), 0.0) for _ in range(2)]
+        shifted.append(replace(mask, column=mask.column + move[0], row=mask.row + move[1]))
+    plan = replace(plan, masks=tuple(shifted))
+    assert plan.separable
+    assert_as_expected(plan, lf.values)
+
+
+@pytest.mark.parametrize("shift", [-25.3, 19.6, 500.0])
+def test_masks_that_end_within_the_picture(shift):
+    lf = field((3, 3, 30, 70, 3))
+    plan = camera((31, 71), 1.0, 2).compile(lf, refine=1)
+    first, second = plan.masks
+    first = replace(first, row=first.row + np.where(np.arange(3)[:, None] == 1, shift, 0))
+    second = replace(second, column=second.column - np.where(np.arange(3) == 2, shift, 0))
+    plan = replace(plan, masks=(first, second))
+    assert_as_expected(plan, lf.values)
+    for engine in ("reference", "array_api"):
+        truth = expected(plan, lf.values)
+        picture = run_plan(plan, lf.values, engine=engine)
+        np.testing.assert_allclose(picture, truth, rtol=0, atol=2e-6 * np.abs(truth).max())
+
+
+@pytest.mark.parametrize("lengths", [(1, 1), (5, 5), (9, 3), (1, 7)])
+@pytest.mark.parametrize("against_sensor", [False, True])
+def test_sharpening(lengths, against_sensor):
+    lf = field((2, 2, 70, 75, 3))
+    plan = camera((70, 71), 0.9).compile(lf, interpolation="linear")
+    rng = np.random.default_rng(2)
+    weights = [rng.normal(size=n) + 1 for n in lengths]
+    sharpen = weights[0] / weights[0].sum(), weights[1] / weights[1].sum()
+    transmission = rng.random(plan.sensor_shape) if against_sensor else None
+    guard = max(lengths) // 2
+    plan = replace(plan, sharpen=sharpen, guard=guard, x=plan.x + guard, y=plan.y + guard)
+    truth = expected(plan, lf.values)
+    if transmission is not None:
+        plan = replace(plan, sensor_transmission=transmission)
+        truth = truth * transmission[..., None]
+    for engine in ("numba", "reference", "array_api"):
+        picture = run_plan(plan, lf.values, engine=engine)
+        np.testing.assert_allclose(picture, truth, rtol=0, atol=2e-6 * np.abs(truth).max())
