@@ -198,7 +198,8 @@ class _Drawing:
         if self.kind == "prisms":
             for _ in range(self.one_of(1, 2)):
                 deflection = (self.between(-0.02, 0.02), self.between(-0.02, 0.02))
-                self.optics.append(vcc.Prism(deflection, z=self.one_of(0.0, z, 20 * mm, 30 * mm)))
+                # Behind all lenses, or at the lens or before: nothing stands within a thick one.
+                self.optics.append(vcc.Prism(deflection, z=self.one_of(0.0, z, 26 * mm, 30 * mm)))
         elif rim is None and self.chance(0.4):
             self.stop_kind = self.one_of("round", "polygon")
             size = 2 * min(self.half) * self.between(0.5, 0.85)
@@ -236,6 +237,7 @@ class _Drawing:
         self.depths = [w + self.between(-GAP, GAP) * largest]
         if self.chance(0.5):
             self.depths.append(w + self.between(-GAP, GAP) * largest)
+        self.depths = [max(each, 0.02) for each in self.depths]  # a scene is no further than infinity
 
     def _scene(self) -> Scene:
         """Vergences at z = 0; textures and the opacity of the nearer plane no finer than `FINEST`."""
@@ -269,7 +271,7 @@ class _Drawing:
         flight = np.eye(5)
         flight[0, 2] = flight[1, 3] = self.flown
         frame = flight @ frame
-        low, high = Bench(camera, frame, (self.number[1], self.number[0]), self.flown).asked(frame)
+        low, high, _ = Bench(camera, frame, (self.number[1], self.number[0]), self.flown).asked(frame)
         first = np.floor(low) - MARGIN
         count = (np.ceil(high) + MARGIN - first + 1).astype(int)
         shift = np.eye(5)

@@ -898,8 +898,14 @@ class Bench:
             ray = _applied(_undone(sheet.step), ray)
         return last, through
 
-    def asked(self, frame: Array, points: int = 4096, seed: int = 0) -> tuple[Array, Array]:
-        """The lowest and highest index (k, l) of a frame that rays of the camera ask for, of those that pass."""
+    def asked(self, frame: Array, points: int = 4096, seed: int = 0) -> tuple[Array, Array, float]:
+        """The lowest and highest index (k, l) of a frame that rays within the grid of views ask for, and their share.
+
+        Args:
+            frame: 5×5 of the light field at z = 0.
+            points: rays tried, through all of the sensor and of what is aimed at.
+            seed: of them.
+        """
         aim = self.aim()
         scatterers = sum(sheet.scatter is not None for sheet in self.sheets)
         rng = np.random.default_rng(seed)
@@ -912,10 +918,9 @@ class Bench:
         a, b = (aim.middle[n] + (2 * drawn[2 + n] - 1) * aim.half[n] for n in (0, 1))
         at_views, _ = self._walked(_applied(aim.rays, (X, Y, a, b)), drawn[4:])
         place = _applied(_undone(frame[:4]), _applied(self.home, at_views))
-        grid = self.sheets[0].openings[0].at(at_views[0], at_views[1]) > 0
-        if not grid.any():
-            grid[:] = True
-        return np.array([place[2][grid].min(), place[3][grid].min()]), np.array([place[2][grid].max(), place[3][grid].max()])
+        within = self.sheets[0].openings[0].at(at_views[0], at_views[1]) > 0
+        used = np.stack(place[2:])[:, within if within.any() else ~within]
+        return used.min(axis=1), used.max(axis=1), float(within.mean())
 
 
 def _applied(step: Array, ray: tuple[Array, ...]) -> tuple[Array, ...]:
