@@ -31,7 +31,7 @@ import vcc
 def checks(kind: str, seed: int, laws: list[str], by_force: bool) -> Iterator[Check]:
     """All checks of one camera; what raises is a check that fails."""
     try:
-        case = drawn(kind, seed, 16)
+        case = drawn(kind, seed, 16, 9)
     except RuntimeError:  # asks for views that are too large to be held
         return
     for law in laws:
@@ -84,7 +84,7 @@ def main() -> int:
     for number in range(each):
         for kind in kinds:
             if number == 0 and each == 1:
-                print(drawn(kind, given.seed, 16).described())
+                print(drawn(kind, given.seed, 16, 9).described())
             for check in checks(kind, given.seed + number, laws, by_force and number < forced):
                 found.append(check)
                 if not check.holds or each == 1 or check.law == "brute force":

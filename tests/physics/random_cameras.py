@@ -103,20 +103,21 @@ class Case:
         )
 
 
-def drawn(kind: str, seed: int, pixels: int = 32) -> Case:
+def drawn(kind: str, seed: int, pixels: int = 32, views: int = 17) -> Case:
     """A random camera of a kind before a random scene.
 
     Args:
         kind: one of `KINDS`.
         seed: of everything.
         pixels: about so many a side.
+        views: likewise.
     """
-    return _Drawing(kind, seed, pixels).case()
+    return _Drawing(kind, seed, pixels, views).case()
 
 
 class _Drawing:
-    def __init__(self, kind: str, seed: int, pixels: int) -> None:
-        self.kind, self.seed, self.pixels = kind, seed, pixels
+    def __init__(self, kind: str, seed: int, pixels: int, views: int) -> None:
+        self.kind, self.seed, self.pixels, self.views = kind, seed, pixels, views
         self.rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
 
     # -- drawing numbers
@@ -164,7 +165,9 @@ class _Drawing:
         )
 
     def _views(self) -> None:
-        self.number = (int(self.rng.integers(14, 21)), int(self.rng.integers(14, 21)))  # along u, v
+        fewest = self.views - self.views // 5
+        along_u, along_v = (int(self.rng.integers(fewest, 2 * self.views - fewest + 1)) for _ in range(2))
+        self.number = (along_u, along_v)
         du, ps = self.between(0.7, 1.2) * mm, self.between(0.8, 1.4) * 1e-3
         self.spacing = (du, du * (1.0 if self.chance(0.4) else self.between(0.7, 1.4)))
         self.slopes = (ps, ps * (1.0 if self.chance(0.4) else self.between(0.75, 1.3)))
