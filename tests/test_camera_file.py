@@ -37,7 +37,8 @@ from vcc import (
     surfaces,
 )
 from vcc.camera_file import ELEMENT_KINDS, KERNEL_NAMES, PATTERN_NAMES, SURFACE_NAMES, save_camera
-from vcc.optics.lattice import CellApertures, CellBlock, Lattice, Product
+from vcc.optics.lattice import CellApertures, CellBlock, Lattice
+from vcc.sheets import Product
 from vcc.units import deg, mm, nm, um
 
 SENSOR = '\n[sensor]\nz = "52 mm"\nshape = [500, 400]\npitch = "48 um"\n'

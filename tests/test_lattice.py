@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import vcc
-from vcc.optics.lattice import LAYOUTS, CellApertures, CellBlock, Lattice, Product, interleaved
+from vcc.optics.lattice import LAYOUTS, CellApertures, CellBlock, Lattice, interleaved
 from vcc.patterns import Bounded, Circle, Open
+from vcc.sheets import Product
 
 REACH = 12
 """Cells are listed out to this row and column, and looked at well inside."""

@@ -62,6 +62,7 @@ from vcc.kernels import Kernel
 from vcc.optics import Element, FirstOrder, lattice
 from vcc.patterns import Cells, FunctionPattern, Pattern
 from vcc.sensor import Sensor
+from vcc.sheets import Product
 from vcc.surfaces import Surface
 
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
@@ -83,7 +84,7 @@ def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
 ELEMENT_KINDS: dict[str, type[Element]] = dict(sorted(_named(Element, optics).items()))
 """Which class each ``kind`` in a camera file stands for. Add your own to read and write them."""
 
-PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice)
+PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice) | {"product": Product}
 """Which class each ``name`` of a pattern in a camera file stands for. Add your own."""
 del PATTERN_NAMES[_friendly(FunctionPattern)]  # Python, which no file can hold
 

@@ -181,7 +181,7 @@ def test_the_engines_see_the_scene_convolved_with_it(case):
     spot = np.exp(-(grid**2) / (2 * SPOT**2))
     scene = np.outer(spot, spot)
     samples = np.broadcast_to(scene, (views, views, 81, 81))
-    field = vcc.LightField.from_views(samples, DIAMETER / views, slope, Z, disparity_range=(0, 0))
+    field = vcc.LightField.from_views(samples, DIAMETER / views, slope, Z, disparity_range=(0, 0), sample="point")
     more = {"samples": 256} if method == "rays" else {}
     image = stand.capture(field, method=method, **more)
     spread = psf(stand, Z)

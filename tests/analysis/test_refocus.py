@@ -35,7 +35,7 @@ def rays(views, row, column, at=None):
 
 def light_field(views):
     samples = np.array([[radiance(*rays(views, j, i)) for i in range(views[1])] for j in range(views[0])])
-    return vcc.LightField.from_views(samples, (DV, DU), (PT, PS), FOCUS)
+    return vcc.LightField.from_views(samples, (DV, DU), (PT, PS), FOCUS, sample="point")
 
 
 def integral(views, distance, weights=None):
@@ -81,7 +81,7 @@ def test_gridding_is_as_good_as_its_kernel():
         return 0.5 + 0.1 * sum(np.cos(2 * np.pi * (a * x + b * y)) for a, b in waves)
 
     samples = np.array([[picture(j, i) for i in range(views[1])] for j in range(views[0])])
-    refocuser = Refocuser(vcc.LightField.from_views(samples, DU, PS), border=0)
+    refocuser = Refocuser(vcc.LightField.from_views(samples, DU, PS, sample="point"), border=0)
     sharp = refocuser.at(DU / (shift * PS))
     assert np.abs(sharp.values - picture(4, 3.5)).max() < 1e-5
     # At another distance every wave is dimmed by the Dirichlet kernel of the views.
@@ -141,7 +141,7 @@ def test_a_general_frame_is_refocused_too():
     matrix[4, 4] = 1
     frame = vcc.Affine(matrix) @ vcc.Affine.translation(-3.0, -3.0, -30.0, -28.0)
     index = np.stack(np.meshgrid(*map(np.arange, (7, 7, 57, 61)), indexing="ij"), axis=-1)[..., [1, 0, 3, 2]]
-    field = vcc.LightField(radiance(*np.moveaxis(frame(index), -1, 0)), frame)
+    field = vcc.LightField(radiance(*np.moveaxis(frame(index), -1, 0)), frame, sample="point")
     _, _, s0, t0 = np.moveaxis(frame(index[3, 3]), -1, 0)
     for distance in (NEAR, FAR):
         places = frame(index[:, :, 0, 0])[..., :2].reshape(-1, 2)

@@ -60,7 +60,9 @@ class Blob:
         self.frame = frame_of(linear)
         index = np.stack(np.meshgrid(*(np.arange(n) for n in SIZES[[1, 0, 3, 2]]), indexing="ij"), axis=-1)
         rays = self.frame(index[..., [1, 0, 3, 2]]) - CENTRE
-        self.light_field = vcc.LightField(np.exp(-np.pi * ((rays @ self.q) * rays).sum(axis=-1)), self.frame)
+        self.light_field = vcc.LightField(
+            np.exp(-np.pi * ((rays @ self.q) * rays).sum(axis=-1)), self.frame, sample="point"
+        )
 
     def spectrum(self, f):
         power = ((f @ np.linalg.inv(self.q)) * f).sum(axis=-1)

@@ -3,8 +3,8 @@
 Layers, lowest first; a module may import from its own layer and from those below::
 
     errors < units, memory < describe, electronics < affine < sampled < light_field, image, sensor
-    < patterns, kernels, surfaces < optics < camera < plan < engines < operators, formats, sources, parallax, plot,
-    cli, demo, ...
+    < patterns, kernels, surfaces < sheets < optics < camera < plan < engines < operators, formats, sources,
+    parallax, plot, cli, demo, ...
 
 Imports inside functions that go up are allowed only from the list below, each with its reason.
 """
@@ -30,6 +30,7 @@ LAYERS: list[set[str]] = [
     {"sampled"},
     {"light_field", "image", "sensor"},
     {"patterns", "kernels", "surfaces"},
+    {"sheets"},
     {"optics"},
     {"camera"},
     {"plan"},

@@ -17,8 +17,9 @@ import torch
 import vcc
 from vcc import kernels, patterns, surfaces
 from vcc.optics import Element, Faces, Lattice
-from vcc.optics.lattice import CellApertures, Product
+from vcc.optics.lattice import CellApertures
 from vcc.plan.rays import CellWindows, RayPlan, Window
+from vcc.sheets import Product
 from vcc.units import mm
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")

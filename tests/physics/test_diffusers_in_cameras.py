@@ -59,7 +59,7 @@ def in_focus(texture: Texture, pixels: int = 208, views_across: int = 14) -> vcc
     """A single plane where the views converge."""
     plane = Scene([Layer(FOCUS, texture)])
     samples = views(plane, (views_across, views_across, pixels, pixels), SPACING, SLOPE, FOCUS).astype(np.float32)
-    return vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0))
+    return vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0), sample="point")
 
 
 def capture(elements, lf, sensor, **options) -> vcc.Image:
@@ -398,7 +398,9 @@ def test_a_stop_behind_a_diffuser_forbids_a_blur_of_the_picture():
 
 def in_wide_views() -> vcc.LightField:
     samples = views(SCENE, (VIEWS, VIEWS, 160, 160), SPACING, SLOPE, FOCUS).astype(np.float32)
-    return vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(-DISPARITY, DISPARITY))
+    return vcc.LightField.from_views(
+        samples, SPACING, SLOPE, FOCUS, disparity_range=(-DISPARITY, DISPARITY), sample="point"
+    )
 
 
 def test_rays_sent_forwards_tell_the_same():

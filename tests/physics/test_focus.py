@@ -32,7 +32,7 @@ def blob(distance: float, views: int, spacing: float, slope: float, pixels: int,
     # A point on the axis is seen by a view at u along the slope u/Z.
     profile = np.exp(-((angle - place[:, None] / distance) ** 2) / (2 * (sigma * slope) ** 2))
     samples = profile[:, None, :, None] * profile[None, :, None, :]
-    return vcc.LightField.from_views(samples, spacing, slope)
+    return vcc.LightField.from_views(samples, spacing, slope, sample="point")
 
 
 def moments(image: np.ndarray, pitch: float) -> tuple[float, float]:

@@ -49,7 +49,12 @@ def scene() -> Scene:
 def light_field(scene) -> vcc.LightField:
     samples = views(scene, (VIEWS, VIEWS, PIXELS, PIXELS), SPACING, SLOPE, FOCUS)
     return vcc.LightField.from_views(
-        samples.astype(np.float32), SPACING, SLOPE, FOCUS, disparity_range=(-0.7, 0.7)
+        samples.astype(np.float32),
+        SPACING,
+        SLOPE,
+        FOCUS,
+        disparity_range=(-0.7, 0.7),
+        sample="point",
     )
 
 
@@ -185,7 +190,12 @@ def test_two_masks_at_different_places_converge_to_brute_force_as_views_get_clos
         spacing = 20 * mm / number
         samples = views(scene, (number, number, 64, 64), spacing, SLOPE, FOCUS)
         lf = vcc.LightField.from_views(
-            samples.astype(np.float32), spacing, SLOPE, FOCUS, disparity_range=(-0.7, 0.7)
+            samples.astype(np.float32),
+            spacing,
+            SLOPE,
+            FOCUS,
+            disparity_range=(-0.7, 0.7),
+            sample="point",
         )
         reached.append(capture([LENS, *elements], lf, sensor, interpolation="cubic"))
 
@@ -209,7 +219,7 @@ def test_a_coded_mask_half_way_matches_brute_force_to_50_dB(place):
     width, side, sensor = 10 * mm, 16 * mm, vcc.Sensor(z=D, shape=(40, 40), pitch=PITCH)
     focus_plane = Scene([Layer(FOCUS, cosines(3, np.array([26.0, 40.0]) * SLOPE * FOCUS))])
     samples = views(focus_plane, (VIEWS, VIEWS, 64, 64), SPACING, SLOPE, FOCUS)
-    lf = vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0))
+    lf = vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0), sample="point")
     stop = vcc.Mask(pattern=np.ones((1, 1)), width=side)
     mask = vcc.Mask(z=place * D, pattern=code, width=width)
     image = capture([vcc.Lens(focal_length=FOCAL_LENGTH), stop, mask], lf, sensor)
@@ -311,6 +321,7 @@ def test_refining_samples_converges_to_brute_force_for_a_fine_mask_near_the_sens
         slope,
         FOCUS,
         disparity_range=(0.0, 0.0),
+        sample="point",
     )
     sensor = vcc.Sensor(z=d, shape=(80, 80), pitch=step / 4)
     diameter, z, period = 2.6 * mm, 0.97 * d, 3 * step

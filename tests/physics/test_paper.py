@@ -167,7 +167,7 @@ def edges(field, matrix, half):
 def ours(masked: bool) -> np.ndarray:
     """The same quantity from a camera: one row of views and of pixels, a sensor row that takes all."""
     samples = flatland_field(SPACING, VIEWS)[None, :, None, :]
-    lf = vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(-0.5, 0.5))
+    lf = vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(-0.5, 0.5), sample="point")
     tall = 10 * mm
     elements = [
         vcc.Lens(focal_length=F),
@@ -213,7 +213,7 @@ def test_the_operators_step_by_step_tend_to_the_camera():
     samples = views(world, (number, number, pixels, pixels), spacing, slope, 1 * m)
     # The outer views are dark: what lies between the last sample and its cell's border is resampled to zero.
     samples[[0, -1]] = samples[:, [0, -1]] = 0
-    lf = vcc.LightField.from_views(samples, spacing, slope, 1 * m, disparity_range=(0.0, 0.0))
+    lf = vcc.LightField.from_views(samples, spacing, slope, 1 * m, disparity_range=(0.0, 0.0), sample="point")
     mask = vcc.Mask(pattern=CosineSum((2 * mm, 3 * mm), 1, 0.3), z=0.5 * D)
     sensor = vcc.Sensor(z=D, shape=(10, 10), pitch=D * slope)
     expected = vcc.Camera([vcc.Lens(focal_length=F), mask], sensor).capture(lf).values

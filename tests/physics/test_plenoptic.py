@@ -155,7 +155,7 @@ def test_an_array_without_gaps_keeps_all_light(layout):
     samples = views(Scene([Layer(FOCUS, Spot())]), (16, 16, PIXELS, PIXELS), SPACING, SLOPE, FOCUS).astype(
         np.float32
     )
-    lf = vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0))
+    lf = vcc.LightField.from_views(samples, SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0), sample="point")
     sensor = vcc.Sensor(z=D + B, shape=(50, 50), pitch=60 * um)
     array = vcc.LensArray(pitch=P, focal_length=SHARP, z=D, layout=layout, offset=(0.11 * mm, 0.23 * mm))
     images = [vcc.Camera([LENS, *more], sensor).capture(lf, method="rays", samples=2048) for more in ([], [array])]

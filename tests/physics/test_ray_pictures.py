@@ -218,7 +218,12 @@ def point(distance: float, z: float = 0.0) -> vcc.LightField:
     samples = views(Scene([Layer(distance, Point(distance))]), (14, 14, 92, 92), SPACING, SLOPE, FOCUS)
     disparity = (1 / distance - 1 / FOCUS) * SPACING / SLOPE
     return vcc.LightField.from_views(
-        samples.astype(np.float32), SPACING, SLOPE, FOCUS, disparity_range=(disparity, disparity)
+        samples.astype(np.float32),
+        SPACING,
+        SLOPE,
+        FOCUS,
+        disparity_range=(disparity, disparity),
+        sample="point",
     )
 
 
@@ -432,7 +437,7 @@ def plane(*shape: int) -> vcc.LightField:
     s = u / FOCUS - ((np.arange(ns) - (ns - 1) / 2) * SLOPE)[None, None, None, :]
     t = v / FOCUS - ((np.arange(nt) - (nt - 1) / 2) * SLOPE)[None, None, :, None]
     samples = Scene([Layer(FOCUS, texture)]).radiance(u, v, s, t).astype(np.float32)
-    return vcc.LightField.from_views(samples, spacing, SLOPE, FOCUS, disparity_range=(0.0, 0.0))
+    return vcc.LightField.from_views(samples, spacing, SLOPE, FOCUS, disparity_range=(0.0, 0.0), sample="point")
 
 
 @pytest.mark.parametrize("views_there", [(1, 1), (1, 12), (12, 1), (2, 3)], ids=str)

@@ -35,7 +35,12 @@ def sensor_with_gap(gap: float, disparity: float, shape: tuple[int, int]) -> vcc
 def light_field(scene: Scene, disparities: tuple[float, float], pixels: int = PIXELS) -> vcc.LightField:
     samples = views(scene, (VIEWS, VIEWS, pixels, pixels), SPACING, SLOPE, FOCUS)
     return vcc.LightField.from_views(
-        samples.astype(np.float32), SPACING, SLOPE, FOCUS, disparity_range=disparities
+        samples.astype(np.float32),
+        SPACING,
+        SLOPE,
+        FOCUS,
+        disparity_range=disparities,
+        sample="point",
     )
 
 

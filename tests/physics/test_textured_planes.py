@@ -62,7 +62,12 @@ def scene(request) -> Scene:
 def light_field(scene) -> vcc.LightField:
     samples = views(scene, (VIEWS, VIEWS, PIXELS, PIXELS), SPACING, SLOPE, FOCUS)
     return vcc.LightField.from_views(
-        samples.astype(np.float32), SPACING, SLOPE, FOCUS, disparity_range=(-1.0, 1.0)
+        samples.astype(np.float32),
+        SPACING,
+        SLOPE,
+        FOCUS,
+        disparity_range=(-1.0, 1.0),
+        sample="point",
     )
 
 

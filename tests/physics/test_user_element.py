@@ -106,7 +106,9 @@ def test_a_point_becomes_the_ring_of_the_closed_form():
         return np.exp(-(x**2 + y**2) / (2 * sigma**2))
 
     samples = views(Scene([Layer(FOCUS, spot)]), (VIEWS, VIEWS, 124, 124), SPACING, SLOPE, FOCUS)
-    lf = vcc.LightField.from_views(samples.astype(np.float32), SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0))
+    lf = vcc.LightField.from_views(
+        samples.astype(np.float32), SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0), sample="point"
+    )
     sensor = vcc.Sensor(z=D, shape=(60, 60), pitch=D * 68 * SLOPE / 60)
     image = capture([LENS, replace(SPIRAL, charge=3 * CHARGE)], lf, sensor, samples=4096)
     values = image.values.astype(np.float64)

@@ -52,5 +52,10 @@ class TwoPlanes:
         shape = (self.views, self.views, self.pixels, self.pixels)
         samples = views(self.scene, shape, self.spacing, self.slope, self.focus).astype(np.float32)
         return vcc.LightField.from_views(
-            samples, self.spacing, self.slope, self.focus, disparity_range=(-self.disparity, self.disparity)
+            samples,
+            self.spacing,
+            self.slope,
+            self.focus,
+            disparity_range=(-self.disparity, self.disparity),
+            sample="point",
         )

@@ -147,7 +147,12 @@ def test_a_recording_of_ours_is_decoded():
     # Views fill the stop; pixels go on beyond the sensor, so that interpolation never lacks any.
     samples = views(both, (15, 15, pixels + 8, pixels + 8), STOP / 15, SIZE / D / pixels, FOCUS)
     light_field = vcc.LightField.from_views(
-        samples.astype(np.float32), STOP / 15, SIZE / D / pixels, FOCUS, disparity_range=(0.0, 0.0)
+        samples.astype(np.float32),
+        STOP / 15,
+        SIZE / D / pixels,
+        FOCUS,
+        disparity_range=(0.0, 0.0),
+        sample="point",
     )
     options = {"interpolation": "cubic", "refine": 4}
     image = camera.capture(light_field, between_views="none", **options)

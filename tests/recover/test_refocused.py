@@ -29,7 +29,9 @@ def grating(distance: float, views: int = VIEWS, pixels: int = PIXELS) -> vcc.Li
     along = k + disparity(distance) * i[:, None]
     phase = 2 * np.pi / PERIOD * (along[None, :, None, :] + 0.5 * along[:, None, :, None])
     d = disparity(distance)
-    return vcc.LightField.from_views(0.5 + 0.4 * np.cos(phase), SPACING, SLOPE, FOCUS, (min(0, d), max(0, d)))
+    return vcc.LightField.from_views(
+        0.5 + 0.4 * np.cos(phase), SPACING, SLOPE, FOCUS, (min(0, d), max(0, d)), sample="point"
+    )
 
 
 def middle(picture: np.ndarray, border: int = 16) -> np.ndarray:

@@ -15,7 +15,7 @@ from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
 from vcc.engines.smear import band_matrix, finishing_terms
-from vcc.plan.footprint import Division, reach_in_pixels, shares
+from vcc.plan.footprint import reach_in_pixels, shares
 from vcc.plan.model import MaskLookup, Plan
 from vcc.sampled import to_dtype
 
@@ -78,8 +78,8 @@ class _Run:
         l, k = (np.arange(n, dtype=np.float64) for n in plan.samples)
         if plan.refine > 1:
             rows, columns = plan.samples
-            down = Division.of(plan.interpolation, rows, plan.refine)
-            across = Division.of(plan.interpolation, columns, plan.refine)
+            down = plan.division(rows)
+            across = plan.division(columns)
             view = self.rows_mixed(self.constant(down.matrix(rows)), view)
             view = self.rows_mixed(self.constant(across.matrix(columns)), xp.permute_dims(view, (1, 0, 2)))
             view = xp.permute_dims(view, (1, 0, 2))

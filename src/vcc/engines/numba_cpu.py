@@ -37,7 +37,8 @@ def run(plan: Plan, values: NDArray[Any], progress: Progress | None = None) -> N
     rows, columns = plan.raster_shape
     raster = np.zeros((rows, columns, channels), dtype=np.float32)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        if plan.separable:
+        alike = all(np.ptp(m.column, axis=0).max() < 1e-6 > np.ptp(m.row, axis=1).max() for m in plan.masks)
+        if plan.separable and alike:
             separable = _Separable(plan, channels)
             separable.add(values, raster.reshape(rows, -1), pool, progress)
             if separable.mirrored:
@@ -77,7 +78,7 @@ class _FineGrid:
         nothing = (np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.float32))
         self.tables = (*nothing, *nothing, channels)
         if plan.refine > 1:
-            down, across = (Division.of(plan.interpolation, n, plan.refine) for n in plan.samples)
+            down, across = (plan.division(n) for n in plan.samples)
             self.rows, self.columns = len(down.first), len(across.first)
             self.first_row, self.first_column = down.start, across.start
             self.divided_as = down, across

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.engines.smear import finish
-from vcc.plan.footprint import Division, shares
+from vcc.plan.footprint import shares
 from vcc.plan.model import Plan
 
 Array = NDArray[np.float64]
@@ -49,8 +49,8 @@ def _samples_of(plan: Plan, view: Array) -> tuple[Array, Array, Array]:
     if plan.refine == 1:
         return view, np.arange(view.shape[1], dtype=float), np.arange(view.shape[0], dtype=float)
     rows, columns = view.shape[:2]
-    down = Division.of(plan.interpolation, rows, plan.refine)
-    across = Division.of(plan.interpolation, columns, plan.refine)
+    down = plan.division(rows)
+    across = plan.division(columns)
     fine = np.einsum("al,bk,lkc->abc", down.matrix(rows), across.matrix(columns), view, optimize=True)
     k = across.start + np.arange(fine.shape[1]) / plan.refine
     l = down.start + np.arange(fine.shape[0]) / plan.refine

@@ -54,13 +54,15 @@ RANK_TOLERANCE = 1e-8
 
 
 def finishing_terms(plan: Plan) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """The tents between views and the blur of a plan, as `separable_terms`."""
-    tents = tent(plan.smear[0]), tent(plan.smear[1])
+    """The tents between views, the blur and the sharpening of a plan, as `separable_terms`."""
+    down, across = tent(plan.smear[0]), tent(plan.smear[1])
+    if plan.sharpen is not None:
+        down, across = np.convolve(down, plan.sharpen[0]), np.convolve(across, plan.sharpen[1])
     if plan.blur is None:
-        return [tents]
+        return [(down, across)]
     from scipy.signal import convolve
 
-    return separable_terms(convolve(plan.blur, np.outer(*tents)))
+    return separable_terms(convolve(plan.blur, np.outer(down, across)))
 
 
 LONG = 64
@@ -76,8 +78,16 @@ def blurred(raster: NDArray[Any], weights: NDArray[np.float64], axis: int) -> ND
     from scipy.signal import oaconvolve
 
     kernel = np.expand_dims(weights, [other for other in range(3) if other != axis])
-    wide = oaconvolve(raster.astype(np.float64), kernel, mode="same", axes=axis)
-    return np.asarray(np.maximum(wide, 0) if raster.min(initial=0) >= 0 else wide)  # no light stays no light
+    return _without_rounding(oaconvolve(raster.astype(np.float64), kernel, mode="same", axes=axis))
+
+
+def _without_rounding(wide: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What Fourier transforms leave of no light, set to none."""
+    return np.where(np.abs(wide) < ROUNDING * np.abs(wide).max(initial=0), 0.0, wide)
+
+
+ROUNDING = 1e-13
+"""Of the largest number: below it lies what Fourier transforms in double precision round to."""
 
 
 def finish(plan: Plan, raster: NDArray[Any]) -> NDArray[np.float32]:
@@ -89,7 +99,9 @@ def finish(plan: Plan, raster: NDArray[Any]) -> NDArray[np.float32]:
 
         # In double precision: what Fourier transforms round to in the dark would else show.
         wide = oaconvolve(raster.astype(np.float64), plan.blur[:, :, None], mode="same", axes=(0, 1))
-        raster = np.maximum(wide, 0) if raster.min(initial=0) >= 0 else wide
+        raster = _without_rounding(wide)
+    if plan.sharpen is not None:
+        raster = blurred(blurred(raster, plan.sharpen[0], 0), plan.sharpen[1], 1)
     if plan.guard:
         raster = raster[plan.guard : -plan.guard, plan.guard : -plan.guard]
     if plan.sensor_transmission is not None:

@@ -310,31 +310,3 @@ class CellBlock(Pattern):
         row, column = self.lattice.cell_of(x, y)
         inside = (row >= 0) & (row < self.rows) & (column >= 0) & (column < self.columns)
         return np.asarray(inside, dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class Product(Pattern):
-    """Several patterns on one sheet: light passes what all of them let pass.
-
-    Args:
-        patterns: one or more.
-
-    Raises:
-        InputError: no pattern at all.
-    """
-
-    patterns: tuple[Pattern, ...]
-
-    def __post_init__(self) -> None:
-        if not self.patterns:
-            raise InputError("a product of patterns has one or more, not none")
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """(width, height) of the smallest, metres."""
-        width, height = zip(*(pattern.size for pattern in self.patterns), strict=True)
-        return min(width), min(height)
-
-    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """The product of the transmissions."""
-        return math.prod((pattern(x, y) for pattern in self.patterns), start=np.asarray(1.0))

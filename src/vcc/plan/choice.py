@@ -20,7 +20,7 @@ def compile_best(
     light_field: LightField,
     *,
     method: str = "auto",
-    interpolation: str = "linear",
+    interpolation: str = "sharp",
     between_views: str = "auto",
     scene_distance: float | None = None,
     refine: int | str = "auto",
@@ -51,7 +51,7 @@ def compile_best(
         )
     if method == "footprints":
         raise InputError(f"this camera's picture cannot be made by footprints: {reason}. Use method='rays'")
-    for name, given, default in (("interpolation", interpolation, "linear"), ("refine", refine, "auto")):
+    for name, given, default in (("interpolation", interpolation, "sharp"), ("refine", refine, "auto")):
         if given != default:
             raise InputError(
                 f"{name}={given!r} is for pictures made by footprints; this one is made by rays ({reason}): "

@@ -8,7 +8,7 @@ the masks and the projection become one sum.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,19 +17,35 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.light_field import LightField
+from vcc.patterns import Open
 from vcc.plan.diffuser_rules import diffusers_as_blurs
 from vcc.plan.footprint import REACH, SMALLEST_STEP
 from vcc.plan.model import MaskLookup, Plan
 from vcc.plan.parallax_rule import BetweenViews, choose_between_views
-from vcc.plan.planes import Plane, depends_on_view_only, detail_lost, mask_lookup, tap_origin, texture_error
+from vcc.plan.planes import (
+    Plane,
+    depends_on_view_only,
+    detail_lost,
+    mask_lookup,
+    open_parts,
+    tap_origin,
+    texture_error,
+)
+from vcc.plan.sharpening import MEAN, TENT, across_plane, along_axis
 from vcc.sampled import to_dtype
 
 if TYPE_CHECKING:
-    from vcc.camera import Camera
+    from vcc.camera import Camera, Stage
     from vcc.sensor import Sensor
 
 Array = NDArray[np.float64]
 
+INTERPOLATIONS = ("sharp", *REACH)
+"""Ways to interpolate within a view; ``"sharp"`` is linear with what that costs given back."""
+LARGEST_SHEARED_FILTER = 6
+"""Weights on each side of the middle of a filter for a sheared pixel grid."""
+CORRELATED = 0.02
+"""Share of two masks' variances that may vanish together inside the cell of a view before cells are divided."""
 FINE_DETAIL_IN_VIEW = 0.15
 """Share of a mask's variance that may vanish inside the cell of a view before cells are divided."""
 FINE_DETAIL_IN_SAMPLE = 0.01
@@ -47,7 +63,7 @@ def compile_plan(
     camera: Camera,
     light_field: LightField,
     *,
-    interpolation: str = "linear",
+    interpolation: str = "sharp",
     between_views: str = "auto",
     scene_distance: float | None = None,
     refine: int | str = "auto",
@@ -60,7 +76,8 @@ def compile_plan(
         InputError: an option that does not exist, or a frame that the sensor cannot be reached by.
     """
     _check_options(interpolation, between_views, refine)
-    blurs = diffusers_as_blurs(camera, light_field)
+    sharp = interpolation == "sharp"
+    blurs = diffusers_as_blurs(camera, light_field, sharp)
     if isinstance(blurs, str):
         raise InputError(f"this camera's picture cannot be made by footprints: {blurs}")
     if blurs.views is not None:
@@ -79,34 +96,36 @@ def compile_plan(
     view_planes = [p for p in planes if depends_on_view_only(p, samples, between.motion)]
     path_planes = [p for p in planes if p not in view_planes]
 
-    divide = _divide_views(planes, between, refine)
+    division = _divide_views(planes, path_planes, between, refine)
+    divide = division.parts
     fine = _divide_samples(path_planes, between, light_field.whole_views, refine)
-    rows, row_shift, row_share = _tap_places(light_field.shape[0], divide)
-    columns, column_shift, column_share = _tap_places(light_field.shape[1], divide)
+    rows, row_shift, row_share = _tap_places(light_field.shape[0], division)
+    columns, column_shift, column_share = _tap_places(light_field.shape[1], division)
     index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
     shift = np.stack(np.broadcast_arrays(column_shift[None, :], row_shift[:, None]), axis=-1)
 
-    weights = row_share[:, None] * column_share[None, :]
-    for plane in view_planes:
-        weights = weights * plane.view_weights(index, shift, between.motion, samples, divide)
+    parts = open_parts(view_planes, index, shift, between.motion, samples, divide)
+    weights = row_share[:, None] * column_share[None, :] * parts.weights
     used_rows, used_columns = _used(weights)
     keep = np.ix_(used_rows, used_columns)
-    index, shift, weights = index[keep], shift[keep], weights[keep]
+    index, shift, weights, off_middle = index[keep], shift[keep], weights[keep], parts.middle[keep]
 
     tap = tap_origin(on_sensor, origin, index, shift, between.motion)
     guard, smear = _smear(between, divide)
     _check_raster(sensor.shape, guard)
     if blurs.picture is not None:
         guard += max(blurs.picture.shape) // 2
+    points = light_field.sample == "point" and fine == 1
     lookups = tuple(
-        mask_lookup(plane, index, shift, between.motion, samples, divide, fine) for plane in path_planes
+        mask_lookup(plane, index, shift + off_middle, between.motion, samples, divide, fine, not points)
+        for plane in path_planes
     )
     missing, reason = _missing_rays(view_planes, light_field.shape, samples, weights, tap, step, sensor.shape)
     volume = light_field.sample_volume / light_field.full_scale
-    return Plan(
+    plan = Plan(
         sensor_shape=sensor.shape,
         guard=guard,
-        interpolation=interpolation,
+        interpolation="linear" if sharp else interpolation,
         scale=volume / (sensor.pitches[0] * sensor.pitches[1]),
         view_rows=rows[used_rows],
         view_columns=columns[used_columns],
@@ -122,7 +141,7 @@ def compile_plan(
         samples=samples,
         missing_rays=missing,
         missing_reason=reason,
-        notes=_notes(camera, view_planes, path_planes, against_sensor, between, divide, fine, swapped)
+        notes=_notes(camera, view_planes, path_planes, against_sensor, between, division, fine, swapped)
         + _coarse_textures(lookups)
         + blurs.notes,
         expected_ghosting=between.gap_left,
@@ -130,6 +149,44 @@ def compile_plan(
         blur=blurs.picture,
         view_blur=blurs.views,
     )
+    return _sharpened(plan, light_field.sample) if sharp else plan
+
+
+def _sharpened(plan: Plan, sample: str) -> Plan:
+    """The plan with the filters that give back what linear interpolation takes (`vcc.plan.sharpening`).
+
+    Where samples are divided because a mask is finer than they are, they are filtered as they are divided, before
+    the mask; the picture then lacks only what its finer samples lost, each a mean over its own cell.
+    """
+    losses = TENT + (MEAN if sample == "mean" else 0)
+    within = along_axis(losses, 1.0) if plan.refine > 1 else None
+    if plan.refine > 1:
+        losses = TENT + MEAN
+    step = plan.step / plan.refine
+    (xk, xl), (yk, yl) = step
+    if not (xl or yk):
+        filters = along_axis(losses, yl), along_axis(losses, xk)
+        reach = max(len(weights) for weights in filters) // 2
+        return _guarded(replace(plan, sharpen=filters, sharpen_samples=within), reach)
+    # Light is spread along the samples' columns on the sensor, and across at fixed rows of pixels; a pixel's mean
+    # is taken along the columns, too.
+    shear = xl / yl
+    spread = [(float(TENT), np.array([xk - shear * yk, 0.0])), (float(TENT), np.array([xl, yl]))]
+    spread += [(1.0, plan.opening * np.array([shear, 1.0])), (-1.0, plan.opening * np.array([0.0, 1.0]))]
+    if losses > TENT:
+        spread += [(float(MEAN), step[:, 0]), (float(MEAN), step[:, 1])]
+    half = min(2 + math.ceil(2 * max(0.0, float(np.abs(step).max()) - 1)), LARGEST_SHEARED_FILTER)
+    kernel = across_plane(spread, half)
+    if plan.blur is not None:
+        from scipy.signal import convolve
+
+        kernel = np.asarray(convolve(plan.blur, kernel))
+    return _guarded(replace(plan, blur=kernel, sharpen_samples=within), half)
+
+
+def _guarded(plan: Plan, pixels: int) -> Plan:
+    """The plan with so many more pixels around the picture, for filters that look beyond its border."""
+    return replace(plan, guard=plan.guard + pixels, x=plan.x + pixels, y=plan.y + pixels)
 
 
 def why_not_footprints(camera: Camera, light_field: LightField) -> str | None:
@@ -160,8 +217,8 @@ def _grown(light_field: LightField, kernel: Array) -> LightField:
 
 
 def _check_options(interpolation: str, between_views: str, refine: int | str) -> None:
-    if interpolation not in REACH:
-        raise InputError(f"interpolation is one of {', '.join(map(repr, REACH))}, not {interpolation!r}")
+    if interpolation not in INTERPOLATIONS:
+        raise InputError(f"interpolation is one of {', '.join(map(repr, INTERPOLATIONS))}, not {interpolation!r}")
     if between_views not in ("auto", "none"):
         raise InputError(f"between_views is 'auto' or 'none', not {between_views!r}")
     if refine != "auto" and not (isinstance(refine, int) and 1 <= refine <= LARGEST_REFINEMENT):
@@ -196,35 +253,64 @@ def _absorbing_planes(camera: Camera, frame: Affine, sensor_place: Array) -> tup
     Rule: a mask whose every ray meets it where it meets the sensor multiplies the picture. Precondition:
     the place on the mask is the place on the sensor, shifted at most, for every sample.
     """
-    in_path: list[Plane] = []
-    against_sensor: list[Plane] = []
+    groups: list[tuple[Array, list[Stage]]] = []
     rays = Affine.identity()
     for stage in camera.stages:
         rays = stage.approach @ rays
-        arriving = rays
+        place = (rays @ frame).matrix[:2]
         if stage.centred is not None:
             rays = stage.centred @ rays
-        pattern, element = stage.faces.pattern, stage.element
-        if pattern is None:
+        if stage.faces.pattern is None or isinstance(stage.faces.pattern, Open):
             continue
-        plane = Plane.met_by(frame, arriving, pattern, element.decentre, element.label)
-        place = (arriving @ frame).matrix[:2]
-        same = np.allclose(place, sensor_place, rtol=1e-9, atol=1e-9 * np.abs(sensor_place).max())
-        (against_sensor if same else in_path).append(plane)
+        if groups and _same_place(place, groups[-1][0]):
+            groups[-1][1].append(stage)
+        else:
+            groups.append((place, [stage]))
+    in_path: list[Plane] = []
+    against_sensor: list[Plane] = []
+    for place, stages in groups:
+        # What stands in one plane is multiplied there, before anything is averaged.
+        patterns = [(stage.faces.pattern, stage.element.decentre) for stage in stages]
+        label = " and ".join(dict.fromkeys(stage.element.label for stage in stages))
+        plane = Plane.at(place, [(pattern, middle) for pattern, middle in patterns if pattern is not None], label)
+        (against_sensor if _same_place(place, sensor_place) else in_path).append(plane)
     return in_path, against_sensor
 
 
-def _tap_places(views: int, divide: int) -> tuple[NDArray[np.int64], Array, Array]:
+def _same_place(one: Array, other: Array) -> bool:
+    return np.allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+
+
+@dataclass(frozen=True)
+class _CellDivision:
+    """How the cells of views are divided.
+
+    Args:
+        parts: of each, along each axis.
+        spread: whether a view's light reaches its neighbours, as a tent, for a place between views is interpolated
+            from both; else it stays in its own cell.
+        left: the correlation that masks in different planes still have inside a part (see `CORRELATED`).
+    """
+
+    parts: int
+    spread: bool
+    left: float = 0.0
+
+
+def _tap_places(views: int, division: _CellDivision) -> tuple[NDArray[np.int64], Array, Array]:
     """Views read, shifts from them in views, and shares, of the taps along one axis.
 
-    Undivided, each view is one tap. Divided, a view's light is spread over a tent that reaches its
-    neighbours, in steps of 1/divide: a place between views is interpolated linearly from both.
+    Undivided, each view is one tap. Divided, it is one in each part of its cell; or its light is spread over a
+    tent that reaches its neighbours, so that a place between views is interpolated linearly from both.
     """
-    if divide == 1:
-        return np.arange(views), np.zeros(views), np.ones(views)
-    shift = (np.arange(-divide, divide) + 0.5) / divide
-    share = (1 - np.abs(shift)) / divide
-    return np.repeat(np.arange(views), 2 * divide), np.tile(shift, views), np.tile(share, views)
+    divide = division.parts
+    if division.spread:
+        shift = (np.arange(-divide, divide) + 0.5) / divide
+        share = (1 - np.abs(shift)) / divide
+    else:
+        shift = (np.arange(divide) + 0.5) / divide - 0.5
+        share = np.full(divide, 1 / divide)
+    return np.repeat(np.arange(views), len(shift)), np.tile(shift, views), np.tile(share, views)
 
 
 def _used(weights: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -250,14 +336,17 @@ def _check_raster(sensor_shape: tuple[int, int], guard: int) -> None:
         )
 
 
-def _divide_views(planes: list[Plane], between: BetweenViews, refine: int | str) -> int:
-    """Into how many parts a view's cell is divided each way, so that fine masks keep their detail.
+def _divide_views(
+    planes: list[Plane], path_planes: list[Plane], between: BetweenViews, refine: int | str
+) -> _CellDivision:
+    """How a view's cell is divided so that fine masks keep their detail.
 
-    Needed only where a cell's picture is spread over more than a pixel: else what a mask does inside the
-    cell adds up in one place, and the mean over the cell says it all.
+    Where a cell's picture is spread over more than a pixel, what a mask does inside the cell must fall where it
+    belongs. Elsewhere it adds up in one place, and the mean over the cell says it all for one mask; but the mean
+    of two masks' product is not the product of their means where both are finer than the cell.
     """
     if refine != "auto":
-        return 1
+        return _CellDivision(1, False)
     divide = 1
     for plane in planes:
         cell = np.abs(plane.view_step(between.motion)).sum(axis=1)
@@ -265,7 +354,21 @@ def _divide_views(planes: list[Plane], between: BetweenViews, refine: int | str)
             if detail_lost(plane, np.zeros(2), cell / divide) < FINE_DETAIL_IN_VIEW:
                 break
             divide *= 2
-    return divide
+    if divide > 1:
+        return _CellDivision(divide, True)
+
+    def correlated(parts: int) -> float:
+        lost = sorted(
+            detail_lost(plane, np.zeros(2), np.abs(plane.view_step(between.motion)).sum(axis=1) / parts)
+            for plane in path_planes
+        )
+        return math.sqrt(lost[-1] * lost[-2]) if len(lost) > 1 else 0.0
+
+    left = correlated(1)
+    while left > CORRELATED and divide < LARGEST_CHOSEN_REFINEMENT:
+        divide *= 2
+        left = correlated(divide)
+    return _CellDivision(divide, False, left)
 
 
 def _divide_samples(
@@ -391,7 +494,7 @@ def _notes(
     path_planes: list[Plane],
     against_sensor: list[Plane],
     between: BetweenViews,
-    divide: int,
+    division: _CellDivision,
     fine: int,
     swapped: bool,
 ) -> tuple[str, ...]:
@@ -418,8 +521,15 @@ def _notes(
     if swapped:
         notes.append("pixel rows and columns of the views change places: the frame turns them")
     notes.append(between.reason)
-    if divide > 1:
-        notes.append(f"cells of views divided {divide}×{divide}: a mask is finer than a view's cell")
+    parts = division.parts
+    if parts > 1:
+        finer = "a mask is" if division.spread else "several masks are"
+        notes.append(f"cells of views divided {parts}×{parts}: {finer} finer than a view's cell")
+    if division.left > CORRELATED:
+        notes.append(
+            f"masks in different planes still vary together inside these cells, by up to {division.left:.0%} of "
+            "their contrast, and are taken as independent there: more views would tell them apart"
+        )
     if fine > 1:
         further = (
             f"; finer ones, up to refine={LARGEST_REFINEMENT}, are made when asked for"

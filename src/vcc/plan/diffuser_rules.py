@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.errors import InputError
+from vcc.plan.sharpening import TENT, along_axis
 
 if TYPE_CHECKING:
     from vcc.camera import Camera, Stage
@@ -48,8 +49,14 @@ class Blurs:
     notes: tuple[str, ...] = ()
 
 
-def diffusers_as_blurs(camera: Camera, light_field: LightField) -> Blurs | str:
-    """The blurs by which the rules replace all diffusers of a camera, or why they do not."""
+def diffusers_as_blurs(camera: Camera, light_field: LightField, sharp: bool = True) -> Blurs | str:
+    """The blurs by which the rules replace all diffusers of a camera, or why they do not.
+
+    Args:
+        camera: with diffusers or without.
+        light_field: that it looks at.
+        sharp: whether the tent by which a kernel is shared out on its lattice is given back.
+    """
     picture: Array | None = None
     views: Array | None = None
     notes = []
@@ -63,12 +70,14 @@ def diffusers_as_blurs(camera: Camera, light_field: LightField) -> Blurs | str:
         obstacle = behind(camera, n)
         try:
             if obstacle is None:
-                picture = _convolved(picture, kernel.weights(_pixels_from_slopes(camera, n)))
+                weights = kernel.weights(_pixels_from_slopes(camera, n))
+                picture = _convolved(picture, _without_tent(weights) if sharp else weights)
                 notes.append(
                     f"blur of the picture: {label}, since all behind it is affine and nothing there absorbs"
                 )
             elif meets_views_in_points(camera, light_field, n):
-                views = _convolved(views, kernel.weights(_samples_from_slopes(camera, light_field, n)))
+                weights = kernel.weights(_samples_from_slopes(camera, light_field, n))
+                views = _convolved(views, _without_tent(weights) if sharp else weights)
                 notes.append(f"blur of each view: {label}, since each view meets it in one place")
             else:
                 return f"{label} scatters, and {obstacle} behind it"
@@ -133,9 +142,15 @@ def _samples_from_slopes(camera: Camera, light_field: LightField, n: int) -> Arr
     return np.asarray((rays @ light_field.frame).inverse().linear[2:, 2:])
 
 
+def _without_tent(weights: Array) -> Array:
+    """A kernel's weights without the tent by which they share out what falls between points of their lattice."""
+    sharper = along_axis(TENT, 1.0)
+    return _convolved(weights, np.outer(sharper, sharper))
+
+
 def _convolved(one: Array | None, other: Array) -> Array:
     if one is None:
         return other
     from scipy.signal import convolve
 
-    return np.asarray(np.maximum(convolve(one, other), 0.0))
+    return np.asarray(convolve(one, other))

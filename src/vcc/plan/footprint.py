@@ -173,15 +173,32 @@ class Division:
     shares: Array
 
     @classmethod
-    def of(cls, interpolation: str, samples: int, refine: int) -> Division:
-        """``samples`` samples, each divided into ``refine``, interpolated as named."""
-        reach = REACH[interpolation]
+    def of(cls, interpolation: str, samples: int, refine: int, sharpen: Array | None = None) -> Division:
+        """``samples`` samples, each divided into ``refine``, interpolated as named.
+
+        Args:
+            interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+            samples: how many there are.
+            refine: parts of each.
+            sharpen: an odd number of weights by which samples are filtered before they are interpolated; a fine
+                sample is then the mean of what is interpolated over its own cell, not its value in the middle.
+        """
+        weights = np.ones(1) if sharpen is None else sharpen
+        reach = REACH[interpolation] + len(weights) // 2
         fine = round((samples - 1 + 2 * reach) * refine)
         start = -reach + 0.5 / refine
         place = start + np.arange(fine) / refine
         first = np.clip(np.ceil(place - reach), 0, samples - 1).astype(np.int64)
         index = first[:, None] + np.arange(math.ceil(2 * reach))
-        shares = weight(interpolation, place[:, None] - index) / refine
+        distance = place[:, None] - index
+        if sharpen is None:
+            shares = weight(interpolation, distance) / refine
+        else:
+            middle, half = len(weights) // 2, 0.5 / refine
+            shares = np.zeros(distance.shape)
+            for n, one in enumerate(weights):
+                upper = cumulative(interpolation, distance - (n - middle) + half)
+                shares += one * (upper - cumulative(interpolation, distance - (n - middle) - half))
         return cls(start, first, np.where(index < samples, shares, 0.0))
 
     def matrix(self, samples: int) -> Array:

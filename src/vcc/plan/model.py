@@ -14,6 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.plan.footprint import Division
+
 Array = NDArray[np.float64]
 
 
@@ -63,7 +65,7 @@ class Plan:
     Args:
         sensor_shape: (rows, columns) of the picture.
         guard: extra pixels around it, for light that the smear brings in from outside.
-        interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+        interpolation: of footprints: ``"nearest"``, ``"linear"`` or ``"cubic"``.
         scale: turns stored samples times shares into irradiance.
         view_rows: row of views that each row of taps reads.
         view_columns: column of views that each column of taps reads.
@@ -80,6 +82,10 @@ class Plan:
         blur: kernel that the picture is convolved with, odd rows × odd columns of sum 1 (a diffuser), or None.
         view_blur: kernel that each view is convolved with before all else (a diffuser at the views), growing by
             half the kernel on each side, or None; ``samples`` and places count what is there after that.
+        sharpen: weights (down, across), each an odd number of sum 1, by which the picture is filtered along its
+            columns and rows to give back what interpolation took from sharpness (`vcc.plan.sharpening`), or None.
+        sharpen_samples: an odd number of weights by which samples are filtered along both axes where they are
+            divided (``refine``), or None.
         swap_pixel_axes: whether rows and columns of pixels change places before all else.
         samples: (rows, columns) of pixels of a view, after that change.
         missing_rays: share of the rays asked for that the light field lacks.
@@ -112,6 +118,12 @@ class Plan:
     opening: float = 1.0
     blur: Array | None = None
     view_blur: Array | None = None
+    sharpen: tuple[Array, Array] | None = None
+    sharpen_samples: Array | None = None
+
+    def division(self, samples: int) -> Division:
+        """How ``samples`` samples along an axis are divided into ``refine`` finer ones each."""
+        return Division.of(self.interpolation, samples, self.refine, self.sharpen_samples)
 
     def columns(self, columns: NDArray[np.int64]) -> Plan:
         """The plan with some of its columns of view taps only: pictures of such pieces add up."""
@@ -131,14 +143,17 @@ class Plan:
 
     @property
     def separable(self) -> bool:
-        """Whether columns on the sensor follow from columns of the light field alone, and rows from rows."""
-        maps = [(self.x, self.y, self.step)]
-        maps += [(mask.column, mask.row, mask.step) for mask in self.masks]
-        return all(
-            np.ptp(x, axis=0).max() < 1e-6
-            and np.ptp(y, axis=1).max() < 1e-6
-            and max(abs(step[0, 1]) * self.samples[0], abs(step[1, 0]) * self.samples[1]) < 1e-6
-            for x, y, step in maps
+        """Whether columns on the sensor follow from columns of the light field alone, and rows from rows.
+
+        Masks are then looked up along rows and columns, too; where a tap meets them is its own affair.
+        """
+        steps = [self.step, *(mask.step for mask in self.masks)]
+        return bool(
+            np.ptp(self.x, axis=0).max() < 1e-6
+            and np.ptp(self.y, axis=1).max() < 1e-6
+            and all(
+                max(abs(step[0, 1]) * self.samples[0], abs(step[1, 0]) * self.samples[1]) < 1e-6 for step in steps
+            )
         )
 
     @property

@@ -86,10 +86,11 @@ def choose_between_views(
     else:
         motions = index_motions(frame, known)
         steps = on_sensor[:, :2] - on_sensor[:, 2:] @ motions
-    axis = 0 if columns > 1 else 1
-    along = steps[:, :, axis]
-    gaps = np.linalg.norm(along, axis=-1)
-    crosses_focus = (along @ along[0] < 0).any()
+    # Views go on along both axes, and the wider gap decides: cameras turned by 90° are treated alike.
+    axes = [axis for axis, views in enumerate((columns, rows)) if views > 1]
+    along = steps[:, :, axes]
+    gaps = np.linalg.norm(along, axis=1).max(axis=-1)
+    crosses_focus = bool((np.einsum("npa,pa->na", along, along[0]) < 0).any())
     smallest, largest = (0.0 if crosses_focus else gaps.min()), gaps.max()
     wanted = float(np.sqrt(smallest * largest))
     chosen = int(np.abs(gaps - wanted).argmin())
@@ -105,9 +106,7 @@ def choose_between_views(
         )
     if wanted <= pixel:
         return BetweenViews(motions[chosen], (0.0, 0.0), largest, f"{spread}; {_advice(largest, pixel)}")
-    step = np.abs(steps[chosen])
-    vertical = float(step[1].sum()) if rows > 1 else 0.0
-    horizontal = float(step[0].sum()) if columns > 1 else 0.0
+    horizontal, vertical = (float(extent) for extent in np.abs(along[chosen]).sum(axis=1))
     left = max(largest - wanted, 0.0)
     return BetweenViews(
         motions[chosen],

@@ -11,15 +11,21 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.patterns import Pattern
 from vcc.plan.model import MaskLookup
+from vcc.plan.sharpening import TENT, gain, symmetric
+from vcc.sheets import in_one_plane
 
 Array = NDArray[np.float64]
 
-TEXTURE_POINTS_PER_FOOTPRINT = 6
-"""Weights are looked up linearly between texture points this fine: the error is below 1/6² of a curvature."""
-LARGEST_TEXTURE = 2048
-"""Points a side of a mask texture: 16 MiB."""
+TEXTURE_POINTS_PER_FOOTPRINT = 3
+"""Weights are looked up linearly between texture points this fine; what that takes is given back beforehand."""
+LARGEST_TEXTURE = 4096
+"""Points a side of a mask texture: 64 MiB."""
 POINTS_AT_ONCE = 2**20
 """Points of a texture that are averaged at once, in float64: 8 MiB."""
+PARTS_OF_A_CELL = 6
+"""Parts each way by which the open part of a view's cell is found."""
+TEXTURE_FILTER = 5
+"""Weights on each side of a texture's filter, beside those that the box of a sample takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +42,26 @@ class Plane:
     offset: Array
 
     @classmethod
+    def at(cls, place: Array, patterns: list[tuple[Pattern, tuple[float, float]]], label: str) -> Plane:
+        """The plane of all patterns that samples meet in one place.
+
+        Args:
+            place: (x, y) in metres from index (i, j, k, l, 1), 2×5.
+            patterns: each with the place of its middle, metres.
+            label: what they are called.
+        """
+        if len(patterns) == 1:
+            ((pattern, decentre),) = patterns
+        else:
+            pattern, decentre = in_one_plane(patterns), (0.0, 0.0)
+        return cls(pattern, label, decentre, place[:, :4], place[:, 4] - np.array(decentre))
+
+    @classmethod
     def met_by(
         cls, frame: Affine, rays: Affine, pattern: Pattern, decentre: tuple[float, float], label: str
     ) -> Plane:
         """The plane of a pattern as samples of this frame meet it, ``rays`` leading from them to the plane."""
-        place = (rays @ frame).matrix[:2]
-        return cls(pattern, label, decentre, place[:, :4], place[:, 4] - np.array(decentre))
+        return cls.at((rays @ frame).matrix[:2], [(pattern, decentre)], label)
 
     def middle_of_view(self, samples: tuple[int, int]) -> Array:
         """Where the middle of view (0, 0) falls, (x, y) in metres; views have (rows, columns) of samples."""
@@ -54,7 +74,7 @@ class Plane:
         """The open share of each tap's cell, for a plane that tells views apart only; see `tap_origin`."""
         place = tap_origin(self.at_index, self.middle_of_view(samples), index, shift, motion)
         width, height = np.abs(self.view_step(motion)).sum(axis=1) / divide
-        return self.pattern.mean(place[..., 0], place[..., 1], width, height)
+        return self.pattern.mean(place[..., 0], place[..., 1], float(width), float(height))
 
     def view_step(self, motion: Array) -> Array:
         """2×2: metres moved here per view, a point of the scene being followed."""
@@ -79,6 +99,53 @@ def tap_origin(at_index: Array, offset: Array, index: Array, shift: Array, motio
     return np.asarray(index @ at_index[:, :2].T + shift @ view_step.T + offset)
 
 
+@dataclass(frozen=True, eq=False)
+class OpenParts:
+    """What of each tap's cell of the aperture is open.
+
+    Args:
+        weights: the open share of each tap's cell, (rows of taps, columns of taps).
+        middle: the middle of the open part, in views from the middle of the cell, (rows, columns, 2) as (i, j).
+    """
+
+    weights: Array
+    middle: Array
+
+
+def open_parts(
+    planes: list[Plane], index: Array, shift: Array, motion: Array, samples: tuple[int, int], divide: int
+) -> OpenParts:
+    """What of each tap's cell is open behind planes that tell views apart only; see `tap_origin`.
+
+    A cell that a rim cuts is lit through a part of it, and what other masks do to that light they do around the
+    middle of that part.
+    """
+    weights = np.ones(index.shape[:2])
+    middle = np.zeros((*index.shape[:2], 2))
+    if not planes:
+        return OpenParts(weights, middle)
+    for plane in planes:
+        weights = weights * plane.view_weights(index, shift, motion, samples, divide)
+    part = ((np.arange(PARTS_OF_A_CELL) + 0.5) / PARTS_OF_A_CELL - 0.5) / divide
+    inside = np.stack(np.meshgrid(part, part), axis=-1)
+    shape = (*index.shape[:2], PARTS_OF_A_CELL, PARTS_OF_A_CELL, 2)
+    index_of_parts = np.broadcast_to(index[:, :, None, None], shape)
+    shift_of_parts = shift[:, :, None, None] + inside
+    shares = np.ones(shape[:4])
+    for plane in planes:
+        shares = shares * plane.view_weights(
+            index_of_parts, shift_of_parts, motion, samples, divide * PARTS_OF_A_CELL
+        )
+    light = shares.sum(axis=(2, 3))
+    lit = light > 0
+    middle[lit] = (shares[..., None] * inside).sum(axis=(2, 3))[lit] / light[lit][:, None]
+    if (
+        len(planes) > 1
+    ):  # planes apart from each other: what both leave of a cell is not the product of their shares
+        weights = shares.mean(axis=(2, 3))
+    return OpenParts(weights, middle)
+
+
 def mask_lookup(
     plane: Plane,
     index: Array,
@@ -87,14 +154,28 @@ def mask_lookup(
     samples: tuple[int, int],
     divide: int,
     fine: int,
+    over_samples: bool = True,
 ) -> MaskLookup:
-    """The mask averaged over a sample's footprint, as a texture, and where each sample reads it."""
+    """The mask averaged over a sample's footprint, as a texture, and where each sample reads it.
+
+    Args:
+        plane: the mask.
+        index: of the views, (rows of taps, columns of taps, 2).
+        shift: of the taps from them, in views.
+        motion: see `tap_origin`.
+        samples: (rows, columns) of a view.
+        divide: parts of a view's cell, each way.
+        fine: parts of a sample, each way.
+        over_samples: whether to average over the sample's cell besides that of the view: samples that are points
+            meet the mask in a point.
+    """
     place = tap_origin(plane.at_index, plane.offset, index, shift, motion)
     step = plane.sample_step
     view_part = np.abs(plane.view_step(motion)).sum(axis=1) / divide
-    sample_part = np.abs(step).sum(axis=1) / fine
-    # Two boxes in a row spread as one whose width is their root of squares, exact where one is small.
+    sample_part = np.abs(step).sum(axis=1) / fine * over_samples
     footprint = np.hypot(view_part, sample_part)
+    # The wider of the two boxes is taken by the pattern's own means, the other by a filter of the texture.
+    wide, narrow = np.maximum(view_part, sample_part), np.minimum(view_part, sample_part)
     corners = np.array([[k, l] for k in (-2, samples[1] + 1) for l in (-2, samples[0] + 1)]) @ step.T
     low = (place.reshape(-1, 2)[:, None] + corners).min(axis=(0, 1))
     high = (place.reshape(-1, 2)[:, None] + corners).max(axis=(0, 1))
@@ -105,11 +186,14 @@ def mask_lookup(
     first, last = np.floor(low / spacing) - 1, np.ceil(high / spacing) + 1
     last = np.maximum(last, first + 2)
     start = first * spacing
-    grid_x = np.arange(first[0], last[0] + 1) * spacing[0]
-    grid_y = np.arange(first[1], last[1] + 1) * spacing[1]
-    texture = np.empty((grid_y.size, grid_x.size), dtype=np.float32)
-    for rows in np.array_split(np.arange(grid_y.size), -(-texture.size // POINTS_AT_ONCE)):
-        texture[rows] = plane.pattern.mean(grid_x[None, :], grid_y[rows, None], footprint[0], footprint[1])
+    filters = [_texture_filter(float(narrow[n] / spacing[n])) for n in (0, 1)]
+    margin = [len(weights) // 2 for weights in filters]
+    grid_x = np.arange(first[0] - margin[0], last[0] + margin[0] + 1) * spacing[0]
+    grid_y = np.arange(first[1] - margin[1], last[1] + margin[1] + 1) * spacing[1]
+    means = np.empty((grid_y.size, grid_x.size), dtype=np.float32)
+    for rows in np.array_split(np.arange(grid_y.size), -(-means.size // POINTS_AT_ONCE)):
+        means[rows] = plane.pattern.mean(grid_x[None, :], grid_y[rows, None], float(wide[0]), float(wide[1]))
+    texture = _filtered(means, filters)
     return MaskLookup(
         texture=texture,
         column=(place[..., 0] - start[0]) / spacing[0],
@@ -117,6 +201,27 @@ def mask_lookup(
         step=_cleaned_lookup(step / spacing[:, None], samples),
         label=plane.label,
     )
+
+
+def _texture_filter(box: float) -> Array:
+    """The filter of a texture along one axis: a mean over a box, and what looking it up linearly takes.
+
+    Args:
+        box: its width in points of the texture.
+    """
+    return symmetric(
+        lambda frequency: np.sinc(box * frequency) * gain(TENT, frequency), TEXTURE_FILTER + math.ceil(box / 2)
+    )
+
+
+def _filtered(means: NDArray[np.float32], filters: list[Array]) -> NDArray[np.float32]:
+    """Means (rows, columns) filtered along columns and rows, without the margin that this takes."""
+    from scipy.ndimage import convolve1d
+
+    (across, down) = filters
+    down_done = convolve1d(means, down, axis=0, mode="constant")[len(down) // 2 : len(means) - len(down) // 2]
+    wide = convolve1d(down_done, across, axis=1, mode="constant")
+    return np.ascontiguousarray(wide[:, len(across) // 2 : wide.shape[1] - len(across) // 2])
 
 
 def texture_error(texture: NDArray[np.float32]) -> float:

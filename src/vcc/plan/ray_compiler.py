@@ -15,13 +15,14 @@ from vcc.affine import Affine
 from vcc.electronics import checked_seed
 from vcc.errors import InputError
 from vcc.optics.deflections import CellDeflection, FacetDeflection
-from vcc.optics.lattice import CellApertures, CellBlock, Product
+from vcc.optics.lattice import CellApertures, CellBlock
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
 from vcc.plan import steps
 from vcc.plan.beam import Beam
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import FIRST_COLUMNS, TABLE, Aim, CellWindows, RayPlan, Window
+from vcc.sheets import Product
 from vcc.units import short
 
 if TYPE_CHECKING:
