@@ -1,13 +1,13 @@
 """Random cameras of all elements, and closed-form scenes before them: what the laws and brute force are held on.
 
-Everything follows from a kind and a seed. What is drawn: elements in any order along the axis, decentred and out of
-focus, at the entrance plane, at the lens, mid-way, against the sensor and a little before it; stops within the grid
-of views, or none; views that converge or are parallel, flown or not, closer along one axis than along the other;
-pixels of any proportions, smaller and larger than samples; floating point and bytes, one channel or three.
+Everything follows from a kind and a seed. What is drawn: elements in any order along the axis, decentred and out
+of focus, at the entrance plane, at the lens, mid-way, against the sensor and a little before it; stops within the
+grid of views, or none; views that converge or are parallel, flown or not, closer along one axis than along the
+other; pixels of any proportions, smaller and larger than samples; floating point and bytes, one channel or three.
 
 Views are so dense that neighbouring views' pictures of a scene lie less than `GAP` pixels (or samples, where these
-are larger) apart on the sensor, and periods are so long that samples carry them (`FINEST`): further apart or finer,
-the light field does not say what lies between, and no picture of it could be held against the truth.
+are larger) apart on the sensor, and periods are so long that samples carry them (`FINEST`): further apart or
+finer, the light field does not say what lies between, and no picture of it could be held against the truth.
 """
 
 from __future__ import annotations
@@ -91,7 +91,11 @@ class Case:
         sensor = self.camera.sensor
         parts = [
             f"{each.kind} z={each.z * 1e3:.4g}mm"
-            + (f" off ({each.decentre[0] * 1e3:.2g}, {each.decentre[1] * 1e3:.2g})mm" if any(each.decentre) else "")
+            + (
+                f" off ({each.decentre[0] * 1e3:.2g}, {each.decentre[1] * 1e3:.2g})mm"
+                if any(each.decentre)
+                else ""
+            )
             + f" [{each.described()}]"
             for each in self.camera.elements
         ]
@@ -252,7 +256,9 @@ class _Drawing:
             waves = []
             for _ in range(3):
                 angle, period = self.between(0, np.pi), self.spread(finest, 5 * finest) * step
-                waves.append((0.13, grown * np.cos(angle) / period, grown * np.sin(angle) / period, self.between(0, 6)))
+                waves.append(
+                    (0.13, grown * np.cos(angle) / period, grown * np.sin(angle) / period, self.between(0, 6))
+                )
             return Plane(w / grown, 0.5, waves)
 
         if len(self.depths) == 1:

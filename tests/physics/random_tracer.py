@@ -1,12 +1,12 @@
 """A third independent tracer: brute force for cameras that a generator draws, whatever they are made of.
 
-Of `vcc` only the numbers of a camera are read: sizes, places, focal lengths, tables. What they do to a ray is written
-out here by hand. A pixel's value is the mean over its sensitive area of
+Of `vcc` only the numbers of a camera are read: sizes, places, focal lengths, tables. What they do to a ray is
+written out here by hand. A pixel's value is the mean over its sensitive area of
 
     I(x) = ∫∫ L(ray from aperture point a to sensor point x) · ∏ transmissions  ds dt,   ds dt = J da db
 
-over the aperture of the smallest solid angle, a stop or the grid of views as a rectangle; J is the same for all rays
-where optics are affine. Scenes are sums of plane waves in ray space, so that their means are known in closed form.
+over the aperture of the smallest solid angle, a stop or the grid of views as a rectangle; J is the same for all
+rays where optics are affine. Scenes are sums of plane waves in ray space, so that their means are known in closed form.
 
 `Bench.by_means` is for affine optics along both axes. Pixel and aperture are cut into strips, and what a strip
 of both sees of each wave and of each mask along an axis is taken as its *exact mean* (a mask's edge is met by a
@@ -29,7 +29,7 @@ from scipy.stats import qmc
 
 Array = NDArray[np.float64]
 Widths = tuple[float, float]
-"""Lengths of two boxes whose convolution is what a strip of pixel and aperture throws on a plane, along an axis."""
+"""Lengths of two boxes: their convolution is what a strip of pixel and aperture throws on a plane along an axis."""
 
 
 MOST_STRIPS = 256
@@ -95,7 +95,9 @@ class Scene:
             amplitude = amplitude * np.sinc(steps[:, 2] / 2 / np.pi) * np.sinc(steps[:, 3] / 2 / np.pi)
         i, j, k, l = (np.arange(shape[n]) for n in (1, 0, 3, 2))
         across = np.exp(1j * (steps[:, 0, None, None] * i[:, None] + steps[:, 2, None, None] * k))
-        down = np.exp(1j * (steps[:, 1, None, None] * j[:, None] + steps[:, 3, None, None] * l + phase[:, None, None]))
+        down = np.exp(
+            1j * (steps[:, 1, None, None] * j[:, None] + steps[:, 3, None, None] * l + phase[:, None, None])
+        )
         across, down = across.reshape(len(phase), -1), (amplitude[:, None, None] * down).reshape(len(phase), -1)
         values = down.real.T @ across.real - down.imag.T @ across.imag
         return np.asarray(values.reshape(shape[0], shape[2], shape[1], shape[3]).transpose(0, 2, 1, 3))
@@ -262,7 +264,10 @@ class Cosines(Opening):
         return self._axis(x - self.x, self.periods[0], (0, 0)) * self._axis(y - self.y, self.periods[1], (0, 0))
 
     def mean(self, x: Array, across: Widths, y: Array, down: Widths) -> Array:
-        over, under = self._axis(x - self.x, self.periods[0], across), self._axis(y - self.y, self.periods[1], down)
+        over, under = (
+            self._axis(x - self.x, self.periods[0], across),
+            self._axis(y - self.y, self.periods[1], down),
+        )
         return np.asarray(under[:, None] * over)
 
 
@@ -292,7 +297,11 @@ class Gaps(Opening):
         if self.round:
             return np.asarray(a * a + b * b <= half * half, dtype=np.float64)
         a, b = np.abs(a), np.abs(b)
-        inside = (a <= half) & (b <= half) if not self.cells.hexagonal else (a <= half) & (a / 2 + b * 3**0.5 / 2 <= half)
+        inside = (
+            (a <= half) & (b <= half)
+            if not self.cells.hexagonal
+            else (a <= half) & (a / 2 + b * 3**0.5 / 2 <= half)
+        )
         return np.asarray(inside, dtype=np.float64)
 
 
@@ -643,10 +652,14 @@ def _array(element: Any) -> Sheet:
 def _coded(element: Any) -> Sheet:
     x0, y0 = element.decentre
     drawn = [_kernel(kernel) for kernel in element.kernels]
-    shares = None if element.weights is None else [
-        _bilinear(np.asarray(each), element.width, element.height) for each in element.weights
-    ]
-    stretch = None if element.widths is None else _bilinear(np.asarray(element.widths), element.width, element.height)
+    shares = (
+        None
+        if element.weights is None
+        else [_bilinear(np.asarray(each), element.width, element.height) for each in element.weights]
+    )
+    stretch = (
+        None if element.widths is None else _bilinear(np.asarray(element.widths), element.width, element.height)
+    )
     largest = 1.0 if element.widths is None else float(np.max(element.widths))
 
     def scatter(xi: Array, eta: Array, zeta: Array, x: Array, y: Array) -> tuple[Array, Array]:
@@ -735,7 +748,7 @@ class Bench:
     # -- aiming
 
     def _back_to(self) -> list[tuple[Array, list[tuple[Array, tuple[float, float]]]]]:
-        """For each sheet: rays at the sensor to rays just before it (unbent), and what bends behind or in it moves."""
+        """For each sheet: rays at the sensor to rays just behind it, unbent, and what each bend behind it moves."""
         found: list[tuple[Array, list[tuple[Array, tuple[float, float]]]]] = []
         back, bent = _undone(self.to_sensor), []
         for sheet in reversed(self.sheets):
@@ -819,7 +832,10 @@ class Bench:
         (xs, px, ax, sx, wx, ex), (ys, py, ay, sy, wy, ey) = axes
 
         def share(opening: Opening, ray: Array, x: float, y: float) -> Array:
-            places = ray[0, 0] * (x + px) + ray[0, 2] * ax + ray[0, 4], ray[1, 1] * (y + py) + ray[1, 3] * ay + ray[1, 4]
+            places = (
+                ray[0, 0] * (x + px) + ray[0, 2] * ax + ray[0, 4],
+                ray[1, 1] * (y + py) + ray[1, 3] * ay + ray[1, 4],
+            )
             widths = (ray[0, 0] * sx, ray[0, 2] * wx), (ray[1, 1] * sy, ray[1, 3] * wy)
             return opening.mean(places[0], widths[0], places[1], widths[1])
 
@@ -899,7 +915,7 @@ class Bench:
         return last, through
 
     def asked(self, frame: Array, points: int = 4096, seed: int = 0) -> tuple[Array, Array, float]:
-        """The lowest and highest index (k, l) of a frame that rays within the grid of views ask for, and their share.
+        """The lowest and highest index (k, l) of a frame that rays within the views ask for, and their share.
 
         Args:
             frame: 5×5 of the light field at z = 0.
