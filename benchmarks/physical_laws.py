@@ -5,8 +5,8 @@
     python benchmarks/physical_laws.py --kind "one mask" --seed 5 --cameras 1   # one camera again, with words
 
 Cameras, laws and the tracer are those of tests/physics (`random_cameras.py`, `laws.py`, `random_tracer.py`), of
-which a part runs in the tests. The laws are held on pictures of about 16 pixels a side, brute force on 32 (20 where
-rays are traced). All by default options, but for 256 rays a pixel where brute force is held against rays.
+which a part runs in the tests. The laws are held on pictures of about 16 pixels a side, brute force on 32 (20
+where rays are traced). All by default options, but for 256 rays a pixel where brute force is held against rays.
 """
 
 from __future__ import annotations

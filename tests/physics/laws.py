@@ -552,8 +552,8 @@ def rays_are_footprints(case: Case) -> Iterator[Check]:
 
     A look-up that is linear along an axis of samples passes sinc² of a cosine's cycles a sample, and where samples
     are means over pixels sinc once more along s and t. Between views it goes along the parallax of the middle
-    depth, and what is left of the cycles is what other depths have. Footprints take as much or less. So each cosine
-    may differ by its amplitude times 1 − Π sinc, and the picture by the root mean square of them all.
+    depth, and what is left of the cycles is what other depths have. Footprints take as much or less. So each
+    cosine may differ by its amplitude times 1 − Π sinc, and the picture by the root mean square of them all.
     """
     by_footprints = _taken(case, "footprints")
     if by_footprints is None:

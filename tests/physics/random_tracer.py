@@ -6,7 +6,7 @@ written out here by hand. A pixel's value is the mean over its sensitive area of
     I(x) = ∫∫ L(ray from aperture point a to sensor point x) · ∏ transmissions  ds dt,   ds dt = J da db
 
 over the aperture of the smallest solid angle, a stop or the grid of views as a rectangle; J is the same for all
-rays where optics are affine. Scenes are sums of plane waves in ray space, so that their means are known in closed form.
+rays where optics are affine. Scenes are sums of plane waves in ray space: their means are known in closed form.
 
 `Bench.by_means` is for affine optics along both axes. Pixel and aperture are cut into strips, and what a strip
 of both sees of each wave and of each mask along an axis is taken as its *exact mean* (a mask's edge is met by a
@@ -29,7 +29,7 @@ from scipy.stats import qmc
 
 Array = NDArray[np.float64]
 Widths = tuple[float, float]
-"""Lengths of two boxes: their convolution is what a strip of pixel and aperture throws on a plane along an axis."""
+"""Lengths of two boxes: convolved, they are what a strip of pixel and aperture throws on a plane along an axis."""
 
 
 MOST_STRIPS = 256
@@ -748,7 +748,7 @@ class Bench:
     # -- aiming
 
     def _back_to(self) -> list[tuple[Array, list[tuple[Array, tuple[float, float]]]]]:
-        """For each sheet: rays at the sensor to rays just behind it, unbent, and what each bend behind it moves."""
+        """For each sheet: rays at the sensor to rays just behind it, unbent, and what bends behind it move."""
         found: list[tuple[Array, list[tuple[Array, tuple[float, float]]]]] = []
         back, bent = _undone(self.to_sensor), []
         for sheet in reversed(self.sheets):
