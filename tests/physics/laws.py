@@ -101,7 +101,7 @@ def default(case: Case) -> Shot:
 
 def brute_force(case: Case) -> Iterator[Check]:
     """The picture by default options against rays integrated in float64."""
-    wanted = 10 ** (-(TARGETS[case.kind] + 10) / 20)
+    wanted = 10 ** (-(TARGETS[case.kind] + 15) / 20)
     truth, doubt = case.bench.by_means(case.scene, wanted) if case.bench.affine else case.bench.by_rays(case.scene)
     options = {"samples": RAYS} if case.kind in BENT else {}
     shot = capture(case.camera, case.light_field, **options)

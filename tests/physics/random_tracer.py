@@ -142,7 +142,7 @@ def _running_share(x: Array, widths: Widths) -> Array:
 
 
 class Opening:
-    """What lets light through: at points, or its mean over a strip (trapezia along x and y).
+    """What lets light through: at points, or its mean over strips (trapezia along x and y).
 
     ``bounds`` are (x, y, half width, half height) outside which all is dark, None where nothing bounds it.
     """
@@ -152,9 +152,17 @@ class Opening:
     def at(self, x: Array, y: Array) -> Array:
         raise NotImplementedError
 
+    def along(self, axis: int, places: Array, widths: Widths) -> Array | None:
+        """For places along x (0) or y (1), (n, terms): means are sums over the terms of products of both.
+
+        None where x and y do not part.
+        """
+        return None
+
     def mean(self, x: Array, across: Widths, y: Array, down: Widths) -> Array:
         """For places x (n,) and y (m,): (m, n)."""
-        return self.at(x[None, :], y[:, None])
+        over, under = self.along(0, x, across), self.along(1, y, down)
+        return self.at(x[None, :], y[:, None]) if over is None or under is None else under @ over.T
 
 
 @dataclass
@@ -229,11 +237,11 @@ class Table(Opening):
         inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
         return np.where(inside, self.values[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)], 0.0)
 
-    def mean(self, x: Array, across: Widths, y: Array, down: Widths) -> Array:
+    def along(self, axis: int, places: Array, widths: Widths) -> Array:
         rows, columns = self.values.shape
-        over = self._shares(x - self.x, self.width, columns, across)
-        under = self._shares(y - self.y, self.height, rows, down)
-        return np.asarray(under @ self.values @ over.T)
+        if axis == 0:
+            return self._shares(places - self.x, self.width, columns, widths)
+        return np.asarray(self._shares(places - self.y, self.height, rows, widths) @ self.values)
 
     @staticmethod
     def _shares(places: Array, size: float, cells: int, widths: Widths) -> Array:
@@ -263,12 +271,8 @@ class Cosines(Opening):
     def at(self, x: Array, y: Array) -> Array:
         return self._axis(x - self.x, self.periods[0], (0, 0)) * self._axis(y - self.y, self.periods[1], (0, 0))
 
-    def mean(self, x: Array, across: Widths, y: Array, down: Widths) -> Array:
-        over, under = (
-            self._axis(x - self.x, self.periods[0], across),
-            self._axis(y - self.y, self.periods[1], down),
-        )
-        return np.asarray(under[:, None] * over)
+    def along(self, axis: int, places: Array, widths: Widths) -> Array:
+        return self._axis(places - (self.x, self.y)[axis], self.periods[axis], widths)[:, None]
 
 
 @dataclass
@@ -831,28 +835,33 @@ class Bench:
         masks = [(opening, maps[n]) for n, sheet in enumerate(self.sheets) for opening in sheet.openings]
         (xs, px, ax, sx, wx, ex), (ys, py, ay, sy, wy, ey) = axes
 
-        def share(opening: Opening, ray: Array, x: float, y: float) -> Array:
-            places = (
-                ray[0, 0] * (x + px) + ray[0, 2] * ax + ray[0, 4],
-                ray[1, 1] * (y + py) + ray[1, 3] * ay + ray[1, 4],
-            )
-            widths = (ray[0, 0] * sx, ray[0, 2] * wx), (ray[1, 1] * sy, ray[1, 3] * wy)
-            return opening.mean(places[0], widths[0], places[1], widths[1])
+        def strips_of(ray: Array, axis: int, place: float) -> tuple[Array, Widths]:
+            (p, a, side, size) = (px, ax, sx, wx) if axis == 0 else (py, ay, sy, wy)
+            places = ray[axis, axis] * (place + p) + ray[axis, 2 + axis] * a + ray[axis, 4]
+            return places, (ray[axis, axis] * side, ray[axis, 2 + axis] * size)
 
-        fixed, moving = np.ones((py.size, px.size)), []
+        # What does not move with the pixel, what parts into x and y, and the rest.
+        fixed, parting, moving = np.ones((py.size, px.size)), [], []
         for opening, ray in masks:
             if np.abs(ray[:2, :2]).max() < 1e-12 * np.abs(ray[:2, 2:4]).max():
-                fixed = fixed * share(opening, ray, 0.0, 0.0)
-            else:
+                fixed = fixed * opening.mean(*strips_of(ray, 0, 0.0), *strips_of(ray, 1, 0.0))
+                continue
+            over = [opening.along(0, *strips_of(ray, 0, x)) for x in xs]
+            under = [opening.along(1, *strips_of(ray, 1, y)) for y in ys]
+            if over[0] is None:
                 moving.append((opening, ray))
+            else:
+                parting.append(([each.T.copy() for each in over], under))
         total = np.zeros((len(ys), len(xs)))
         right = np.concatenate([ex.real, ex.imag], axis=1)
         for row, y in enumerate(ys):
             down = np.concatenate([ey[row].real, -ey[row].imag])
             for column, x in enumerate(xs):
                 light = fixed * (down.T @ right[column])
+                for over, under in parting:
+                    light *= under[row] @ over[column]
                 for opening, ray in moving:
-                    light *= share(opening, ray, x, y)
+                    light *= opening.mean(*strips_of(ray, 0, x), *strips_of(ray, 1, y))
                 total[row, column] = light.sum()
         return total * wx * wy * aim.density / parts**2
 

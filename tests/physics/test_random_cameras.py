@@ -70,12 +70,12 @@ def test_a_scene_as_waves_is_the_scene_as_planes():
 
 def test_means_over_cells_are_those_of_many_points():
     table = Table(0.1, -0.2, np.random.default_rng(1).random((5, 4)), 2.0, 3.0)
-    box = (np.arange(400) + 0.5) / 400 - 0.5
-    across = (0.7 * box[:, None] + 0.2 * box).ravel()
+    box = (np.arange(200) + 0.5) / 200 - 0.5
+    across = (0.7 * box[::2, None] + 0.2 * box[::5]).ravel()
     x, y = np.array([-0.9, 0.05, 0.8]), np.array([0.3])
     points = [table.at(place + across[:, None], 0.3 + 0.5 * box).mean() for place in x]
-    # A point stands for 1/400 of an edge's width, and there are few edges.
-    np.testing.assert_allclose(table.mean(x, (0.7, 0.2), y, (0.5, 0.0))[0], points, atol=5e-3)
+    # A point stands for 1/200 of an edge's width or less, and there are few edges.
+    np.testing.assert_allclose(table.mean(x, (0.7, 0.2), y, (0.5, 0.0))[0], points, atol=1e-2)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -101,9 +101,9 @@ def test_stores_hold_what_memory_does(kind):
 
 @pytest.mark.parametrize("kind", AFFINE)
 def test_footprints_meet_brute_force(kind):
-    held([check for seed in (0, 1) for check in brute_force(drawn(kind, seed, 20))])
+    held([check for seed in (0, 1) for check in brute_force(drawn(kind, seed, 14))])
 
 
 @pytest.mark.parametrize("kind", BENT)
 def test_rays_meet_brute_force_within_what_they_state(kind):
-    held(list(brute_force(drawn(kind, 0, 14))))
+    held(list(brute_force(drawn(kind, 0, 10))))
