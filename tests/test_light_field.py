@@ -11,6 +11,7 @@ import torch
 
 import vcc
 from vcc import Affine, LightField
+from vcc.kernels import Gaussian
 from vcc.light_field import describe_geometry
 from vcc.units import mm
 
@@ -141,6 +142,49 @@ def test_repr_says_shape_type_and_geometry():
     text = repr(LightField.from_views(samples(), 1 * mm, 1e-3, 0.5))
     for part in ("3×4×5×6", "float32", "1 mm", "0.001", "500 mm"):
         assert part in text
+
+
+MASK = vcc.Mask(pattern=np.ones((2, 2)), width=1.0)
+
+
+@pytest.mark.parametrize("sample", ["mean", "point"])
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda lf: lf,
+        lambda lf: lf[1:, ::-1, 1:4, ::2],
+        lambda lf: lf[::2, ::2],
+        lambda lf: lf.scaled(0.5),
+        lambda lf: lf.transformed(Affine.lens(0.05)),
+        lambda lf: lf.masked(MASK),
+        lambda lf: lf.scattered(vcc.Diffuser(Gaussian(1e-3))),
+        lambda lf: lf.resampled(lf.frame, (2, 2, 2, 2)),
+        lambda lf: lf.replaced(samples()),
+        lambda lf: vcc.Camera([vcc.Lens(0.05), MASK], vcc.Sensor(0.05, (4, 4), 1e-5)).light_field_at(lf, 0.02),
+    ],
+)
+def test_what_samples_are_is_kept(sample, made):
+    lf = LightField.from_views(samples(), 1 * mm, 1e-3, sample=sample)
+    assert made(lf).sample == sample
+
+
+def test_means_of_which_most_are_left_out_are_points():
+    """Sinc's loss is (πwf)²/6: of a cell 2 wide, samples that are means over 1 took 1/4 of what its mean takes."""
+    assert field()[..., ::2, ::-2].sample == "point"
+    assert field()[..., ::2, :].sample == field()[..., ::2].sample == "mean"
+
+
+def test_samples_are_means_or_points():
+    with pytest.raises(vcc.InputError, match=r"'mean' .* or 'point', not 'cell'"):
+        LightField(samples(), FRAME, sample="cell")
+
+
+@pytest.mark.parametrize(("sample", "words"), [("mean", "means over pixels"), ("point", "values at points")])
+def test_what_samples_are_is_said(sample, words):
+    lf = LightField.from_views(samples(), 1 * mm, 1e-3, disparity_range=(0, 0), sample=sample)
+    assert words in repr(lf)
+    camera = vcc.Camera([vcc.Lens(0.05)], vcc.Sensor(0.05, (4, 4), 5e-5))
+    assert words in " ".join(camera.explain(lf).split())
 
 
 def test_operators_refuse_more_memory_than_allowed_and_say_how_much():

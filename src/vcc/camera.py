@@ -286,7 +286,8 @@ class Camera:
 
         Warns:
             ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
-                tolerance was not reached, or the cells of an array are smaller than a pixel.
+                tolerance was not reached, the cells of an array are smaller than a pixel, or the picture is 0
+                everywhere although the light field is not dark (by footprints, and no mask closes the camera).
 
         Raises:
             InputError: an option that does not exist or does not go with the method, an element that returns
@@ -298,6 +299,7 @@ class Camera:
         from vcc.engines import record
         from vcc.errors import ResultWarning
         from vcc.image import Image
+        from vcc.plan.darkness import why_dark
 
         plan = self.compile(
             light_field,
@@ -319,7 +321,17 @@ class Camera:
             recorded = record_pieces(
                 plan, light_field, engine=engine, tolerance=tolerance, memory_limit=memory_limit, progress=progress
             )
-        if recorded.missing_rays > 0.01:
+        dark = why_dark(
+            plan,
+            light_field,
+            recorded.values,
+            recorded.rays,
+            recorded.missing_rays,
+            recorded.missing_reason,
+        )
+        if dark is not None:
+            warnings.warn(dark, ResultWarning, stacklevel=2)
+        elif recorded.missing_rays > 0.01:
             warnings.warn(
                 f"{recorded.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
                 f"({recorded.missing_reason}); the picture is darker there",

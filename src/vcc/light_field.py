@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 Sample = Literal["mean", "point"]
 """What a sample says of the scene: its mean over the cell of a pixel, or its value in the middle of the cell."""
 
+SAMPLES_IN_WORDS: dict[Sample, str] = {"mean": "means over pixels", "point": "values at points"}
+"""What samples are, for people."""
+
 
 class DisparityRange:
     """The disparities that a light field shows, measured when first asked for and then kept.
@@ -193,11 +196,17 @@ class LightField:
         return total * self.sample_volume / (self.channels or 1)
 
     def __getitem__(self, index: Index | tuple[Index, ...]) -> LightField:
-        """A piece of the light field, in its place: slices along (v, u, t, s[, channel])."""
+        """A piece of the light field, in its place: slices along (v, u, t, s[, channel]).
+
+        Where only every second pixel (or fewer) is kept along s and along t, means become ``"point"``: of a cell
+        n pixels wide each sample covers 1/n, and what that took from sharpness is 1/n² of what a mean over the
+        cell takes.
+        """
         values, frame, steps = sliced(self.values, self.frame, index, LIGHT_FIELD_AXES, "a light field")
         rows, columns = self.whole_views
         return replace(
             self._with(values, frame, steps[0] / steps[2]),
+            sample="point" if min(abs(steps[2]), abs(steps[3])) > 1 else self.sample,
             _whole_views=(rows / abs(steps[1]), columns / abs(steps[0])),
         )
 
@@ -297,7 +306,7 @@ class LightField:
         """The light field interpolated on another grid, zero where this one holds nothing.
 
         This is what the paper does after every element (section 4.2, "the resolution issue"); it loses
-        detail, which a frame does not.
+        detail, which a frame does not. What samples are stays: means are means over cells as large as they were.
 
         Args:
             frame: 5×5, from the new grid's indices to rays at this plane.
@@ -386,7 +395,8 @@ class LightField:
 
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))
-        return f"LightField({sizes} {to_dtype(self.values)}, {describe_geometry(self)})"
+        samples = f"{to_dtype(self.values)} {SAMPLES_IN_WORDS[self.sample]}"
+        return f"LightField({sizes} {samples}, {describe_geometry(self)})"
 
 
 def describe_geometry(light_field: LightField) -> str:

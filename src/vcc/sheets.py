@@ -16,7 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.errors import InputError
-from vcc.patterns import RASTER_LIMIT, RASTER_PER_CELL, Bounded, Cells, FunctionPattern, Open, Pattern
+from vcc.patterns import (
+    RASTER_LIMIT,
+    RASTER_PER_CELL,
+    Bounded,
+    Cells,
+    Circle,
+    FunctionPattern,
+    Open,
+    Pattern,
+)
 
 Array = NDArray[np.float64]
 
@@ -268,6 +277,27 @@ def _raster_points(extent: float, cell: float) -> int | None:
         return None
     across = min(RASTER_PER_CELL, RASTER_LIMIT * cell / extent)
     return math.ceil(extent / cell * across) if across >= FEWEST_PER_CELL else None
+
+
+def clear_over(pattern: Pattern, low: Array, high: Array) -> bool:
+    """Whether a pattern lets all light pass in a rectangle, as far as that can be told from what it is.
+
+    Args:
+        pattern: any.
+        low: (x, y) of the rectangle's corner, metres from the pattern's middle.
+        high: (x, y) of the opposite corner.
+    """
+    for part in _parts([pattern], (0.0, 0.0)):
+        if isinstance(part, Circle):
+            if np.hypot(*np.maximum(np.abs(low), np.abs(high))) > part.diameter / 2:
+                return False
+        elif isinstance(part, Tiles):
+            inside = part.columns[0] <= low[0] and high[0] <= part.columns[-1]
+            if not (inside and part.rows[0] <= low[1] and high[1] <= part.rows[-1] and (part.values == 1).all()):
+                return False
+        else:
+            return False
+    return True
 
 
 def in_one_plane(patterns: list[tuple[Pattern, tuple[float, float]]]) -> Pattern:

@@ -6,6 +6,7 @@ exp(−πn/4), 7e-7 for the smallest n here, 18. Cut ends and aliases add up to 
 about 1e-6 of the largest value: 1e-5 is asked for.
 """
 
+import dataclasses
 import re
 
 import numpy as np
@@ -187,9 +188,11 @@ def test_the_slice_has_channels_and_refuses_frames_that_mix_x_and_y():
 def test_there_and_back(dtype):
     rng = np.random.default_rng(1)
     samples = rng.integers(0, 256, (3, 4, 9, 8, 2)).astype(dtype)
-    light_field = vcc.LightField.from_views(samples, 1 * mm, 2e-3)
+    light_field = vcc.LightField.from_views(samples, 1 * mm, 2e-3, sample="point")
     back = ifft4(fft4(light_field))
     assert back.frame == light_field.frame
+    assert back.sample == ifft4(fft4(light_field).transformed(vcc.Affine.lens(0.05))).sample == "point"
+    assert ifft4(fft4(dataclasses.replace(light_field, sample="mean"))).sample == "mean"
     # Single precision: rounding of 2⁻²⁴ in about four levels of butterflies on each of eight ways.
     np.testing.assert_allclose(back.values, samples / light_field.full_scale, atol=1e-6 * samples.max())
 

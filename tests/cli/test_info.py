@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import imagecodecs
 import numpy as np
@@ -47,6 +48,7 @@ def test_geometry_disparities_and_brightness(folder, light_field):
     assert lines["format"] == "HCI 4D light-field benchmark"
     assert lines["views"] == "3 × 4 (rows × columns)"
     assert lines["pictures"] == "28 × 24 pixels, 3 channels, 16-bit"
+    assert lines["samples"] == "means over pixels"
     assert lines["spacing"] == "4 mm"
     # tan of half the field of view: 14 pixels of 0.002 are 1.6°, 12 are 1.37°
     assert lines["slope per pixel"] == "0.002, a field of view of 3.21° × 2.75°"
@@ -173,6 +175,9 @@ def test_a_store(tmp_path, light_field):
     assert "in linear light" in lines["brightness"]
     assert (tmp_path / "grid.png").stat().st_size > 1000
     assert "brightness" not in said(tmp_path / "a.zarr", "--quick")
+    assert lines["samples"] == "means over pixels"
+    save_light_field(replace(light_field, sample="point"), tmp_path / "b.zarr")
+    assert said(tmp_path / "b.zarr", "--quick")["samples"] == "values at points"
 
 
 def test_a_raw_recording(tmp_path):

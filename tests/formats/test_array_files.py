@@ -18,7 +18,9 @@ def samples():
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float16, np.float32, np.float64])
 def test_own_file_keeps_everything(tmp_path, samples, kind):
     values = (samples % 251).astype(kind)
-    views = LightField.from_views(values, (1e-3, 2e-3), (0.01, 0.02), 1.5, disparity_range=(-1.0, 2.0))
+    views = LightField.from_views(
+        values, (1e-3, 2e-3), (0.01, 0.02), 1.5, disparity_range=(-1.0, 2.0), sample="point"
+    )
     piece = views[:, ::-1, 1:]
     light_field = replace(piece, frame=Affine.propagation(0.02) @ piece.frame)  # no camera array has it
     path = tmp_path / "Kiste 1.npz"
@@ -30,6 +32,15 @@ def test_own_file_keeps_everything(tmp_path, samples, kind):
     assert back.frame == light_field.frame
     assert back.transfer == "linear"
     assert back.geometry.disparity_range == light_field.measured_disparity_range()
+    assert back.geometry.sample == "point"
+
+
+def test_arrays_that_do_not_say_what_samples_are_hold_means(tmp_path, samples):
+    np.savez(tmp_path / "a.npz", values=samples)
+    assert arrays.read(tmp_path / "a.npz").geometry.sample == "mean"
+    np.savez(tmp_path / "a.npz", values=samples, sample=np.array("cell"))
+    with pytest.raises(InputError, match='"sample" is \'cell\'; "mean" and "point" are known'):
+        arrays.read(tmp_path / "a.npz")
 
 
 def test_npy(tmp_path, samples):

@@ -107,18 +107,19 @@ def test_without_intrinsics_the_cameras_are_unknown(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])
-@pytest.mark.parametrize("channels", [None, 1, 3, 4])
-def test_written_and_read_back_is_the_same(kind: type, channels: int | None, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("channels", "sample"), [(None, "point"), (1, "mean"), (3, "point"), (4, "mean")])
+def test_written_and_read_back_is_the_same(kind: type, channels: int | None, sample: Any, tmp_path: Path) -> None:
     shape = (2, 3, 4, 5) if channels is None else (2, 3, 4, 5, channels)
     values = (np.random.default_rng(1).random(shape) * (1 if kind is np.float32 else 200)).astype(kind)
     frame = Affine(np.diag([1e-3, 2e-3, -3e-3, -4e-3, 1])) @ Affine.translation(-1, -0.5, -2, -1.5)
-    field = LightField(values, frame, (-0.5, 1.5))
+    field = LightField(values, frame, (-0.5, 1.5), sample)
     lftoolbox.save(field, tmp_path / "ä b.mat")
     back = open_light_field(tmp_path / "ä b.mat")
     assert back.values.dtype == kind
     np.testing.assert_array_equal(back.values, values)
     np.testing.assert_allclose(back.frame.matrix, frame.matrix, rtol=1e-15, atol=1e-18)
     assert back.disparity_range == (-0.5, 1.5)
+    assert back.sample == sample
 
 
 def test_written_as_matlab_writes(tmp_path: Path) -> None:

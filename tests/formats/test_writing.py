@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from vcc import Affine, InputError, LightField, ResultWarning, open_light_field
-from vcc.formats import transfer
+from vcc.formats import read_geometry, transfer
 from vcc.formats.writing import save_folder, save_light_field
 
 RNG = np.random.default_rng(1)
@@ -61,6 +61,28 @@ def test_folders(tmp_path, kind, bits, channels):
     assert same_frame(back, light_field)
     assert back.disparity_range == (-0.5, 2.25)
     assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("sample", ["mean", "point"])
+def test_folders_say_what_samples_are(tmp_path, sample):
+    """In an entry of ours, and only where the samples are no means: other folders stay as HCI has them."""
+    path = tmp_path / "a"
+    save_light_field(field_of(sample=sample), path)
+    assert ("sample" in (path / "parameters.cfg").read_text()) == (sample == "point")
+    assert reopened(path).sample == read_geometry(path).sample == sample
+    (path / "parameters.cfg").write_text((path / "parameters.cfg").read_text() + "sample = cell\n")
+    with pytest.raises(InputError, match='sample is "cell"; "mean" and "point" are known'):
+        reopened(path)
+
+
+def test_what_cannot_say_that_samples_are_points_warns(tmp_path):
+    with pytest.warns(ResultWarning, match=r"a.png: .* values at points, and they are read back as means"):
+        save_light_field(field_of(sample="point"), tmp_path / "a.png")
+    oblong = field_of(sample="point", spacing=(1e-3, 2e-3))
+    with pytest.warns(
+        ResultWarning, match=r"cannot hold its cameras.* values at points, and they are read back as means"
+    ):
+        save_light_field(oblong, tmp_path / "views", kind="views")
 
 
 def test_the_files_are_as_hci_has_them(tmp_path):

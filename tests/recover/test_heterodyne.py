@@ -126,6 +126,7 @@ def test_the_frame_is_the_cameras():
     decoded = decode_heterodyne(recorded(camera_with(2, 12), scene(12, 2)), camera_with(2, 12))
     expected = vcc.LightField.from_views(np.ones((5, 5, 12, 12)), STOP / 5, SIZE / 12 / D, FOCUS)
     assert decoded.frame.isclose(expected.frame)
+    assert decoded.sample == "point"
 
 
 def test_colours_are_decoded_each_by_itself():

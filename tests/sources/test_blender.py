@@ -65,6 +65,9 @@ class Blender:
         class Render(SimpleNamespace):
             engine = Choice("CYCLES", eevee, "BLENDER_WORKBENCH")
 
+        class Cycles(SimpleNamespace):
+            pixel_filter_type = Choice("BLACKMAN_HARRIS", "GAUSSIAN", "BOX")
+
         class Images(SimpleNamespace):
             file_format = Choice("PNG", "OPEN_EXR", "FFMPEG")
             color_depth = Choice("8", "16")
@@ -97,7 +100,7 @@ class Blender:
             timeline_markers=[SimpleNamespace(camera=base)],
             camera=base,
             render=self.render,
-            cycles=SimpleNamespace(samples=1, seed=0),
+            cycles=Cycles(samples=1, seed=0),
             eevee=SimpleNamespace(taa_render_samples=1),
             display_settings=Display(),
             view_settings=View(use_curve_mapping=True),
@@ -153,6 +156,14 @@ def pixel_in_blender(seen, point, size, unit):
     column = (across - seen.shift_x + 0.5) * columns - 0.5
     row = rows / 2 - (up - seen.shift_y) * columns - 0.5
     return row, column
+
+
+@pytest.mark.parametrize("engine", ["cycles", "eevee"])
+def test_pixels_of_cycles_are_means(engine, tmp_path, monkeypatch):
+    """EEVEE has no such filter."""
+    blender = Blender((4, 5, 0), tmp_path)
+    blender.run(blender_script(ARRAY, engine=engine), monkeypatch)
+    assert blender.scene.cycles.pixel_filter_type == ("BOX" if engine == "cycles" else "BLACKMAN_HARRIS")
 
 
 @pytest.mark.parametrize("version", [(3, 6, 0), (4, 1, 0), (4, 2, 3), (4, 5, 0), (5, 0, 0), (5, 1, 0)])

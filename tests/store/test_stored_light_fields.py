@@ -64,6 +64,24 @@ def test_samples_and_frame_come_back_bit_for_bit(tmp_path, kind, channels):
     assert read.disparity_range == stored.disparity_range == (-0.25, 1 / 3)
     assert stored.complete
     assert stored.transfer == "linear"
+    assert stored.sample == "mean"
+
+
+@pytest.mark.parametrize("sample", ["mean", "point"])
+def test_what_samples_are_comes_back(tmp_path, sample):
+    stored = save_store(light_field(sample=sample), tmp_path / "a.zarr")
+    parts = [stored, stored.outline, stored.read(), stored[1:, :2, 3:], stored.scaled(2), open_store(stored.path)]
+    parts.append(convert(stored, tmp_path / "b.zarr", dtype="float16"))
+    parts.append(convert(stored.read(), tmp_path / "c.zarr"))
+    assert {part.sample for part in parts} == {sample}
+    assert {"mean": "means over pixels", "point": "values at points"}[sample] in repr(stored)
+
+
+def test_a_store_that_states_something_else_of_its_samples_is_refused(stored):
+    group = zarr.open_group(stored.path, mode="r+")
+    group.attrs["light_field"] = group.attrs["light_field"] | {"sample": "cell"}
+    with pytest.raises(vcc.InputError, match='sample is "mean" or "point", not \'cell\''):
+        open_store(stored.path)
 
 
 @pytest.mark.parametrize(
@@ -136,6 +154,7 @@ def test_a_store_that_another_program_writes(tmp_path):
     values = light_field("uint16", ()).values
     group.create_array("samples", data=values, chunks=(1, 1, 10, 12))
     np.testing.assert_array_equal(open_store(tmp_path / "a.zarr").read().values, values)
+    assert open_store(tmp_path / "a.zarr").sample == "mean"
 
 
 def test_disparities_are_measured_as_in_memory(tmp_path):

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.affine import Affine
 from vcc.analysis.plane_spectrum import PlaneSpectrum, transformed_along
 from vcc.errors import InputError
-from vcc.light_field import LightField
+from vcc.light_field import LightField, Sample
 from vcc.memory import check_samples
 from vcc.sampled import LIGHT_FIELD_AXES, to_numpy
 
@@ -47,10 +47,12 @@ class Spectrum:
             middle (index n // 2 of each axis); radiance × m² (slopes have no unit). Their phases are about the
             ray `origin`.
         light_field_frame: the frame of the transformed light field, 5×5.
+        sample: what the transformed samples are, means or points; see `vcc.LightField`.
     """
 
     values: NDArray[np.complex64]
     light_field_frame: Affine
+    sample: Sample = "mean"
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -106,7 +108,7 @@ class Spectrum:
         """
         factor = abs(affine.determinant)
         values = self.values if abs(factor - 1) < 1e-12 else self.values * np.float32(factor)
-        return Spectrum(values, affine @ self.light_field_frame)
+        return Spectrum(values, affine @ self.light_field_frame, self.sample)
 
     def sensor_slice(self) -> PlaneSpectrum:
         """The spectrum of ∫∫ L ds dt at this plane, the picture on a sensor there: F(fx, fy, 0, 0).
@@ -239,7 +241,7 @@ def fft4(
     for axis in range(4):
         transformed_along(values, axis)
     values *= np.float32(scale)
-    return Spectrum(values, light_field.frame)
+    return Spectrum(values, light_field.frame, light_field.sample)
 
 
 def ifft4(spectrum: Spectrum, *, memory_limit: int | None = None) -> LightField:
@@ -250,7 +252,7 @@ def ifft4(spectrum: Spectrum, *, memory_limit: int | None = None) -> LightField:
         memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
 
     Returns:
-        Float32 samples on the frame `spectrum.light_field_frame`.
+        Float32 samples on the frame `spectrum.light_field_frame`, means or points as `spectrum.sample` says.
 
     Raises:
         InputError: samples that are not real or not positive by more than rounding (a filtered spectrum may be
@@ -265,7 +267,7 @@ def ifft4(spectrum: Spectrum, *, memory_limit: int | None = None) -> LightField:
             f"{largest:g}), which radiance is not: take the numbers from vcc.analysis.samples_of(spectrum), and "
             "clip or shift them"
         )
-    return LightField(np.maximum(samples, 0), spectrum.light_field_frame)
+    return LightField(np.maximum(samples, 0), spectrum.light_field_frame, sample=spectrum.sample)
 
 
 def samples_of(spectrum: Spectrum, *, memory_limit: int | None = None) -> NDArray[np.float32]:

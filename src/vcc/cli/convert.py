@@ -132,7 +132,7 @@ def store_facts(path: Path, quick: bool) -> str:
     Raises:
         InputError: what `vcc.store.open_store` refuses.
     """
-    from vcc.light_field import describe_geometry
+    from vcc.light_field import SAMPLES_IN_WORDS, describe_geometry
     from vcc.store import open_store
     from vcc.units import short
 
@@ -147,6 +147,7 @@ def store_facts(path: Path, quick: bool) -> str:
         "views": f"{nv} × {nu} (rows × columns)" + (f", {len(missing)} missing" if missing else ""),
         "state": "complete" if stored.complete else "not finished",
         "pictures": f"{ns} × {nt} pixels, {colour}{names}, {stored.dtype} {stored.transfer}",
+        "samples": SAMPLES_IN_WORDS[stored.sample],
         "size": f"{packed / 1e6:,.1f} MB on disk, {stored.view_bytes * nv * nu / 1e6:,.1f} MB in memory, linear",
         "cameras": describe_geometry(stored.outline),
     }

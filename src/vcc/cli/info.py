@@ -139,6 +139,7 @@ def _describe_store(path: Path, quick: bool, picture: Path | None) -> str:
 
 def _facts(facts: FolderInfo) -> dict[str, str]:
     """What the folder or file states and what is taken for granted, line by line."""
+    from vcc.light_field import SAMPLES_IN_WORDS
     from vcc.units import short
 
     def assumed(name: str) -> str:
@@ -158,6 +159,7 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         "format": facts.format,
         "views": f"{facts.rows} × {facts.columns} (rows × columns)",
         "pictures": f"{facts.width} × {facts.height} pixels, {colour}, {kind}",
+        "samples": SAMPLES_IN_WORDS[facts.sample],
         "size": f"{samples * facts.bits // 8 / 1e6:,.1f} MB in memory as stored, "
         f"{samples * 4 / 1e6:,.1f} MB as linear light",
         "spacing": apart + assumed("spacing"),

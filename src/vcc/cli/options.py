@@ -102,8 +102,11 @@ RaySeed = Annotated[
     ),
 ]
 Interpolation = Annotated[
-    Literal["nearest", "linear", "cubic"],
-    typer.Option(help="Interpolation within a view.", rich_help_panel=_CAPTURING),
+    Literal["sharp", "nearest", "linear", "cubic"],
+    typer.Option(
+        help="Interpolation within a view; sharp is linear with what that costs given back.",
+        rich_help_panel=_CAPTURING,
+    ),
 ]
 BetweenViews = Annotated[
     Literal["auto", "none"],

@@ -73,7 +73,7 @@ def refocus(
         ),
     ] = "auto",
     frames_per_second: Annotated[float, typer.Option(metavar="NUMBER", help="Of a film.")] = 8.0,
-    interpolation: given.Interpolation = "cubic",
+    interpolation: given.Interpolation = "sharp",
     between_views: given.BetweenViews = "auto",
     memory_limit: Annotated[
         str | None,

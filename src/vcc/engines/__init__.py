@@ -72,7 +72,7 @@ def record(
     traced = rays.run(plan, values, chosen(engine, values), tolerance, progress)
     return Recorded(
         traced.values,
-        traced.missing_rays,
+        traced.missing_rays if plan.missing_rays is None else plan.missing_rays,
         "they fall outside the grid of views or outside the views' pictures",
         traced.sampling_error,
         traced.rays,

@@ -1,13 +1,15 @@
 """The fast engine: the plan's sum in compiled loops over contiguous rows, on two or more CPU threads.
 
-All views of one column are first summed row by row in the columns of the samples, where memory is
-contiguous and every byte is converted where it is used; then the sum is resampled across once per column of
-views instead of once per view. Threads take bands of the picture's rows, so none waits for another and the
-result does not depend on how many there are. No 4-D intermediate is made: memory is a few bands of rows.
+All views of one column are first summed row by row in the columns of the samples, where memory is contiguous and
+every sample is converted once for four rows of the picture; then the sum is resampled across, eight rows side by
+side, once per column of views instead of once per view. Threads take bands of the picture's rows, so none waits
+for another and the result does not depend on how many there are. No 4-D intermediate is made: memory is a few
+bands of rows.
 """
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -19,70 +21,106 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.engines import numba_kernels as kernels
-from vcc.engines.smear import finish
+from vcc.engines.smear import LONG, finish, finishing_terms
+from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
 from vcc.plan.footprint import REACH, Division, taps
 from vcc.plan.model import Plan
 
 Progress = Callable[[int, int], None]
 
-BAND = 32
-"""Rows of the picture that a thread works on at once: their sums stay in the second-level cache."""
-MASKED_BAND = 64
-"""Likewise with masks: more rows, so that rows weighted for the band's ends are seldom made twice."""
+BAND = 64
+"""Rows of the picture that a thread works on at once, at most."""
+BAND_BYTES = 3 * 2**17
+"""Their sums stay in the second-level cache."""
+MASK_LINES = 64
+"""Lines of a mask that a thread samples at once."""
 
 
 def run(plan: Plan, values: NDArray[Any], progress: Progress | None = None) -> NDArray[Any]:
     """The picture of samples (v, u, t, s[, channels]) by a plan, float32; see `vcc.engines.run_plan`."""
     channels = values.shape[4] if values.ndim == 5 else 1
-    rows, columns = plan.raster_shape
-    raster = np.zeros((rows, columns, channels), dtype=np.float32)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        alike = all(np.ptp(m.column, axis=0).max() < 1e-6 > np.ptp(m.row, axis=1).max() for m in plan.masks)
-        if plan.separable and alike:
-            separable = _Separable(plan, channels)
-            separable.add(values, raster.reshape(rows, -1), pool, progress)
-            if separable.mirrored:
-                raster = raster[:, ::-1]
+        if plan.separable:
+            raster = _ByColumns(plan, channels, pool).raster(values, progress)
         else:
-            _add_sheared(plan, values, raster, pool, progress)
-    picture = finish(plan, raster)
+            raster = _sheared(plan, values, channels, pool, progress)
+        picture = _finished(plan, raster, channels, pool)
     return picture if values.ndim == 5 else picture[..., 0]
+
+
+def memory(plan: Plan, channels: int) -> int:
+    """Bytes that a run takes beside the light field and the picture, estimated."""
+    line = 4 * channels * plan.samples[1] * plan.refine
+    raster = 4 * channels * math.prod(plan.raster_shape)
+    band = _band(line)
+    # A band's sums, eight of them turned, and the rows of a view where its samples are divided.
+    thread = (band + EIGHT + (2 * band if plan.refine > 1 else 0)) * line
+    masks = sum(mask.texture.nbytes + len(mask.texture) * line for mask in plan.masks)
+    return (os.cpu_count() or 1) * thread + 2 * raster + masks
+
+
+def _band(line: int) -> int:
+    """How many rows of the picture make a band whose lines of sums take so many bytes: a multiple of eight."""
+    return int(np.clip(BAND_BYTES // line, EIGHT, BAND)) // EIGHT * EIGHT
+
+
+def _finished(
+    plan: Plan, raster: NDArray[np.float32], channels: int, pool: ThreadPoolExecutor
+) -> NDArray[np.float32]:
+    """The picture (rows, columns, channels) from the raster (rows, columns × channels)."""
+    rows, columns = plan.sensor_shape
+    ((down, across),) = finishing_terms(plan) if plan.blur is None else [(np.ones(LONG), np.ones(LONG))]
+    if max(len(down), len(across)) >= LONG:
+        return finish(plan, raster.reshape(*plan.raster_shape, channels))
+    if len(down) == len(across) == 1 and not plan.guard and plan.sensor_transmission is None:
+        return raster.reshape(rows, columns, channels)
+    picture = np.empty((rows, columns * channels), dtype=np.float32)
+    transmission = np.zeros((0, 0)) if plan.sensor_transmission is None else plan.sensor_transmission
+    weights = down.astype(np.float32), across.astype(np.float32)
+
+    def filtered(start: int) -> None:
+        stop = min(start + BAND, rows)
+        kernels.filter_rows(raster, *weights, channels, plan.guard, transmission, start, stop, picture)
+
+    list(pool.map(filtered, range(0, rows, BAND)))
+    return picture.reshape(rows, columns, channels)
 
 
 @dataclass(frozen=True)
 class _Block:
-    """Samples that lie in memory row by row, and the view taps that read them.
+    """Samples that lie in memory row by row, and the columns of view taps that read them.
 
     Args:
-        samples: (v, u, t, columns × channels), C-contiguous.
-        tap_rows: which rows of taps read it.
-        tap_columns: which columns of taps.
-        view_rows: the row of ``samples`` that each row of taps reads.
-        view_columns: the column of ``samples`` that each column of taps reads.
+        samples: flat.
+        begin: where in them each row of taps begins.
+        column_begin: how much further on each column of taps begins.
+        pitch: sample values from one row of samples to the next.
+        columns: (first, end) of the columns of taps.
     """
 
     samples: NDArray[Any]
-    tap_rows: NDArray[np.int64]
-    tap_columns: NDArray[np.int64]
-    view_rows: NDArray[np.int64]
-    view_columns: NDArray[np.int64]
+    begin: NDArray[np.int64]
+    column_begin: NDArray[np.int64]
+    pitch: int
+    columns: tuple[int, int]
 
 
 class _FineGrid:
     """The samples of a view after division: how many, the index of the first, and how they are made."""
 
-    def __init__(self, plan: Plan, channels: int) -> None:
-        self.samples = self.rows, self.columns = plan.samples
+    def __init__(self, plan: Plan) -> None:
+        self.samples = plan.samples
+        self.rows, self.columns = plan.samples
         self.first_row = self.first_column = 0.0
         self.divided_as: tuple[Division, Division] | None = None
-        nothing = (np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.float32))
-        self.tables = (*nothing, *nothing, channels)
+        self.tables: tuple[NDArray[Any], ...] = ()
         if plan.refine > 1:
             down, across = (plan.division(n) for n in plan.samples)
             self.rows, self.columns = len(down.first), len(across.first)
             self.first_row, self.first_column = down.start, across.start
             self.divided_as = down, across
-            self.tables = (down.first, _in_threes(down.shares), across.first, _in_threes(across.shares), channels)
+            shares = (part.shares.astype(np.float32) for part in (down, across))
+            self.tables = (down.first, next(shares), across.first, next(shares))
 
     @cached_property
     def matrices(self) -> tuple[NDArray[np.float64], ...]:
@@ -101,146 +139,150 @@ class _FineGrid:
 
 def _blocks(plan: Plan, values: NDArray[Any], by_column: bool) -> Iterator[_Block]:
     """The samples in pieces that kernels can read, without ever copying more than a column of views."""
-    nv, nu, nt = values.shape[:3]
-    all_rows, all_columns = np.arange(len(plan.view_rows)), np.arange(len(plan.view_columns))
-    readable = values.flags.c_contiguous and values.dtype != np.float16
-    if readable and not by_column:
-        yield _Block(values.reshape(nv, nu, nt, -1), all_rows, all_columns, plan.view_rows, plan.view_columns)
+    nv, nu, nt, ns = values.shape[:4]
+    channels = values.shape[4] if values.ndim == 5 else 1
+    taps = len(plan.view_columns)
+    n = ns * channels
+    if values.flags.c_contiguous and values.dtype != np.float16 and n >= SHORTEST:
+        view = nt * n
+        flat = values.reshape(-1)
+        begin, column_begin = plan.view_rows * (nu * view), plan.view_columns * view
+        for a in range(taps) if by_column else (0,):
+            yield _Block(flat, begin, column_begin, n, (a, a + 1) if by_column else (0, taps))
         return
-    for a in np.flatnonzero((plan.weights != 0).any(axis=0)):
-        i = plan.view_columns[a : a + 1]
-        if readable:
-            yield _Block(values.reshape(nv, nu, nt, -1), all_rows, all_columns[a : a + 1], plan.view_rows, i)
-            continue
-        kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
-        column = np.ascontiguousarray(values[:, i[0] : i[0] + 1], dtype=kind).reshape(nv, 1, nt, -1)
-        yield _Block(column, all_rows, all_columns[a : a + 1], plan.view_rows, np.zeros(1, dtype=np.int64))
+    kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
+    missing = max(math.ceil(SHORTEST / channels) - ns, 0)
+    for a in map(int, np.flatnonzero((plan.weights != 0).any(axis=0))):
+        column = values[:, plan.view_columns[a]]
+        if missing:
+            column = np.pad(column, [(0, 0), (0, 0), (0, missing), *[(0, 0)] * (values.ndim - 4)])
+        column = np.ascontiguousarray(column, dtype=kind).reshape(nv, nt, -1)
+        pitch = column.shape[2]
+        begin, none = plan.view_rows * (nt * pitch), np.zeros(taps, dtype=np.int64)
+        yield _Block(column.reshape(-1), begin, none, pitch, (a, a + 1))
 
 
-class _Separable:
-    """Tables for plans in which rows and columns part, and the loop over blocks and bands."""
+class _ByColumns:
+    """Tables for plans in which rows and columns part, and the loop over columns of views and bands."""
 
-    def __init__(self, plan: Plan, channels: int) -> None:
-        self.plan, self.channels = plan, channels
-        self.fine = fine = _FineGrid(plan, channels)
+    def __init__(self, plan: Plan, channels: int, pool: ThreadPoolExecutor) -> None:
+        self.plan, self.channels, self.pool = plan, channels, pool
+        self.fine = fine = _FineGrid(plan)
         rows, columns = plan.raster_shape
         start_y = plan.y[:, 0] + plan.row_step * fine.first_row
         start_x = plan.x[0] + plan.column_step * fine.first_column
         row_step, column_step = plan.row_step / plan.refine, plan.column_step / plan.refine
         self.down = taps(plan.interpolation, start_y, row_step, fine.rows, rows, plan.opening)
         self.across = taps(plan.interpolation, start_x, column_step, fine.columns, columns, plan.opening)
-        # A real image runs against its samples: the raster is then filled in mirror writing, so that samples
-        # and pixels are read and written in the same direction.
+        # How many rows of samples four rows of the raster gather, and how many the next four need anew.
+        ends = np.pad(self.down.first, [(0, 0), (0, -rows % ROWS)], mode="edge").reshape(len(start_y), -1, ROWS)
+        self.reach = int(np.ptp(ends, axis=2).max(initial=0)) + self.down.weights.shape[2]
+        self.advance = min(math.ceil(ROWS / abs(row_step)), self.reach)
         self.mirrored = column_step < 0
         if self.mirrored:
             self.across = self.across.mirrored()
-        self.down_shares, self.across_shares = _in_threes(self.down.weights), _in_threes(self.across.weights)
-        self.alike = _alike(self.across.first, self.across_shares)
-        self.masked = bool(plan.masks) or plan.refine > 1
-        # Finer samples make more rows for the same band of the raster.
-        self.band_rows = max(MASKED_BAND // plan.refine, 8) if self.masked else BAND
         self.weights = (plan.weights * plan.scale).astype(np.float32)
-        # Masks' textures one after another: how many rows each has, where they begin, and which mask row the
-        # first row of samples of each tap row looks up, and the step from there.
+        # A mask's weight counts for all channels of a sample: for three of them as it is looked up, for other
+        # numbers by being repeated.
+        self.shared, self.repeated = (3, 1) if channels == 3 else (1, channels)
         self.mask_rows = np.array([len(mask.texture) for mask in plan.masks], dtype=np.int64)
-        self.mask_start = np.cumsum(self.mask_rows) - self.mask_rows
-        row = [mask.row[:, 0] + mask.step[1, 1] * fine.first_row for mask in plan.masks]
-        self.mask_row = np.array(row).reshape(-1, len(plan.view_rows))
         self.mask_row_step = np.array([mask.step[1, 1] / plan.refine for mask in plan.masks], dtype=np.float64)
+        self.lines = np.zeros((0, 0), dtype=np.float32)
+
+    def raster(self, values: NDArray[Any], progress: Progress | None) -> NDArray[np.float32]:
+        """The sum over all samples: the raster (rows, columns × channels)."""
+        plan, fine, done = self.plan, self.fine, 0
+        rows, columns = plan.raster_shape
+        tiles = np.zeros((-(-rows // EIGHT), columns * self.channels, EIGHT), dtype=np.float32)
+        for block in _blocks(plan, values, bool(plan.masks) or plan.refine > 1 or progress is not None):
+            first, end = block.columns
+            if not self.weights[:, first:end].any():
+                continue
+            pitch = max(fine.columns, -(-SHORTEST // self.channels)) * self.channels
+            add = partial(self.add, block, pitch, self.mask_columns(first, pitch), tiles)
+            list(self.pool.map(add, range(0, rows, _band(4 * pitch))))
+            if progress is not None:
+                done += int(np.count_nonzero(self.weights[:, first:end]))
+                progress(done, plan.taps_used)
+        raster = np.empty((rows, columns * self.channels), dtype=np.float32)
+
+        def untiled(start: int) -> None:
+            stop = min(start + BAND, rows)
+            # A real image runs against its samples: the raster is then in mirror writing.
+            kernels.raster_of(tiles, self.channels, self.mirrored, start, stop, raster)
+
+        list(self.pool.map(untiled, range(0, rows, BAND)))
+        return raster
 
     def add(
-        self,
-        values: NDArray[Any],
-        raster: NDArray[np.float32],
-        pool: ThreadPoolExecutor,
-        progress: Progress | None,
+        self, block: _Block, pitch: int, masks: tuple[Any, ...], tiles: NDArray[np.float32], start: int
     ) -> None:
-        """Add all samples to the raster (rows, columns × channels)."""
-        masked, total, done = self.masked, self.plan.taps_used, 0
-        by_column = masked or progress is not None
-        width = self.fine.columns * self.channels
-        room = np.empty((int(self.mask_rows.sum()), width), dtype=np.float32) if masked else None
-        for block in _blocks(self.plan, values, by_column):
-            if room is not None:
-                self.sample_mask_columns(int(block.tap_columns[0]), pool, room)
-            starts = range(0, len(raster), self.band_rows)
-            list(pool.map(partial(self.band, block, room, raster), starts))
-            if progress is not None:
-                done += int(np.count_nonzero(self.weights[np.ix_(block.tap_rows, block.tap_columns)]))
-                progress(done, total)
-
-    def band(
-        self, block: _Block, masks: NDArray[np.float32] | None, raster: NDArray[np.float32], start: int
-    ) -> None:
-        """Add one block's samples to a band of raster rows."""
-        stop = min(start + self.band_rows, len(raster))
-        rows, columns = block.tap_rows, block.tap_columns
-        first_row, row_shares = self.down.first[rows], self.down_shares[rows]
-        weights = self.weights[np.ix_(rows, columns)]
-        if masks is None:
-            kernels.add_band(
-                block.samples, block.view_rows, block.view_columns, weights, first_row, row_shares,
-                self.across.first[columns], self.across_shares[columns], self.alike[columns], self.channels,
-                start, stop, raster,
+        """Add one block's samples to the band of raster rows that begins at ``start``."""
+        stop = min(start + _band(4 * pitch), self.plan.raster_shape[0])
+        first, end = block.columns
+        rows = self.down.first, self.down.weights, self.reach, self.advance
+        across = self.across.first, self.across.weights
+        if self.plan.refine > 1:
+            for a in range(first, end):
+                begin = block.begin + block.column_begin[a]
+                kernels.add_divided_column(
+                    block.samples, begin, block.pitch, pitch, self.weights[:, a], *rows, self.fine.tables, masks,
+                    self.shared, across[0][a], across[1][a], self.channels, start, stop, tiles,
+                )  # fmt: skip
+        else:
+            kernels.add_columns(
+                block.samples, block.begin, block.column_begin, first, end, pitch, self.weights, *rows, masks,
+                self.shared, *across, self.channels, start, stop, tiles,
             )  # fmt: skip
-            return
-        (a,), (view_column,) = columns, block.view_columns
-        kernels.add_masked_band(
-            block.samples, block.view_rows, view_column, weights[:, 0], first_row, row_shares, self.fine.tables,
-            masks, self.mask_start, self.mask_rows, self.mask_row[:, rows], self.mask_row_step,
-            self.across.first[a], self.across_shares[a], self.alike[a], self.channels, start, stop, raster,
-        )  # fmt: skip
 
-    def sample_mask_columns(self, a: int, pool: ThreadPoolExecutor, out: NDArray[np.float32]) -> None:
-        """Fill ``out`` with all masks' rows, one mask after another, at the samples' columns of tap column a."""
-        index = self.fine.first_column + np.arange(self.fine.columns) / self.plan.refine
+    def mask_columns(self, a: int, pitch: int) -> tuple[Any, ...]:
+        """The masks' lines that taps of column ``a`` look up, at the columns of their samples; see the kernels.
 
-        def sample(mask_and_start: tuple[int, int]) -> None:
-            number, begin = mask_and_start
-            mask = self.plan.masks[number]
-            place = mask.column[0, a] + mask.step[0, 0] * index
-            end = min(begin + 100, len(mask.texture))
-            offset = self.mask_start[number]
-            kernels.sample_mask_columns(
-                mask.texture[begin:end], place, self.channels, out[offset + begin : offset + end]
-            )
+        Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: each group of taps
+        that agree gets the lines that it needs.
+        """
+        plan, fine = self.plan, self.fine
+        used = np.flatnonzero(self.weights[:, a])
+        begin = np.zeros((len(plan.masks), len(plan.view_rows)), dtype=np.int64)
+        row = np.zeros(begin.shape)
+        total = 0
+        pieces: list[tuple[NDArray[np.float32], NDArray[np.float64], int]] = []
+        for number, mask in enumerate(plan.masks):
+            step = self.mask_row_step[number]
+            row[number] = mask.row[:, a] + mask.step[1, 1] * fine.first_row
+            ends = np.sort([row[number], row[number] + step * (fine.rows - 1)], axis=0)
+            places, group = np.unique(np.round(mask.column[used, a], 7), return_inverse=True)
+            for one, place in enumerate(places):
+                taps = used[group == one]
+                low = max(math.floor(ends[0, taps].min()), 0)
+                high = min(math.floor(ends[1, taps].max()) + 2, len(mask.texture))
+                if low >= high:  # all of it lies beyond the mask's border, where it is dark
+                    continue
+                begin[number, taps] = total - low
+                columns = place + mask.step[0, 0] * (fine.first_column + np.arange(fine.columns) / plan.refine)
+                pieces += [
+                    (mask.texture[n : min(n + MASK_LINES, high)], columns, total + n - low)
+                    for n in range(low, high, MASK_LINES)
+                ]
+                total += high - low
+        line = pitch // self.shared
+        if plan.masks and self.lines.shape[0] < total:
+            self.lines = np.zeros((total, line), dtype=np.float32)  # and zero beyond the samples' last column
 
-        pieces = [(n, begin) for n in range(len(self.plan.masks)) for begin in range(0, self.mask_rows[n], 100)]
-        list(pool.map(sample, pieces))
+        def sample(piece: tuple[NDArray[np.float32], NDArray[np.float64], int]) -> None:
+            texture, columns, to = piece
+            kernels.sample_mask_columns(texture, columns, self.repeated, self.lines[to : to + len(texture)])
 
-
-def _in_threes(shares: NDArray[Any]) -> NDArray[np.float32]:
-    """Shares (…, width) with zeros added until their number is a multiple of three, as the kernels want them."""
-    extra = -shares.shape[-1] % 3
-    padded = np.pad(shares, [(0, 0)] * (shares.ndim - 1) + [(0, extra)])
-    return np.ascontiguousarray(padded, dtype=np.float32)
-
-
-def _alike(first: NDArray[np.int64], shares: NDArray[np.float32]) -> NDArray[np.int64]:
-    """(begin, end) of the columns around the middle that gather successive samples with the same shares.
-
-    They are all but the borders where a sample is as large as a pixel, a common choice; else there are none.
-    """
-    columns = first.shape[1]
-    column, middle = np.arange(columns), columns // 2
-    place = first - column
-    same = (place == place[:, middle : middle + 1]) & (np.abs(shares - shares[:, middle : middle + 1]) < 1e-6).all(
-        axis=-1
-    )
-    begin = np.where(~same & (column < middle), column, -1).max(axis=1) + 1
-    end = np.where(~same & (column > middle), column, columns).min(axis=1)
-    return np.stack([begin, end], axis=1)
+        list(self.pool.map(sample, pieces))
+        return self.lines, begin, self.mask_rows, row, self.mask_row_step
 
 
-def _add_sheared(
-    plan: Plan,
-    values: NDArray[Any],
-    raster: NDArray[np.float32],
-    pool: ThreadPoolExecutor,
-    progress: Progress | None,
-) -> None:
-    """Add all samples to the raster (rows, columns, channels) where rows and columns do not part."""
-    fine = _FineGrid(plan, 1)
+def _sheared(
+    plan: Plan, values: NDArray[Any], channels: int, pool: ThreadPoolExecutor, progress: Progress | None
+) -> NDArray[np.float32]:
+    """The raster (rows, columns × channels) where rows and columns do not part."""
+    raster = np.zeros((*plan.raster_shape, channels), dtype=np.float32)
+    fine = _FineGrid(plan)
     size = np.array([mask.texture.shape for mask in plan.masks], dtype=np.int64).reshape(-1, 2)
     textures = np.zeros((len(plan.masks), *size.max(axis=0, initial=1)), dtype=np.float32)
     for texture, mask in zip(textures, plan.masks, strict=True):
@@ -266,3 +308,4 @@ def _add_sheared(
         list(pool.map(band, range(0, len(raster), BAND)))
     if progress is not None:
         progress(plan.taps_used, plan.taps_used)
+    return raster.reshape(len(raster), -1)

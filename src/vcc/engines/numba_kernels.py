@@ -9,6 +9,21 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from vcc.engines.vector_sums import (
+    EIGHT,
+    ROWS,
+    RUN,
+    RUN_OF_THREES,
+    add_masked_rows,
+    add_masked_rows_of_threes,
+    add_rows,
+    fetch,
+    mix_eight,
+)
+
+VIEWS = 8
+"""Views that are summed at once: more would be more runs of memory at once than a processor foresees."""
+
 # Sums may be reordered so that they vectorise; NaN and infinity keep their meaning.
 _FAST = {"contract", "reassoc", "nsz"}
 _compiled = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy")
@@ -16,285 +31,328 @@ _inlined = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy
 
 
 @_compiled
-def sum_rows(values, view_rows, column, weights, first, shares, start, stop, sums):  # type: ignore[no-untyped-def]
-    """sums[y − start] = the rows of all views of one column that fall on raster row y.
+def sum_rows(  # type: ignore[no-untyped-def]
+    samples, begin, pitch, used, weights, first, shares, reach, advance, jump, start, stop, masks, repeat, sums,
+):  # fmt: skip
+    """sums[y − start] += the rows of all views of one column that fall on raster row y, times their masks.
 
-    values: (v, u, t, n), n = columns × channels; view_rows, weights: (taps,); first: (taps, rows);
-    shares: (taps, rows, width), width a multiple of 3, zero where a pixel gathers fewer rows.
+    samples: flat; row l of tap b is samples[begin[b] + l · pitch : … + pitch]. used: the taps that are added;
+    weights: (taps,); first: (taps, rows), shares: (taps, rows, width), the rows of samples that a raster row
+    gathers. reach: the most rows of samples that four raster rows gather. masks: see `_masks_at`. repeat: 3 where
+    a weight of a mask counts for three channels, else 1.
 
-    Four views are added at a time, row after row: one pass over the line of sums then serves twelve rows of
-    samples, and each view is read as one run of memory.
+    Four raster rows are summed at a time, so that each sample is converted and weighed once for all of them. The
+    raster is walked along so that samples are read in the order in which they lie in memory (a real image runs
+    against its samples), and what is needed next is asked for beforehand, since many short runs are more than a
+    processor foresees by itself. advance: rows of samples that the next four raster rows need anew; jump: from
+    here to the samples of the next column of views.
     """
-    last, n = values.shape[2] - 1, values.shape[3]
-    used = np.flatnonzero(weights)
-    place = np.empty((4, 3), np.int64)
-    share = np.empty((4, 3), np.float32)
-    j = np.empty(4, np.int64)
-    for group in range(0, used.size, 4):
-        for t in range(0, shares.shape[2], 3):
-            for y in range(start, stop):
-                line = sums[y - start]
-                if group == 0 and t == 0:
-                    line[:n] = 0  # here rather than all at once: the line stays in the nearest cache
-                for g in range(4):
-                    b = used[min(group + g, used.size - 1)]
-                    weight = weights[b] if group + g < used.size else np.float32(0)
-                    j[g] = view_rows[b]
-                    for tap in range(3):
-                        place[g, tap] = min(first[b, y] + t + tap, last)  # beyond the last row the share is zero
-                        share[g, tap] = weight * shares[b, y, t + tap]
-                r0, r1, r2 = (
-                    values[j[0], column, place[0, 0]],
-                    values[j[0], column, place[0, 1]],
-                    values[j[0], column, place[0, 2]],
-                )
-                s0, s1, s2 = (
-                    values[j[1], column, place[1, 0]],
-                    values[j[1], column, place[1, 1]],
-                    values[j[1], column, place[1, 2]],
-                )
-                t0, t1, t2 = (
-                    values[j[2], column, place[2, 0]],
-                    values[j[2], column, place[2, 1]],
-                    values[j[2], column, place[2, 2]],
-                )
-                u0, u1, u2 = (
-                    values[j[3], column, place[3, 0]],
-                    values[j[3], column, place[3, 1]],
-                    values[j[3], column, place[3, 2]],
-                )
-                a0, a1, a2 = share[0, 0], share[0, 1], share[0, 2]
-                b0, b1, b2 = share[1, 0], share[1, 1], share[1, 2]
-                c0, c1, c2 = share[2, 0], share[2, 1], share[2, 2]
-                d0, d1, d2 = share[3, 0], share[3, 1], share[3, 2]
-                for x in range(n):
-                    line[x] += (
-                        (a0 * np.float32(r0[x]) + a1 * np.float32(r1[x]) + a2 * np.float32(r2[x]))
-                        + (b0 * np.float32(s0[x]) + b1 * np.float32(s1[x]) + b2 * np.float32(s2[x]))
-                    ) + (
-                        (c0 * np.float32(t0[x]) + c1 * np.float32(t1[x]) + c2 * np.float32(t2[x]))
-                        + (d0 * np.float32(u0[x]) + d1 * np.float32(u1[x]) + d2 * np.float32(u2[x]))
-                    )
+    mask_lines, _, _, _, mask_row_step = masks
+    count, width = mask_row_step.size, shares.shape[2]
+    group = min(VIEWS, used.size)
+    room = group * reach
+    order, places, ranges = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
+    share = np.empty((room, ROWS), np.float32)
+    mask_places = np.empty((room, count, 2), np.int64)
+    mask_shares = np.empty((room, count, 2), np.float32)
+    ends, highest, lowest = np.empty(10, np.int64), np.empty(reach, np.int64), np.empty(reach, np.int64)
+    next_rows, first_rows = np.empty(group * max(advance, reach), np.int64), np.empty(group * reach, np.int64)
+    per_line = 64 // samples.itemsize
+    run = RUN if count == 0 or repeat == 1 else RUN_OF_THREES
+    tiles = (stop - start + ROWS - 1) // ROWS
+    for begin_group in range(0, used.size, group):
+        views = used[begin_group : begin_group + group]
+        downwards = first[views[0], stop - 1] >= first[views[0], start]
+        first_count = 0
+        for step in range(tiles):
+            y = start + ROWS * (step if downwards else tiles - 1 - step)
+            entries, next_count = 0, 0
+            for b in views:
+                top, rows = _rows_of(b, y, stop, weights[b], first, shares, width, share, entries, lowest, highest)
+                for q in range(rows):
+                    entry, l = entries + q, top + q
+                    places[entry] = begin[b] + l * pitch
+                    # Ranges are numbered 00 01 02 03 11 12 13 22 23 33; −1: nothing is added.
+                    low = lowest[q]
+                    ranges[entry] = -1 if low < 0 else low * ROWS - low * (low + 1) // 2 + highest[q]
+                    if count > 0 and not _masks_at(masks, b, l, entry, mask_places, mask_shares):
+                        ranges[entry] = -1
+                entries += rows
+                for l in range(top + rows, top + rows + advance):
+                    next_rows[next_count] = begin[b] + l * pitch
+                    next_count += 1
+                if step == 0:
+                    for l in range(top, top + rows):
+                        first_rows[first_count] = begin[b] + l * pitch + jump
+                        first_count += 1
+            _sort(ranges, entries, ends, order)
+            following, following_count = (next_rows, next_count) if step < tiles - 1 else (first_rows, first_count)
+            for x in range(0, pitch, run):
+                for near in range((x + per_line - 1) // per_line * per_line, min(x + run, pitch), per_line):
+                    for n in range(following_count):
+                        fetch(samples, following[n] + near)
+                here = min(x, pitch - run)
+                if count == 0:
+                    add_rows(samples, order, places, share, ends, here, x - here, sums, y - start)
+                elif repeat == 3:
+                    add_masked_rows_of_threes(
+                        samples, order, places, share, ends, here, x - here, sums, y - start,
+                        mask_lines, mask_places, mask_shares,
+                    )  # fmt: skip
+                else:
+                    add_masked_rows(
+                        samples, order, places, share, ends, here, x - here, sums, y - start,
+                        mask_lines, mask_places, mask_shares,
+                    )  # fmt: skip
+
+
+@_inlined
+def _rows_of(b, y, stop, weight, first, shares, width, share, entry, lowest, highest):  # type: ignore[no-untyped-def]
+    """List the rows of samples of tap b that fall on four raster rows from y on: the first, and how many.
+
+    Row ``first + q`` counts ``share[entry + q]`` there, and reaches raster rows y + lowest[q] … y + highest[q];
+    lowest[q] is −1 if it reaches none.
+    """
+    rows = min(ROWS, stop - y)
+    top = first[b, y]
+    for r in range(1, rows):
+        top = min(top, first[b, y + r])
+    count = 0
+    lowest[:] = -1
+    for r in range(rows):
+        for t in range(width):
+            if shares[b, y + r, t] != 0:
+                q = first[b, y + r] - top + t
+                if lowest[q] < 0:
+                    lowest[q] = r
+                    share[entry + q] = 0
+                    count = max(count, q + 1)
+                highest[q] = r
+                share[entry + q, r] = weight * shares[b, y + r, t]
+    return top, count
+
+
+@_inlined
+def _masks_at(masks, b, l, entry, places, shares):  # type: ignore[no-untyped-def]
+    """Look up the masks' lines above and below row l of the samples of tap b; False if it is dark there.
+
+    masks: (lines, begin, rows, row, row_step). lines: flat, masks' weights at the columns of the samples. begin:
+    (masks, taps), where in them a mask's row 0 begins, or would begin; rows: (masks,), how many a mask has, each
+    ``line`` long; row: (masks, taps), mask row of sample row 0; row_step: (masks,).
+    """
+    lines, begin, rows, row, row_step = masks
+    line = lines.shape[1]
+    for mask in range(row_step.size):
+        place = row[mask, b] + row_step[mask] * l
+        if not (place > -1 and place < rows[mask]):
+            return False
+        r = int(np.floor(place))
+        after = np.float32(place - r)
+        # Outside the texture there is no light: a weight of zero on any row that exists.
+        shares[entry, mask, 0] = 0 if r < 0 else np.float32(1) - after
+        shares[entry, mask, 1] = 0 if r + 1 >= rows[mask] else after
+        places[entry, mask, 0] = (begin[mask, b] + max(r, 0)) * line
+        places[entry, mask, 1] = (begin[mask, b] + min(r + 1, rows[mask] - 1)) * line
+    return True
+
+
+@_inlined
+def _sort(ranges, entries, ends, order):  # type: ignore[no-untyped-def]
+    """Order the entries by range; ``ends`` counts those of each range and the ones before it."""
+    ends[:] = 0
+    for entry in range(entries):
+        if ranges[entry] >= 0:
+            ends[ranges[entry]] += 1
+    total = 0
+    for n in range(ends.size):
+        here = ends[n]
+        ends[n] = total
+        total += here
+    for entry in range(entries):
+        if ranges[entry] >= 0:
+            order[ends[ranges[entry]]] = entry
+            ends[ranges[entry]] += 1
 
 
 @_compiled
-def sum_masked_rows(  # type: ignore[no-untyped-def]
-    values, view_rows, column, weights, first, shares, fine, masks, mask_start, mask_rows, row, row_step,
-    start, stop, sums,
+def add_columns(  # type: ignore[no-untyped-def]
+    samples, begin, column_begin, first, end, pitch, weights, first_row, row_shares, reach, advance, masks, repeat,
+    first_column, column_shares, channels, start, stop, tiles,
 ):  # fmt: skip
-    """As `sum_rows`, each sample times its weight from the masks.
+    """Add the columns of view taps ``first`` … ``end`` to raster rows start … stop, one after the other.
 
-    masks: (all rows of all masks, n), already sampled at the columns of the samples; mask_start, mask_rows:
-    (masks,), where each mask's rows begin and how many there are; row: (masks, taps), mask row of sample
-    row 0; row_step: (masks,).
-
-    fine: (first_row, row_shares, first_column, column_shares, channels) by which samples are divided into
-    finer ones, the rows and columns above then being fine ones; empty tables leave samples as they are.
-
-    Rows of weighted samples are made once for each view, then summed by raster row.
+    samples: flat; row l of view tap (b, a) begins at begin[b] + column_begin[a] + l · pitch. weights: (rows of
+    taps, columns of taps); first_row: (rows of taps, raster rows), first_column: (columns of taps, raster
+    columns), shares with one axis more; tiles: the raster, (rows / 8, columns · channels, 8).
     """
-    fine_first_row, fine_row_shares, fine_first_column, fine_column_shares, channels = fine
-    divided = fine_first_row.size > 0
-    last, n = values.shape[2] - 1, values.shape[3]
-    if divided:
-        last, n = fine_first_row.size - 1, fine_first_column.size * channels
-    source = np.zeros(values.shape[3] + fine_column_shares.shape[1] * channels, np.float32)
-    samples = np.zeros(n, np.float32)
-    used = np.flatnonzero(weights)
-    low, high = np.full(weights.size, last + 1), np.zeros(weights.size, np.int64)
-    for b in used:
+    sums, turned = _room(stop - start, pitch, column_shares.shape[2], channels)
+    for a in range(first, end):
+        used = np.flatnonzero(weights[:, a])
+        if used.size > 0:
+            sums[:] = 0
+            jump = column_begin[a + 1] - column_begin[a] if a + 1 < column_begin.size else 0
+            sum_rows(
+                samples, begin + column_begin[a], pitch, used, weights[:, a], first_row, row_shares, reach,
+                advance, jump, start, stop, masks, repeat, sums,
+            )  # fmt: skip
+            mix_columns(sums, pitch, first_column[a], column_shares[a], channels, turned, tiles[start // EIGHT :])
+
+
+@_compiled
+def add_divided_column(  # type: ignore[no-untyped-def]
+    samples, begin, sample_pitch, pitch, weights, first_row, row_shares, reach, advance, fine, masks, repeat,
+    first_column, column_shares, channels, start, stop, tiles,
+):  # fmt: skip
+    """As `add_columns` for one column of views, whose samples are divided into finer ones, view by view.
+
+    samples: flat; row l of tap b begins at begin[b] + l · sample_pitch. pitch: values of a row of finer samples;
+    fine: (first_row, row_shares, first_column, column_shares), by which they are made.
+    """
+    fine_first_row, fine_row_shares, fine_first_column, fine_column_shares = fine
+    sums, turned = _room(stop - start, pitch, column_shares.shape[1], channels)
+    source = np.zeros(sample_pitch + fine_column_shares.shape[1] * channels, np.float32)
+    rows = np.zeros((0, pitch), np.float32)
+    here = np.zeros(weights.size, np.int64)
+    for b in np.flatnonzero(weights):
+        low, high = fine_first_row.size, 0
         for y in range(start, stop):
-            for t in range(shares.shape[2]):
-                if shares[b, y, t] != 0:
-                    low[b] = min(low[b], first[b, y] + t)
-                    high[b] = max(high[b], first[b, y] + t + 1)
-    products = np.zeros((max(int((high - low).max()), 1), n), np.float32)
-    for b in used:
-        j = view_rows[b]
-        for l in range(low[b], high[b]):
-            product = products[l - low[b]]
-            if divided:
-                _divided_row(
-                    values, j, column, fine_first_row[l], fine_row_shares[l],
-                    fine_first_column, fine_column_shares, channels, source, samples,
-                )  # fmt: skip
-                _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], product)
-            else:
-                whole = values[j, column, l]
-                _weigh(whole, masks, mask_start, mask_rows, row, row_step, b, l, weights[b], product)
-        for y in range(start, stop):
-            line = y - start
-            for t in range(0, shares.shape[2], 3):
-                a0, a1, a2 = shares[b, y, t], shares[b, y, t + 1], shares[b, y, t + 2]
-                if a0 == 0 and a1 == 0 and a2 == 0:
-                    continue
-                # Where a share is zero, any row will do.
-                r0 = min(max(first[b, y] + t, low[b]), high[b] - 1) - low[b]
-                r1 = min(max(first[b, y] + t + 1, low[b]), high[b] - 1) - low[b]
-                r2 = min(max(first[b, y] + t + 2, low[b]), high[b] - 1) - low[b]
-                for x in range(n):
-                    sums[line, x] += a0 * products[r0, x] + a1 * products[r1, x] + a2 * products[r2, x]
+            for t in range(row_shares.shape[2]):
+                if row_shares[b, y, t] != 0:
+                    low, high = min(low, first_row[b, y] + t), max(high, first_row[b, y] + t + 1)
+        if high <= low:
+            continue
+        if high - low > len(rows):
+            rows = np.zeros((high - low, pitch), np.float32)
+        for l in range(low, high):
+            _divided_row(
+                samples, begin[b] + fine_first_row[l] * sample_pitch, sample_pitch, fine_row_shares[l],
+                fine_first_column, fine_column_shares, channels, source, rows[l - low],
+            )  # fmt: skip
+        here[b] = -low * pitch
+        sum_rows(
+            rows.reshape(-1), here, pitch, np.array([b]), weights, first_row, row_shares, reach, advance, 0, start,
+            stop, masks, repeat, sums,
+        )  # fmt: skip
+    mix_columns(sums, pitch, first_column, column_shares, channels, turned, tiles[start // EIGHT :])
+
+
+@_inlined
+def _room(rows, pitch, width, channels):  # type: ignore[no-untyped-def]
+    """Sums of a band's rows, and eight of them turned, with zeros beyond the last sample."""
+    sums = np.zeros(((rows + EIGHT - 1) // EIGHT * EIGHT, pitch), np.float32)
+    return sums, np.zeros(((pitch + width * channels) * EIGHT), np.float32)
 
 
 @_compiled
 def _divided_row(  # type: ignore[no-untyped-def]
-    values, j, column, first, row_shares, first_column, column_shares, channels, source, samples
+    samples, begin, pitch, row_shares, first_column, column_shares, channels, source, fine
 ):
-    """samples = one row of finer samples of a view; source is room for a row of the view itself."""
-    n = values.shape[3]
-    source[:n] = 0
+    """fine = one row of finer samples; source is room for a row of the samples, zero beyond the last."""
+    source[:pitch] = 0
     for t in range(row_shares.size):
         if row_shares[t] != 0:
-            line = values[j, column, first + t]
-            for x in range(n):
+            line = samples[begin + t * pitch : begin + (t + 1) * pitch]
+            for x in range(pitch):
                 source[x] += row_shares[t] * np.float32(line[x])
-    samples[:] = 0
-    mix_columns(source.reshape(1, -1), first_column, column_shares, (0, 0), channels, samples.reshape(1, -1))
-
-
-@_inlined
-def _weigh(samples, masks, mask_start, mask_rows, row, row_step, b, l, weight, product):  # type: ignore[no-untyped-def]
-    """product = weight · samples · masks along one row."""
-    if row_step.size == 0:
-        for x in range(product.size):
-            product[x] = weight * np.float32(samples[x])
-    for mask in range(row_step.size):
-        place = row[mask, b] + row_step[mask] * l
-        if not (place > -1 and place < mask_rows[mask]):
-            product[:] = 0
-            break
-        r = int(np.floor(place))
-        after = np.float32(place - r)
-        before = np.float32(1) - after
-        # Outside the texture there is no light: a weight of zero on any row that exists.
-        if r < 0:
-            r, before = 0, np.float32(0)
-            upper, lower = masks[mask_start[mask]], masks[mask_start[mask]]
-        elif r + 1 >= mask_rows[mask]:
-            after = np.float32(0)
-            upper, lower = masks[mask_start[mask] + r], masks[mask_start[mask] + r]
-        else:
-            upper, lower = masks[mask_start[mask] + r], masks[mask_start[mask] + r + 1]
-        if mask == 0:
-            before *= weight
-            after *= weight
-            for x in range(product.size):
-                product[x] = (before * upper[x] + after * lower[x]) * np.float32(samples[x])
-        else:
-            for x in range(product.size):
-                product[x] *= before * upper[x] + after * lower[x]
+    for k in range(first_column.size):
+        for c in range(channels):
+            total = np.float32(0)
+            for t in range(column_shares.shape[1]):
+                total += column_shares[k, t] * source[np.uint64((first_column[k] + t) * channels + c)]
+            fine[k * channels + c] = total
 
 
 @_compiled
-def sample_mask_columns(texture, column, channels, out):  # type: ignore[no-untyped-def]
-    """out[r, k·channels + c] = texture[r] at column[k], linearly, zero outside."""
+def sample_mask_columns(texture, column, repeat, out):  # type: ignore[no-untyped-def]
+    """out[r, k · repeat + c] = texture[r] at column[k], linearly, zero outside."""
     rows, columns = texture.shape
-    left = np.empty(column.size, np.int64)
-    before = np.zeros(column.size, np.float32)
-    after = np.zeros(column.size, np.float32)
+    left, right = np.empty(column.size, np.uint64), np.empty(column.size, np.uint64)
+    before, after = np.zeros(column.size, np.float32), np.zeros(column.size, np.float32)
     for k in range(column.size):
         # A border of dark columns around the texture, by weights of zero on columns that exist.
         c = int(np.floor(min(max(column[k], -1.0), float(columns))))
-        left[k] = min(max(c, 0), max(columns - 2, 0))
-        for n in range(2):
-            if 0 <= c + n < columns:
-                share = np.float32(column[k] - c if n else 1 - (column[k] - c))
-                if c + n == left[k]:
-                    before[k] = share
-                else:
-                    after[k] = share
+        left[k], right[k] = min(max(c, 0), columns - 1), min(max(c + 1, 0), columns - 1)
+        before[k] = 1 - (column[k] - c) if 0 <= c < columns else 0
+        after[k] = column[k] - c if 0 <= c + 1 < columns else 0
     for r in range(rows):
-        line = texture[r]
-        for k in range(column.size):
-            value = before[k] * line[left[k]] + after[k] * line[min(left[k] + 1, columns - 1)]
-            for n in range(channels):
-                out[r, k * channels + n] = value
-
-
-@_compiled
-def mix_columns(sums, first, shares, alike, channels, raster):  # type: ignore[no-untyped-def]
-    """raster[y, x·channels + c] += Σ share · sums[y, k·channels + c] over the samples that reach column x.
-
-    sums must reach ``width`` samples beyond the last one, with zeros; shares: (columns, width), width a
-    multiple of 3. alike: (begin, end), columns with the same shares of successive samples: one contiguous
-    sum, where the others are taken one by one.
-    """
-    begin, end = alike
-    for y in range(sums.shape[0]):
-        line, out = sums[y], raster[y]
-        for t in range(0, shares.shape[1], 3):
-            _mix_one_by_one(line, first, shares, t, channels, 0, begin, out)
-            _mix_one_by_one(line, first, shares, t, channels, end, first.size, out)
-            if end > begin:
-                n = channels * (end - begin)
-                start = channels * (first[begin] + t)
-                near = line[start : start + n]
-                mid = line[start + channels : start + channels + n]
-                far = line[start + 2 * channels : start + 2 * channels + n]
-                here = out[channels * begin : channels * end]
-                a, b, c = shares[begin, t], shares[begin, t + 1], shares[begin, t + 2]
-                for x in range(n):
-                    here[x] += a * near[x] + b * mid[x] + c * far[x]
-
-
-@_inlined
-def _mix_one_by_one(line, first, shares, t, channels, begin, end, out):  # type: ignore[no-untyped-def]
-    for x in range(begin, end):
-        k = channels * (first[x] + t)
-        a, b, c = shares[x, t], shares[x, t + 1], shares[x, t + 2]
-        if channels == 3:
-            out[3 * x] += a * line[k] + b * line[k + 3] + c * line[k + 6]
-            out[3 * x + 1] += a * line[k + 1] + b * line[k + 4] + c * line[k + 7]
-            out[3 * x + 2] += a * line[k + 2] + b * line[k + 5] + c * line[k + 8]
+        line, to = texture[r], out[r]
+        if repeat == 1:
+            for k in range(column.size):
+                to[k] = before[k] * line[left[k]] + after[k] * line[right[k]]
         else:
-            for n in range(channels):
-                out[channels * x + n] += (
-                    a * line[k + n] + b * line[k + channels + n] + c * line[k + 2 * channels + n]
-                )
+            for k in range(column.size):
+                value = before[k] * line[left[k]] + after[k] * line[right[k]]
+                for n in range(repeat):
+                    to[k * repeat + n] = value
 
 
 @_compiled
-def add_band(  # type: ignore[no-untyped-def]
-    values, view_rows, view_columns, weights, first_row, row_shares, first_column, column_shares, alike,
-    channels, start, stop, raster,
-):  # fmt: skip
-    """Add all views to raster rows start … stop, column of views by column of views.
+def mix_columns(sums, pitch, first, shares, channels, turned, tiles):  # type: ignore[no-untyped-def]
+    """tiles[i, x · channels + c, y] += Σ share · sums[8i + y, k · channels + c] over samples k that reach x.
 
-    weights: (rows of taps, columns of taps); first_row: (rows of taps, raster rows); first_column: (columns
-    of taps, raster columns); shares with one axis more; raster: (rows, columns × channels).
+    sums: (rows, pitch), a multiple of 8 of them. Eight rows are turned to stand side by side, so that they are
+    mixed alike wherever a column's samples begin; turned is the room for it, zero beyond the last sample. first:
+    (columns,), shares: (columns, width).
     """
-    n = values.shape[3]
-    sums = np.zeros((stop - start, n + column_shares.shape[2] * channels), np.float32)
-    for a in range(view_columns.size):
-        if not weights[:, a].any():
-            continue
-        sum_rows(
-            values,
-            view_rows,
-            view_columns[a],
-            weights[:, a],
-            first_row,
-            row_shares,
-            start,
-            stop,
-            sums,
-        )
-        mix_columns(sums, first_column[a], column_shares[a], alike[a], channels, raster[start:stop])
+    step = EIGHT * channels
+    for tile in range(len(sums) // EIGHT):
+        rows = sums[EIGHT * tile : EIGHT * (tile + 1)]
+        a, b, c, d, e, f, g, h = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7]
+        for k in range(pitch):
+            turned[8 * k], turned[8 * k + 1], turned[8 * k + 2], turned[8 * k + 3] = a[k], b[k], c[k], d[k]
+            turned[8 * k + 4], turned[8 * k + 5], turned[8 * k + 6], turned[8 * k + 7] = e[k], f[k], g[k], h[k]
+        out = tiles[tile].reshape(-1)
+        for x in range(first.size):
+            for n in range(channels):
+                mix_eight(turned, step * first[x] + EIGHT * n, step, shares, x, out, step * x + EIGHT * n)
 
 
 @_compiled
-def add_masked_band(  # type: ignore[no-untyped-def]
-    values, view_rows, column, weights, first_row, row_shares, fine, masks, mask_start, mask_rows, row, row_step,
-    first_column, column_shares, alike, channels, start, stop, raster,
-):  # fmt: skip
-    """As `add_band` for one column of views, each sample divided as ``fine`` says and weighted by the masks."""
-    n = fine[2].size * channels if fine[2].size > 0 else values.shape[3]
-    sums = np.zeros((stop - start, n + column_shares.shape[1] * channels), np.float32)
-    sum_masked_rows(
-        values, view_rows, column, weights, first_row, row_shares, fine, masks, mask_start, mask_rows, row,
-        row_step, start, stop, sums,
-    )  # fmt: skip
-    mix_columns(sums, first_column, column_shares, alike, channels, raster[start:stop])
+def raster_of(tiles, channels, mirrored, start, stop, raster):  # type: ignore[no-untyped-def]
+    """Rows start … stop of the raster, (rows, columns · channels), from its tiles as `mix_columns` has them."""
+    columns = raster.shape[1] // channels
+    for tile in range(start // EIGHT, (stop + EIGHT - 1) // EIGHT):
+        rows = min(EIGHT, stop - EIGHT * tile)
+        for x in range(columns):
+            to = (columns - 1 - x if mirrored else x) * channels
+            for n in range(channels):
+                for y in range(rows):
+                    raster[EIGHT * tile + y, to + n] = tiles[tile, x * channels + n, y]
+
+
+@_compiled
+def filter_rows(  # type: ignore[no-untyped-def]
+    raster, down, across, channels, guard, transmission, start, stop, picture
+):
+    """Rows start … stop of the picture: the raster convolved down and across, less its guard, times transmission.
+
+    raster: (rows, columns · channels), dark beyond its border; down, across: odd numbers of float32 weights;
+    transmission: (rows, columns), or empty; picture: (rows, columns · channels), each side by guard smaller.
+    """
+    rows, n = raster.shape
+    wide = picture.shape[1]
+    reach_down, reach = down.size // 2, channels * (across.size // 2)
+    line = np.zeros(n + 2 * reach, np.float32)
+    middle = line[reach : reach + n]
+    for y in range(start, stop):
+        middle[:] = 0
+        for i in range(down.size):
+            source = y + guard + reach_down - i
+            if 0 <= source < rows:
+                weight, here = down[i], raster[source]
+                for x in range(n):
+                    middle[x] += weight * here[x]
+        out = picture[y]
+        out[:] = 0
+        for j in range(across.size):
+            weight, begin = across[j], channels * (guard + 2 * (across.size // 2) - j)
+            here = line[begin : begin + wide]
+            for x in range(wide):
+                out[x] += weight * here[x]
+        if transmission.size > 0:
+            for x in range(transmission.shape[1]):
+                for c in range(channels):
+                    out[x * channels + c] *= np.float32(transmission[y, x])
 
 
 @_inlined

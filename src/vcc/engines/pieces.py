@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.engines import EngineName, Progress, Recorded, record
 from vcc.engines.rays import check_tolerance, warn_of_error
+from vcc.engines.sharpening import kept_as, sharpened
 from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.plan.explain import Explanation, expected_memory, explain
 from vcc.plan.explain_rays import expected_memory as expected_ray_memory
 from vcc.plan.model import Plan
+from vcc.plan.ray_sharpening import REACH
 from vcc.plan.rays import TABLE, RayPlan
 
 if TYPE_CHECKING:
@@ -209,9 +211,10 @@ def cut(plan: Plan | RayPlan, light_field: Unread, engine: EngineName | None, me
         border = 2
     high, wide = rows[1] - rows[0], columns[1] - columns[0]
     kind = np.dtype(outline.values.dtype)
-    pixel_row = math.prod(outline.shape[3:]) * _kept_as(kind).itemsize
+    kept = _kept_as(plan, kind)
+    pixel_row = math.prod(outline.shape[3:]) * kept.itemsize
     # Engines in NumPy convert all that they are given, and take as much again for what they find.
-    times = 1.0 if engine in (None, "numba") else 1 + 16 / _kept_as(kind).itemsize
+    times = 1.0 if engine in (None, "numba") else 1 + 16 / kept.itemsize
     view = pixel_row * nt
     fixed = _fixed(plan, outline)
     # A view is read, unpacked and converted before it has its place.
@@ -237,8 +240,10 @@ def _looked_at(views: NDArray[np.int64]) -> tuple[int, int]:
     return int(views.min()), int(views.max()) + 1
 
 
-def _kept_as(kind: np.dtype[Any]) -> np.dtype[Any]:
+def _kept_as(plan: Plan | RayPlan, kind: np.dtype[Any]) -> np.dtype[Any]:
     """The type of blocks in memory: compiled code takes no half precision."""
+    if isinstance(plan, RayPlan):
+        return kept_as(plan, kind)
     return np.dtype(np.float32) if kind == np.float16 else kind
 
 
@@ -266,7 +271,7 @@ def _summed(
     used = _used_views(plan, outline.shape)
     border = 0 if footprints else 1
     rest = tuple(outline.shape[3:])
-    kind = _kept_as(np.dtype(outline.values.dtype))
+    kind = _kept_as(plan, np.dtype(outline.values.dtype))
     around = [_bordered(block, outline.shape, border) for block in blocks]
     room = np.empty(max(math.prod(shape) for shape, _ in around) * math.prod(rest), dtype=kind)
     total = int(used.sum()) * math.ceil(outline.shape[2] / blocks.pixel_rows_each)
@@ -280,7 +285,7 @@ def _summed(
         values = room[: math.prod(grown) * math.prod(rest)].reshape(*grown, *rest)
         values[:] = 0
         for j, i in zip(*np.nonzero(used[a:b, c:d]), strict=True):
-            values[up + j, left + i] = light_field.linear_view(a + int(j), c + int(i), *block.pixel_rows)
+            values[up + j, left + i] = _view(plan, light_field, a + int(j), c + int(i), block.pixel_rows, engine)
             done += 1
             if progress is not None:
                 progress(done, total)
@@ -288,10 +293,33 @@ def _summed(
             part = (
                 _footprints_of(whole, block, outline.shape[2])
                 if footprints
-                else _rays_to(whole, block, grown, rest[0], (a - up, c - left))
+                else _rays_to(_on_sharpened(whole, outline), block, grown, rest[0], (a - up, c - left))
             )
             summed += record(part, values, engine=engine).values
     return sums
+
+
+def _view(
+    plan: Plan | RayPlan,
+    light_field: Unread,
+    row: int,
+    column: int,
+    pixel_rows: tuple[int, int],
+    engine: EngineName | None,
+) -> NDArray[Any]:
+    """Rows of pixels of a view, as the plan looks them up: sharpened with their neighbours if it asks so."""
+    first, stop = pixel_rows
+    if not isinstance(plan, RayPlan) or plan.sharpening is None:
+        return light_field.linear_view(row, column, first, stop)
+    above, below = min(REACH, first), min(REACH, light_field.outline.shape[2] - stop)
+    view = light_field.linear_view(row, column, first - above, stop + below)
+    _, sharp = sharpened(plan, view[None, None], "numba" if engine is None else engine)
+    return np.asarray(sharp)[0, 0, above : above + stop - first]
+
+
+def _on_sharpened(plan: RayPlan, outline: LightField) -> RayPlan:
+    """The plan for views that `_view` has made sharper."""
+    return sharpened(plan, _one_sample(outline), "numba")[0]
 
 
 def _used_views(plan: Plan | RayPlan, shape: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -427,11 +455,12 @@ def _to_one_sample(plan: RayPlan) -> RayPlan:
         views=(1, 1, 1, 1),
         between_views=False,
         motion=np.zeros((2, 2)),
+        sharpening=None,
     )
 
 
 def _one_sample(outline: LightField) -> NDArray[Any]:
-    return np.zeros((1, 1, 1, 1), dtype=_kept_as(np.dtype(outline.values.dtype)))
+    return np.zeros((1, 1, 1, 1), dtype=outline.values.dtype)
 
 
 def _root_mean_square(values: Array) -> float:

@@ -13,9 +13,13 @@ import numpy as np
 from numba import njit
 
 from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add_views_of_4
+from vcc.plan.rays import DIGITS
 
 PACKET = 256
 """Rays at a time: six numbers each, which stay in the first-level cache."""
+
+DIGITS_ABOVE, DIGITS_BELOW = np.float32(2.0**DIGITS), 2.0**-DIGITS
+"""What takes a point to its digits as a whole number, and back."""
 
 INLINED = {"nogil": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy", "inline": "always"}
 OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy"}
@@ -394,17 +398,17 @@ def hashed(number, seed):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINED)
-def set_box(boxes, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
-    """Numbers by which `through_cell` finds the places in a cell that light comes through, along one axis."""
+def set_image(images, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
+    """Numbers by which `through_cell` finds the stop's image seen through a cell, along one axis, and the cell."""
     gain = cells[6, axis] + power * cells[8, axis]
     if abs(gain) < 1e-12:
         gain = 1e-12
     rest = cells[10, axis] - cells[9, axis] + cells[8, axis] * (power * centre + slope)
-    boxes[axis, 0] = rest / gain
-    boxes[axis, 1] = -cells[7, axis] / gain
-    boxes[axis, 2] = cells[11, axis] / abs(gain)
-    boxes[axis, 3] = centre - cells[12, axis]
-    boxes[axis, 4] = centre + cells[12, axis]
+    images[axis, 0] = rest / gain
+    images[axis, 1] = -cells[7, axis] / gain
+    images[axis, 2] = cells[11, axis] / abs(gain)
+    images[axis, 3] = centre
+    images[axis, 4] = cells[12, axis]
 
 
 @njit(**OPTIONS)
@@ -445,33 +449,38 @@ def cells_seen(cells, cell_kinds, cell_whole, x, y, pixels, near):  # type: igno
 
 
 @njit(**INLINED)
-def at_pixel(points, start, n, moved, middle_x, middle_y, wide, high, x, y):  # type: ignore[no-untyped-def]
+def unit(point, flipped):  # type: ignore[no-untyped-def]
+    """A number 0 … 1 of `DIGITS` binary digits, some of them flipped; see `vcc.plan.rays.RayPlan._moved`."""
+    return (np.float64(np.int32(point * DIGITS_ABOVE) ^ flipped) + 0.5) * DIGITS_BELOW
+
+
+@njit(**INLINED)
+def at_pixel(points, start, n, flipped, middle_x, middle_y, wide, high, x, y):  # type: ignore[no-untyped-def]
     """Places of n rays over the sensitive area of a pixel."""
-    right, down = moved[0], moved[1]
+    across, down = np.int32(flipped[0]), np.int32(flipped[1])
     for p in range(n):
-        a = points[0, start + p] + right
-        x[p] = middle_x + (a - math.floor(a + 0.5)) * wide
-        b = points[1, start + p] + down
-        y[p] = middle_y + (b - math.floor(b + 0.5)) * high
+        x[p] = middle_x + (unit(points[0, start + p], across) - 0.5) * wide
+        y[p] = middle_y + (unit(points[1, start + p], down) - 0.5) * high
 
 
 @njit(**INLINED)
 def through_window(  # type: ignore[no-untyped-def]
-    points, start, n, moved, window, scatter, x, y, s, t, share
+    points, start, n, flipped, window, scatter, x, y, s, t, share
 ):  # fmt: skip
     """Slopes and weights of n rays towards a window, making up for diffusers; see `vcc.plan.rays.Window`."""
     f0, f1, f2, f3, f4 = window[0, 0], window[0, 1], window[0, 2], window[0, 3], window[0, 4]
     g0, g1, g2, g3, g4 = window[1, 0], window[1, 1], window[1, 2], window[1, 3], window[1, 4]
-    solid_angle, right, down, side = window[2, 0], 2.0 * moved[2], 2.0 * moved[3], 2.0
-    if window[2, 1] == 1.0:  # a disc is turned, not shifted
-        turn = 2.0 * math.pi * moved[2]
+    solid_angle, disc = window[2, 0], window[2, 1] == 1.0
+    if disc:  # turned
+        turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
         cosine, sine = math.cos(turn), math.sin(turn)
         f0, f1 = f0 * cosine + f1 * sine, f1 * cosine - f0 * sine
         g0, g1 = g0 * cosine + g1 * sine, g1 * cosine - g0 * sine
-        right = down = side = 0.0
+    across, down = np.int32(flipped[2]), np.int32(flipped[3])
     for p in range(n):
-        a, b = points[2, start + p] + right, points[3, start + p] + down
-        a, b = a - side * math.floor(0.5 * a + 0.5), b - side * math.floor(0.5 * b + 0.5)
+        a, b = np.float64(points[2, start + p]), np.float64(points[3, start + p])
+        if not disc:
+            a, b = 2.0 * unit(points[2, start + p], across) - 1.0, 2.0 * unit(points[3, start + p], down) - 1.0
         s[p] = f0 * a + f1 * b + f2 * x[p] + f3 * y[p] + f4
         t[p] = g0 * a + g1 * b + g2 * x[p] + g3 * y[p] + g4
         share[p] = solid_angle
@@ -485,41 +494,52 @@ def through_window(  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINED)
-def through_cell(points, start, n, moved, boxes, cells, x, y, s, t, share):  # type: ignore[no-untyped-def]
-    """Slopes and weights of n rays through the part of a cell that the stop is seen through, along each axis."""
-    for axis in range(2):
-        place, slope = (x, s) if axis == 0 else (y, t)
-        middle, along, half = boxes[axis, 0], boxes[axis, 1], boxes[axis, 2]
-        left, right = boxes[axis, 3], boxes[axis, 4]
-        from_sensor, offset, per_slope = cells[3, axis], cells[5, axis], 1 / cells[4, axis]
-        weight, shift = abs(per_slope), 2.0 * moved[2 + axis]
-        for p in range(n):
-            point = points[2 + axis, start + p] + shift
-            point -= 2.0 * math.floor(0.5 * point + 0.5)
-            centre = middle + along * place[p]
-            low = max(centre - half, left)
-            high = max(min(centre + half, right), low)
-            a = (low + high) / 2 + (high - low) / 2 * point
-            slope[p] = (a - from_sensor * place[p] - offset) * per_slope
-            share[p] = weight * (high - low) * (share[p] if axis == 1 else 1.0)
+def through_cell(points, start, n, flipped, images, cells, borders, x, y, s, t, share):  # type: ignore[no-untyped-def]
+    """Slopes and weights of n rays through what of a cell the stop is seen through; see `CellWindows.aimed`.
 
-
-@njit(**OPTIONS)
-def keep_own(cells, cell_whole, row, column, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
-    """Drop rays that meet another cell than the one whose rectangle they were aimed at."""
-    turn = cells[0:3].ravel()
+    Until the last loop, s holds places across, t and share the ends of what is seen there.
+    """
+    middle, along, half, centre, reach = images[0, 0], images[0, 1], images[0, 2], images[0, 3], images[0, 4]
+    middle_y, along_y, half_y, centre_y = images[1, 0], images[1, 1], images[1, 2], images[1, 3]
+    radius, disc = cells[13, 0], cells[13, 1]
+    across, down = np.int32(flipped[2]), np.int32(flipped[3])
+    per_half = disc / half  # of a rectangle all chords are alike
     for p in range(n):
-        a = cells[3, 0] * x[p] + cells[4, 0] * s[p] + cells[5, 0]
-        b = cells[3, 1] * y[p] + cells[4, 1] * t[p] + cells[5, 1]
-        own_row, own_column, _, _ = cell_of(cell_whole[0], turn, a, b)
-        if own_row != row or own_column != column:
-            share[p] = 0.0
+        image = middle + along * x[p]
+        low = max(image - half, centre - reach)
+        a = low + max(min(image + half, centre + reach) - low, 0.0) * unit(points[2, start + p], across)
+        off = (a - image) * per_half
+        chord = half_y * math.sqrt(max(1.0 - off * off, 0.0))
+        image = middle_y + along_y * y[p]
+        s[p], t[p], share[p] = a, image - chord, image + chord
+    for strip in range(len(borders)):
+        slope, tall = borders[strip, 0], borders[strip, 1]
+        for p in range(n):
+            border = centre_y + slope * (s[p] - centre)
+            t[p], share[p] = max(t[p], border - tall), min(share[p], border + tall)
+    if radius < np.inf:
+        for p in range(n):
+            away = s[p] - centre
+            chord = math.sqrt(max(radius * radius - away * away, 0.0))
+            t[p], share[p] = max(t[p], centre_y - chord), min(share[p], centre_y + chord)
+    per_slope_x, per_slope_y = 1 / cells[4, 0], 1 / cells[4, 1]
+    weight = abs(per_slope_x * per_slope_y)
+    from_x, from_y, offset_x, offset_y = cells[3, 0], cells[3, 1], cells[5, 0], cells[5, 1]
+    for p in range(n):
+        image = middle + along * x[p]
+        wide = max(min(image + half, centre + reach) - max(image - half, centre - reach), 0.0)
+        tall = max(share[p] - t[p], 0.0)
+        b = t[p] + tall * unit(points[3, start + p], down)
+        s[p] = (s[p] - from_x * x[p] - offset_x) * per_slope_x
+        t[p] = (b - from_y * y[p] - offset_y) * per_slope_y
+        share[p] = weight * wide * tall
 
 
 @njit(**OPTIONS)
 def add_tile(  # type: ignore[no-untyped-def]
     values, views, channels, scale, pixels, tile, samples, block_shift, seed, points, window, scatter, cells,
-    cell_kinds, cell_whole, codes, whole, real, shares, slopes, index, motion, between, ends, picture, tally,
+    cell_kinds, cell_whole, borders, codes, whole, real, shares, slopes, index, motion, between, ends, picture,
+    tally,
 ):  # fmt: skip
     """The pixels of a tile, into picture (rows, columns, channels).
 
@@ -539,6 +559,7 @@ def add_tile(  # type: ignore[no-untyped-def]
         cells: rows of numbers by axis (x, y) where rays are aimed through cells, else empty.
         cell_kinds: (kinds, 3): power, δs, δt.
         cell_whole: layout, rows and columns of kinds, reach in rows and columns.
+        borders: (strips, 2): what cuts out a cell's opening, see `vcc.plan.rays.CellWindows`.
         codes: see `vcc.plan.steps.Packer`, likewise the next four.
         whole: see above.
         real: see above.
@@ -559,7 +580,7 @@ def add_tile(  # type: ignore[no-untyped-def]
     blocks = points.shape[1] // samples
     near = np.empty((256, 2), dtype=np.int64)
     turn = cells[0:3].ravel()
-    boxes, moved = np.empty((2, 5)), np.empty(4)
+    images, flipped = np.empty((2, 5)), np.empty(4, dtype=np.int64)
     for row in range(tile[0], min(tile[1], rows_there)):
         for column in range(tile[2], min(tile[3], columns_there)):
             middle_x = pixels[0, 0] + column * pixels[0, 1]
@@ -567,7 +588,7 @@ def add_tile(  # type: ignore[no-untyped-def]
             block = (np.int64(hashed(row * columns_there + column, seed)) * blocks) >> 32
             first = (block ^ block_shift) * samples
             for n in range(4):
-                moved[n] = hashed(row * columns_there + column, seed + 1 + n) * 2.0**-32
+                flipped[n] = hashed(row * columns_there + column, seed + 1 + n) >> np.uint32(32 - DIGITS)
             totals[:] = 0
             cells_near = 1
             if by_cell:
@@ -576,18 +597,16 @@ def add_tile(  # type: ignore[no-untyped-def]
                 if by_cell:
                     centre_x, centre_y = centre_of(cell_whole[0], turn, near[q, 0], near[q, 1])
                     kind = kind_of(cell_whole, near[q, 0], near[q, 1])
-                    set_box(boxes, cells, 0, centre_x, cell_kinds[kind, 0], cell_kinds[kind, 1])
-                    set_box(boxes, cells, 1, centre_y, cell_kinds[kind, 0], cell_kinds[kind, 2])
+                    set_image(images, cells, 0, centre_x, cell_kinds[kind, 0], cell_kinds[kind, 1])
+                    set_image(images, cells, 1, centre_y, cell_kinds[kind, 0], cell_kinds[kind, 2])
                 for done in range(0, samples, PACKET):
                     n = min(PACKET, samples - done)
                     start = first + done
-                    at_pixel(points, start, n, moved, middle_x, middle_y, pixels[0, 2], pixels[1, 2], x, y)
+                    at_pixel(points, start, n, flipped, middle_x, middle_y, pixels[0, 2], pixels[1, 2], x, y)
                     if by_cell:
-                        through_cell(points, start, n, moved, boxes, cells, x, y, s, t, share)
-                        if cell_whole[0] == 1 or turn[1] != 0.0:  # a cell is not the rectangle around it
-                            keep_own(cells, cell_whole, near[q, 0], near[q, 1], n, x, y, s, t, share)
+                        through_cell(points, start, n, flipped, images, cells, borders, x, y, s, t, share)
                     else:
-                        through_window(points, start, n, moved, window, scatter, x, y, s, t, share)
+                        through_window(points, start, n, flipped, window, scatter, x, y, s, t, share)
                     traced = 0
                     for p in range(n):
                         traced += share[p] > 0.0

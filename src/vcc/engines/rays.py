@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.engines.sharpening import sharpened
 from vcc.errors import InputError, ResultWarning
 from vcc.plan.rays import TABLE, CellWindows, RayPlan, Window
 from vcc.sampled import to_dtype
@@ -68,6 +69,7 @@ def run(
     """
     once = {"numba": _compiled, "array_api": _in_library, "reference": _in_library}[engine]
     kind = np.float64 if engine == "reference" else None
+    plan, values = sharpened(plan, values, engine)
     traced = once(plan, values, 0, kind, progress)
     round_number = 0
     while tolerance is not None and traced.sampling_error > tolerance * abs(_mean(traced.values)):
@@ -157,6 +159,7 @@ def _tile_adder(
     pixels = np.array([plan.first_pixel, plan.pitch, plan.sensitive]).T.copy()
     window, scatter = np.zeros((3, 5)), np.zeros((0, 5))
     cells, kinds, whole = np.zeros((0, 2)), np.zeros((0, 3)), np.zeros(5, dtype=np.int64)
+    borders = np.zeros((0, 2))
     if isinstance(plan.aim, Window):
         window[:2, :2], window[:2, 2:4] = plan.aim.slope_from_point, plan.aim.slope_from_sensor
         window[:2, 4], window[2, :2] = plan.aim.offset, (plan.aim.solid_angle, plan.aim.disc)
@@ -164,6 +167,7 @@ def _tile_adder(
         scatter = np.array(terms).reshape(-1, 5)
     else:
         cells, kinds, whole = _cell_tables(plan.aim)
+        borders = np.ascontiguousarray(plan.aim.borders)
     steps = plan.packed().arrays()
     points, seed = np.ascontiguousarray(plan.points.T), plan.seed & 0xFFFFFFFF  # the hash takes no more of it
 
@@ -171,8 +175,8 @@ def _tile_adder(
         tally = np.zeros(4)
         kernels.add_tile(
             flat, plan.views, channels, plan.scale, pixels, tile, plan.samples, beside, seed, points,
-            window, scatter, cells, kinds, whole, *steps, plan.index_from_ray.matrix[:4].copy(), plan.motion,
-            plan.between_views, plan.views_may_end, picture, tally,
+            window, scatter, cells, kinds, whole, borders, *steps, plan.index_from_ray.matrix[:4].copy(),
+            plan.motion, plan.between_views, plan.views_may_end, picture, tally,
         )  # fmt: skip
         return tally
 
@@ -197,6 +201,7 @@ def _cell_tables(aim: CellWindows) -> tuple[Array, Array, NDArray[np.int64]]:
             aim.middle,
             aim.half,
             aim.cell_half,
+            [aim.opening_radius, aim.disc],
         ]
     )
     kinds = np.concatenate([aim.powers[..., None], aim.slopes], axis=-1).reshape(-1, 3)
@@ -221,7 +226,7 @@ def _in_library(plan: RayPlan, values: Any, beside: int, kind: Any, progress: Pr
     weights, missing, rays = 0.0, 0.0, 0
     for pixel in _pieces(plan):
         index, share = plan.looked_up(pixel, plan.block(pixel) ^ beside)
-        inside, held = _held(plan, index)
+        inside, held = plan.held(index)
         weights += float((share * (inside | plan.views_may_end)).sum())
         missing += float((share * (~held) * (inside | plan.views_may_end)).sum())
         rays += int(np.count_nonzero(share))
@@ -248,14 +253,6 @@ def _pieces(plan: RayPlan) -> Iterator[NDArray[np.int64]]:
     total = plan.sensor_shape[0] * plan.sensor_shape[1]
     for first in range(0, total, at_once):
         yield np.arange(first, min(first + at_once, total))
-
-
-def _held(plan: RayPlan, index: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which rays fall into the grid of views, and which into their pictures too."""
-    nv, nu, nt, ns = plan.views
-    i, j, k, l = np.moveaxis(index, -1, 0)
-    inside = (i >= -0.5) & (i <= nu - 0.5) & (j >= -0.5) & (j <= nv - 0.5)
-    return inside, inside & (k >= -0.5) & (k <= ns - 0.5) & (l >= -0.5) & (l <= nt - 0.5)
 
 
 def _found(plan: RayPlan, xp: Any, samples: Any, index: Array, share: Array, working: Any) -> Any:

@@ -78,10 +78,10 @@ def blurred(raster: NDArray[Any], weights: NDArray[np.float64], axis: int) -> ND
     from scipy.signal import oaconvolve
 
     kernel = np.expand_dims(weights, [other for other in range(3) if other != axis])
-    return _without_rounding(oaconvolve(raster.astype(np.float64), kernel, mode="same", axes=axis))
+    return without_rounding(oaconvolve(raster.astype(np.float64), kernel, mode="same", axes=axis))
 
 
-def _without_rounding(wide: NDArray[np.float64]) -> NDArray[np.float64]:
+def without_rounding(wide: NDArray[np.float64]) -> NDArray[np.float64]:
     """What Fourier transforms leave of no light, set to none."""
     return np.where(np.abs(wide) < ROUNDING * np.abs(wide).max(initial=0), 0.0, wide)
 
@@ -99,7 +99,7 @@ def finish(plan: Plan, raster: NDArray[Any]) -> NDArray[np.float32]:
 
         # In double precision: what Fourier transforms round to in the dark would else show.
         wide = oaconvolve(raster.astype(np.float64), plan.blur[:, :, None], mode="same", axes=(0, 1))
-        raster = _without_rounding(wide)
+        raster = without_rounding(wide)
     if plan.sharpen is not None:
         raster = blurred(blurred(raster, plan.sharpen[0], 0), plan.sharpen[1], 1)
     if plan.guard:

@@ -72,6 +72,8 @@ def _add_views(channels: int) -> Any:
                 run = builder.bitcast(builder.gep(data, [offset]), ir.VectorType(sample, lanes).as_pointer())
                 run = builder.load(run, align=values.dtype.bitwidth // 8)
                 if isinstance(values.dtype, types.Integer):
+                    if values.dtype.signed:
+                        return builder.sitofp(run, wide)
                     if values.dtype.bitwidth < 32:
                         run = builder.zext(run, ir.VectorType(number, lanes))
                         return builder.sitofp(run, wide)  # 32 bits with the sign bit clear: the cheap conversion

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.engines import EngineName, Progress, run_plan
-from vcc.engines.smear import separable_terms, spreading_matrix
+from vcc.engines.smear import separable_terms, spreading_matrix, without_rounding
 from vcc.plan.model import Plan
 
 
@@ -44,8 +44,7 @@ def _blurred(views: Any, kernel: NDArray[np.float64]) -> Any:
         weights = kernel if views.ndim == 4 else kernel[:, :, None]
         for j in range(len(views)):
             # In double precision: what Fourier transforms round to in the dark would else add up.
-            wide = oaconvolve(views[j, 0].astype(np.float64), weights, axes=(0, 1))
-            result[j, 0] = np.maximum(wide, 0)  # radiance is not negative, and neither is the kernel
+            result[j, 0] = without_rounding(oaconvolve(views[j, 0].astype(np.float64), weights, axes=(0, 1)))
         return result
     from array_api_compat import array_namespace, device
 

@@ -2,8 +2,8 @@
 
 An ``.npy`` holds samples and nothing else, so their axes may have to be told and the cameras are unknown.
 The ``.npz`` that `save` makes holds, beside ``values`` (v, u, t, s[, channel]), the 5×5 ``frame`` (indices
-from 0 to metres and slopes), ``transfer`` ("linear" or "srgb") and, where known, ``disparity_range``. Other
-programs may write the same.
+from 0 to metres and slopes), ``transfer`` ("linear" or "srgb"), ``sample`` ("mean" or "point") and, where known,
+``disparity_range``. Other programs may write the same; without ``sample`` the samples are means over pixels.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from vcc.formats.atomic import atomic_path
 from vcc.formats.grid import Decoded, Geometry
 
 if TYPE_CHECKING:
-    from vcc.light_field import LightField
+    from vcc.light_field import LightField, Sample
 
 ENDINGS = (".npy", ".npz")
 
-_OWN = ("values", "frame", "transfer", "disparity_range")
+_OWN = ("values", "frame", "transfer", "sample", "disparity_range")
 _MOST_LIKELY_CHANNELS = 4  # an axis of so few samples is colour rather than a picture's width
 _ORDER = "vutsc"
 
@@ -81,7 +81,10 @@ def read(
         format="NumPy array" if path.suffix.lower() == ".npy" else "NumPy arrays (.npz)",
         values=values,
         transfer=_transfer(arrays.get("transfer"), values, path),
-        geometry=Geometry(disparity_range=_disparity_range(arrays.get("disparity_range"), path)),
+        geometry=Geometry(
+            disparity_range=_disparity_range(arrays.get("disparity_range"), path),
+            sample=_sample(arrays.get("sample"), path),
+        ),
         frame=_frame(arrays.get("frame"), shape is None and axes is None, path),
     )
 
@@ -105,6 +108,7 @@ def save(light_field: LightField, path: str | PathLike[str]) -> Path:
         "values": to_numpy(light_field.values),
         "frame": light_field.frame.matrix,
         "transfer": np.array("linear"),
+        "sample": np.array(light_field.sample),
     }
     if light_field.disparity_range is not None:
         arrays["disparity_range"] = np.array(light_field.measured_disparity_range())
@@ -199,6 +203,14 @@ def _transfer(stated: NDArray[Any] | None, values: NDArray[Any], path: Path) -> 
     if stated.shape == () and stated.item() == "srgb":
         return "srgb"
     raise InputError(f'{path}: its "transfer" is {stated.tolist()!r}; "linear" and "srgb" are known')
+
+
+def _sample(stated: NDArray[Any] | None, path: Path) -> Sample:
+    if stated is None or (stated.shape == () and stated.item() == "mean"):
+        return "mean"
+    if stated.shape == () and stated.item() == "point":
+        return "point"
+    raise InputError(f'{path}: its "sample" is {stated.tolist()!r}; "mean" and "point" are known')
 
 
 def _frame(stated: NDArray[Any] | None, axes_as_stored: bool, path: Path) -> Affine | None:

@@ -16,6 +16,7 @@ from vcc.units import mm
 
 if TYPE_CHECKING:
     from vcc.affine import Affine
+    from vcc.light_field import Sample
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")
 """The endings of the files that views may be stored in."""
@@ -54,6 +55,7 @@ class Geometry:
         directions_are_true: the positions are known to grow downwards and to the right, so that a −1 says that the
             files are counted the other way.
         picture_shape: (rows, columns) that the pictures must have.
+        sample: what a sample is, see `vcc.LightField`: means over pixels unless a file says otherwise.
     """
 
     spacing: tuple[float, float] | None = None
@@ -65,6 +67,7 @@ class Geometry:
     directions: tuple[int, int] | None = None
     directions_are_true: bool = False
     picture_shape: tuple[int, int] | None = None
+    sample: Sample = "mean"
 
 
 @dataclass(frozen=True, eq=False)

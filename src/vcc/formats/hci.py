@@ -12,6 +12,7 @@ from pathlib import Path
 
 from vcc.errors import InputError
 from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
+from vcc.light_field import Sample
 from vcc.units import mm
 
 PARAMETERS = "parameters.cfg"
@@ -90,6 +91,7 @@ def read_geometry(folder: Path) -> Geometry | None:
         focus_distance=focus if focus > 0 else math.inf,
         disparity_range=(low, high) if low <= high else None,  # NaN where not stated
         picture_shape=(int(height), int(width)),
+        sample=_sample(settings, folder),
     )
 
 
@@ -109,6 +111,16 @@ def parameters_file(folder: Path) -> Path | None:
             "Leave the right one there"
         )
     return others[0] if others else None
+
+
+def _sample(settings: configparser.ConfigParser, folder: Path) -> Sample:
+    """An entry of ours, written for samples that are no means over pixels."""
+    stated = settings.get("meta", "sample", fallback="mean")
+    if stated == "mean":
+        return "mean"
+    if stated == "point":
+        return "point"
+    raise InputError(f'{parameters_file(folder)}: sample is "{stated}"; "mean" and "point" are known')
 
 
 def _settings(folder: Path) -> configparser.ConfigParser | None:

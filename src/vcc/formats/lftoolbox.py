@@ -21,7 +21,7 @@ from vcc.errors import InputError
 from vcc.formats import hdf5
 from vcc.formats.atomic import atomic_path
 from vcc.formats.grid import Decoded, Geometry
-from vcc.light_field import LightField
+from vcc.light_field import LightField, Sample
 from vcc.sampled import to_numpy
 
 _TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
@@ -60,6 +60,7 @@ def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> D
         )
         corrected = "ColourCorrect" in _text(file, "DecodeOptions/OptionalTasks")
         ours = _text(file, f"{_OURS}/Transfer")
+        sample: Sample = "point" if _text(file, f"{_OURS}/Sample") == "point" else "mean"
         has_weight = file[f"{_OURS}/HasWeight"][0, 0] != 0 if _OURS in file else None
         disparities = file[f"{_OURS}/DisparityRange"][...].ravel() if f"{_OURS}/DisparityRange" in file else None
         metadata: dict[str, Any] = {}
@@ -88,7 +89,8 @@ def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> D
         values=values,
         transfer=transfer,
         geometry=Geometry(
-            disparity_range=None if disparities is None else (float(disparities[0]), float(disparities[1]))
+            disparity_range=None if disparities is None else (float(disparities[0]), float(disparities[1])),
+            sample=sample,
         ),
         frame=None if intrinsics is None else frame_of(intrinsics, path),
         weights=weights,
@@ -162,7 +164,8 @@ def save(light_field: LightField, path: str | PathLike[str], *, weights: NDArray
             options = _struct(file, "RectOptions")
             _variable(options, "RectCamIntrinsicsH", np.ascontiguousarray(intrinsics_of(light_field.frame).T))
             ours = _struct(file, _OURS)
-            _variable(ours, "Transfer", np.frombuffer("linear".encode("utf-16-le"), np.uint16)[:, None], "char")
+            for name, word in (("Transfer", "linear"), ("Sample", light_field.sample)):
+                _variable(ours, name, np.frombuffer(word.encode("utf-16-le"), np.uint16)[:, None], "char")
             _variable(ours, "HasWeight", np.array([[float(weights is not None)]]))
             if light_field.disparity_range is not None:
                 _variable(ours, "DisparityRange", np.array(light_field.disparity_range, float)[:, None])

@@ -33,7 +33,7 @@ from vcc.formats.pictures import read_picture
 from vcc.formats.reading_views import read_views
 from vcc.formats.sparse import SparseViews
 from vcc.formats.transfer import decode
-from vcc.light_field import DisparityRange, LightField
+from vcc.light_field import DisparityRange, LightField, Sample
 
 Transfer = Literal["auto", "srgb", "linear"]
 
@@ -66,6 +66,7 @@ class FolderInfo:
         transfer: "srgb" or "linear", as the format has it.
         frame: the full 5×5 frame, where the format states one; spacing and the next two are then read from it.
         remarks: what the format's reader has to say, sentences.
+        sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; means unless the files say otherwise.
     """
 
     format: str
@@ -86,6 +87,7 @@ class FolderInfo:
     transfer: Literal["srgb", "linear"] = "srgb"
     frame: Affine | None = None
     remarks: tuple[str, ...] = ()
+    sample: Sample = "mean"
     _geometry: Geometry = field(default_factory=Geometry, repr=False)
 
 
@@ -204,7 +206,7 @@ def open_light_field(
         frame = LightField.from_views(_hollow(values.shape), **geometry).frame
     # Integers and light decoded from them are neither negative nor infinite: no need to look through them all.
     shared = DisparityRange(lambda: seen.disparities) if seen.measured and not moved.steps else None
-    light_field = LightField(values, frame, stated, _shared_disparity=shared, _checked=counts)
+    light_field = LightField(values, frame, stated, info.sample, _shared_disparity=shared, _checked=counts)
     remarks = (*info.remarks, turned, moved.remark)
     if info.frame is None:
         remarks += (
@@ -256,6 +258,7 @@ def open_sparse_views(
         grid.shape,
         LightField.from_views(_hollow((*grid.shape, info.height, info.width)), **geometry).frame,
         info.disparity_range,
+        info.sample,
     )
 
 
@@ -329,6 +332,7 @@ def _info(
         disparity_range=geometry.disparity_range,
         unknown=tuple(name for name, known in stated.items() if not known),
         directions=geometry.directions,
+        sample=geometry.sample,
         _geometry=geometry,
         **({"files": ()} | more),
     )

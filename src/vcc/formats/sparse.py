@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.errors import InputError
-from vcc.light_field import LightField
+from vcc.light_field import LightField, Sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +26,7 @@ class SparseViews:
         shape: (rows, columns) of the whole grid.
         frame: the 5×5 frame of the whole grid's light field.
         disparity_range: (lowest, highest), pixels per view, where known.
+        sample: see `vcc.LightField`.
 
     Raises:
         InputError: places that do not fit the pictures or the grid.
@@ -36,6 +37,7 @@ class SparseViews:
     shape: tuple[int, int]
     frame: Affine
     disparity_range: tuple[float, float] | None = None
+    sample: Sample = "mean"
 
     def __post_init__(self) -> None:
         if len(self.places) != len(self.pictures) or len(set(self.places)) != len(self.places):
@@ -89,7 +91,7 @@ class SparseViews:
         known = self.disparity_range
         if known is not None:
             known = (known[0] * steps[1], known[1] * steps[1]) if steps[1] > 0 else None
-        return LightField(values, frame, known)
+        return LightField(values, frame, known, self.sample)
 
 
 def _numbers(wanted: int | slice, size: int) -> list[int]:

@@ -49,6 +49,10 @@ _HOW: dict[Kind, str] = {
 _FOCAL_LENGTH = 100 * mm
 """What parameters.cfg gives: only its ratio to the sensor's size is known, and HCI's scenes have 100 mm."""
 _PNG_LEVEL = 4  # a third of the usual level's time, for 5 % more bytes
+_POINTS_UNSAID = (
+    "nothing here says that its samples are values at points, and they are read back as means over pixels: "
+    'dataclasses.replace(light_field, sample="point") says it again'
+)
 _PRECISION = 1e-9  # of a step: where a frame is that of a camera array
 
 
@@ -106,7 +110,8 @@ def save_light_field(
         Where it was written and what had to be done for it.
 
     Warns:
-        ResultWarning: samples too bright for a file were clipped.
+        ResultWarning: samples too bright for a file were clipped; or a format has no room to say that samples are
+            values at points.
 
     Raises:
         InputError: an ending that is not known or is not that of the kind, an option that the format does not
@@ -133,6 +138,8 @@ def save_light_field(
 
         writer(light_field if isinstance(light_field, LightField) else light_field.read(), path, **options)
         saved = SavedLightField(path, chosen, 1.0, 0.0, _words(light_field, path, _HOW[chosen]))
+    if light_field.sample != "mean" and chosen in ("eslf", "mp4"):
+        warnings.warn(f"{path}: {_POINTS_UNSAID}", ResultWarning, stacklevel=2)
     if progress is not None:
         progress(1, 1)
     return saved
@@ -397,9 +404,10 @@ def _parameters(
                 f"m (rows) and {du:g} m (columns), slopes per pixel of {pt:g} and {ps:g}. Write a .zarr, .npz or "
                 '.mat, or kind="views" without the file'
             )
+        more = "" if light_field.sample == "mean" else f". And {_POINTS_UNSAID}"
         return "", (
             f"{PARAMETERS} cannot hold its cameras, and there is none. Open it with spacing=({dv!r}, {du!r}), "
-            f"slope_per_pixel=({pt!r}, {ps!r}), focus_distance={cameras.focus_distance!r}"
+            f"slope_per_pixel=({pt!r}, {ps!r}), focus_distance={cameras.focus_distance!r}{more}"
         )
     rows, columns, height, width = light_field.shape[:4]
     focus = 0.0 if math.isinf(cameras.focus_distance) else cameras.focus_distance
@@ -424,6 +432,8 @@ def _parameters(
     ]
     if disparities is not None:
         lines += [f"disp_min = {disparities[0]!r}", f"disp_max = {disparities[1]!r}"]
+    if light_field.sample != "mean":
+        lines.append(f"sample = {light_field.sample}")
     return "\n".join(lines) + "\n", ""
 
 

@@ -136,7 +136,9 @@ def fringes(slope: float, width: float, distance: float, lenslets: int) -> Light
     row = (0.5 + 0.5 * np.cos(2 * np.pi * places)).astype(np.float32)
     # All views of a flat thing are the same picture where they converge on it.
     values = np.ascontiguousarray(np.broadcast_to(row, (2, 2, len(row), len(row))))
-    return LightField.from_views(values, width, slope / finer, distance, disparity_range=(0.0, 0.0))
+    return LightField.from_views(
+        values, width, slope / finer, distance, disparity_range=(0.0, 0.0), sample="point"
+    )
 
 
 def contrast(row: Array) -> float:

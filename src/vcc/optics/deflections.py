@@ -125,32 +125,55 @@ class SlopeFunction(Deflection):
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         # As whole arrays: a function such as (−x/f, −y/f) then returns slopes of one shape.
         x, y = np.broadcast_arrays(x, y)
-        shape = x.shape
-        returned = self.function(x, y)
-        try:
-            s, t = returned
-        except (TypeError, ValueError):
-            raise InputError(
-                f"the deflection must return two arrays, the slopes (Δs, Δt), not {_in_words(returned)}"
-            ) from None
-        s, t = (np.asarray(slope, dtype=np.float64) for slope in (s, t))
-        for slope in (s, t):
-            if slope.shape not in (shape, ()):
-                raise InputError(f"the deflection returned shape {slope.shape} for positions of shape {shape}")
-            if not np.isfinite(slope).all():
-                bad = np.argwhere(~np.isfinite(np.broadcast_to(slope, shape)))[0]
-                where = tuple(float(np.broadcast_to(place, shape)[tuple(bad)]) for place in (x, y))
-                raise InputError(
-                    f"the deflection returned a number that is not finite at (x, y) = "
-                    f"({where[0] * 1e3:g}, {where[1] * 1e3:g}) mm"
-                )
-        return np.broadcast_to(s, shape), np.broadcast_to(t, shape)
+        return checked_slopes(self.function(x, y), x, y, (x.shape, ()))
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
         """The largest slopes on a raster of 257×257 points over the rectangle, and 5 % more."""
         x, y = np.linspace(-half_width, half_width, 257), np.linspace(-half_height, half_height, 257)
         s, t = self(x[None, :], y[:, None])
         return 1.05 * float(np.abs(s).max()), 1.05 * float(np.abs(t).max())
+
+
+def checked_slopes(
+    returned: Any, x: Array, y: Array, shapes: tuple[tuple[int, ...], ...] | None = None
+) -> tuple[Array, Array]:
+    """What a function returned at positions x, y as two whole arrays (Δs, Δt).
+
+    Args:
+        returned: by the function.
+        x: positions, metres, that broadcast against y.
+        y: likewise.
+        shapes: that each of the two may have; None allows all that broadcast to that of the positions.
+
+    Raises:
+        InputError: not two arrays, of another shape, or with numbers that are not finite.
+    """
+    shape = np.broadcast_shapes(x.shape, y.shape)
+    try:
+        s, t = returned
+    except (TypeError, ValueError):
+        raise InputError(
+            f"the deflection must return two arrays, the slopes (Δs, Δt), not {_in_words(returned)}"
+        ) from None
+    s, t = (np.asarray(slope, dtype=np.float64) for slope in (s, t))
+    for slope in (s, t):
+        if not (_broadcasts(slope.shape, shape) if shapes is None else slope.shape in shapes):
+            raise InputError(f"the deflection returned shape {slope.shape} for positions of shape {shape}")
+        if not np.isfinite(slope).all():
+            bad = np.argwhere(~np.isfinite(np.broadcast_to(slope, shape)))[0]
+            where = tuple(float(np.broadcast_to(place, shape)[tuple(bad)]) for place in (x, y))
+            raise InputError(
+                f"the deflection returned a number that is not finite at (x, y) = "
+                f"({where[0] * 1e3:g}, {where[1] * 1e3:g}) mm"
+            )
+    return np.broadcast_to(s, shape), np.broadcast_to(t, shape)
+
+
+def _broadcasts(given: tuple[int, ...], shape: tuple[int, ...]) -> bool:
+    try:
+        return np.broadcast_shapes(given, shape) == shape
+    except ValueError:
+        return False
 
 
 def _in_words(returned: Any) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.describe import parameters_in_words
 from vcc.errors import InputError
-from vcc.optics.deflections import Deflection, SlopeFunction
+from vcc.optics.deflections import Deflection, SlopeFunction, checked_slopes
 from vcc.optics.faces import Element, Faces
 from vcc.patterns import Bounded, Circle, Open, Pattern
 from vcc.surfaces import Surface
@@ -33,7 +33,8 @@ class SurfaceDeflection(Deflection):
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """The gradient of the surface's optical path, checked."""
-        return SlopeFunction(self.surface.slopes)(*np.broadcast_arrays(x, y))
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        return checked_slopes(self.surface.slopes(x, y), x, y)
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
         """The surface's own bounds."""

@@ -51,8 +51,8 @@ def compile_best(
         )
     if method == "footprints":
         raise InputError(f"this camera's picture cannot be made by footprints: {reason}. Use method='rays'")
-    for name, given, default in (("interpolation", interpolation, "sharp"), ("refine", refine, "auto")):
-        if given != default:
+    for name, given, by_rays in (("interpolation", interpolation, ("sharp", "linear")), ("refine", refine, ("auto",))):
+        if given not in by_rays:
             raise InputError(
                 f"{name}={given!r} is for pictures made by footprints; this one is made by rays ({reason}): "
                 "leave it out"
@@ -60,6 +60,7 @@ def compile_best(
     return compile_rays(
         camera,
         light_field,
+        interpolation=interpolation,
         between_views=between_views,
         scene_distance=scene_distance,
         samples=samples,

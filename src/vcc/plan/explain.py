@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vcc.light_field import LightField, describe_geometry
+from vcc.light_field import SAMPLES_IN_WORDS, LightField, describe_geometry
 from vcc.plan.model import Plan
 from vcc.plan.parallax_rule import vergences
 from vcc.plan.rays import RayPlan
@@ -92,7 +92,7 @@ def _what(camera: Camera, light_field: LightField) -> str:
     lines = [
         f"Light field: {nv}×{nu} views of {nt}×{ns} pixels, "
         f"{light_field.channels or 1} channel{'s' if (light_field.channels or 1) > 1 else ''}, "
-        f"{to_dtype(light_field.values)}; {describe_geometry(light_field)}"
+        f"{to_dtype(light_field.values)} {SAMPLES_IN_WORDS[light_field.sample]}; {describe_geometry(light_field)}"
     ]
     lines += [
         f"{_place(element.z)}{element.kind}"
@@ -166,18 +166,12 @@ def _warnings(plan: Plan) -> str:
 
 def expected_memory(plan: Plan, light_field: LightField) -> int:
     """Bytes that a run of the plan takes beside the light field and the picture, estimated."""
-    import os
-
-    from vcc.engines.numba_cpu import BAND, MASKED_BAND
+    from vcc.engines.numba_cpu import memory
 
     channels = light_field.channels or 1
-    line = 4 * channels * plan.samples[1] * plan.refine
-    raster = 4 * channels * plan.raster_shape[0] * plan.raster_shape[1]
-    bands = (os.cpu_count() or 1) * (2 * MASKED_BAND if plan.masks else BAND) * line
-    textures = sum(mask.texture.nbytes + len(mask.texture) * line for mask in plan.masks)
     # One column of views is blurred at a time: in double precision, and kept in single.
     blurred = 0 if plan.view_blur is None else 4 * channels * light_field.shape[0] * math.prod(plan.samples)
-    return int(2 * raster + bands + textures + blurred)
+    return memory(plan, channels) + int(blurred)
 
 
 def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) -> float | None:

@@ -43,24 +43,30 @@ def _pilot(plan: RayPlan, light_field: LightField, engine: Any) -> tuple[float, 
     None where the samples cannot be run (an array under a tracer).
     """
     from vcc.engines import chosen, record
+    from vcc.engines.sharpening import sharpened
 
     if known(light_field.values[:1, :1, :1, :1]) is None:
         return None
+    name = chosen(engine, light_field.values)
+    if plan.sharpening is not None:
+        sharpened(plan, light_field.values[:1, :1], name)  # the first run may compile
+    start = time.perf_counter()
+    plan, values = sharpened(plan, light_field.values, name)
+    sharpening = time.perf_counter() - start
 
     def traced_in(patches: list[RayPlan]) -> tuple[list[Recorded], float]:
         start = time.perf_counter()
-        found = [record(patch, light_field.values, engine=engine) for patch in patches]
+        found = [record(patch, values, engine=engine) for patch in patches]
         return found, (time.perf_counter() - start) / len(patches)
 
     rows, columns = plan.sensor_shape
-    compiled = chosen(engine, light_field.values) == "numba"
-    patches = list(_patches(plan, (os.cpu_count() or 1) if compiled else 1))
+    patches = list(_patches(plan, (os.cpu_count() or 1) if name == "numba" else 1))
     pixel = replace(plan, sensor_shape=(1, 1))
     traced_in([pixel])  # the first run may compile
     _, fixed = traced_in([pixel])
     traced, each = traced_in(patches)
     factor = rows * columns / sum(math.prod(patch.sensor_shape) for patch in patches)
-    seconds = fixed + max(each - fixed, 0.0) * len(patches) * factor
+    seconds = sharpening + fixed + max(each - fixed, 0.0) * len(patches) * factor
     means = [float(np.mean(known(one.values), dtype=np.float64)) for one in traced]  # type: ignore[arg-type]
     error = math.sqrt(sum(one.sampling_error**2 for one in traced) / len(traced))
     mean = abs(sum(means) / len(means))
@@ -109,12 +115,16 @@ def _cost(plan: RayPlan, light_field: LightField, pilot: Any) -> str:
 
 def expected_memory(plan: RayPlan, light_field: LightField) -> int:
     """Bytes that a run of the plan takes beside the light field and the picture, estimated."""
+    from vcc.engines.sharpening import kept_as
+
     # Once in the plan's steps and once as the kernel reads them; a single large table is not copied.
     tables = 2 * sum(table.nbytes for table in plan.packed().arrays())
     values = light_field.values
     copied = 0
-    if isinstance(values, np.ndarray) and (values.dtype == np.float16 or not values.flags.c_contiguous):
-        copied = values.size * (4 if values.dtype == np.float16 else values.dtype.itemsize)
+    if isinstance(values, np.ndarray):
+        kept = kept_as(plan, values.dtype)
+        if plan.sharpening is not None or kept != values.dtype or not values.flags.c_contiguous:
+            copied = values.size * kept.itemsize
     return int(plan.points.nbytes + tables + copied)
 
 

@@ -24,6 +24,8 @@ POINTS_AT_ONCE = 2**20
 """Points of a texture that are averaged at once, in float64: 8 MiB."""
 PARTS_OF_A_CELL = 6
 """Parts each way by which the open part of a view's cell is found."""
+DIVIDED = 4
+"""Samples before the first and after the last at which finer ones may stand."""
 TEXTURE_FILTER = 5
 """Weights on each side of a texture's filter, beside those that the box of a sample takes."""
 
@@ -176,7 +178,9 @@ def mask_lookup(
     footprint = np.hypot(view_part, sample_part)
     # The wider of the two boxes is taken by the pattern's own means, the other by a filter of the texture.
     wide, narrow = np.maximum(view_part, sample_part), np.minimum(view_part, sample_part)
-    corners = np.array([[k, l] for k in (-2, samples[1] + 1) for l in (-2, samples[0] + 1)]) @ step.T
+    rows, columns = samples
+    ends = [[k, l] for k in (-DIVIDED, columns - 1 + DIVIDED) for l in (-DIVIDED, rows - 1 + DIVIDED)]
+    corners = np.array(ends) @ step.T
     low = (place.reshape(-1, 2)[:, None] + corners).min(axis=(0, 1))
     high = (place.reshape(-1, 2)[:, None] + corners).max(axis=(0, 1))
     bound = np.array(plane.pattern.size) / 2 + footprint
@@ -191,8 +195,8 @@ def mask_lookup(
     grid_x = np.arange(first[0] - margin[0], last[0] + margin[0] + 1) * spacing[0]
     grid_y = np.arange(first[1] - margin[1], last[1] + margin[1] + 1) * spacing[1]
     means = np.empty((grid_y.size, grid_x.size), dtype=np.float32)
-    for rows in np.array_split(np.arange(grid_y.size), -(-means.size // POINTS_AT_ONCE)):
-        means[rows] = plane.pattern.mean(grid_x[None, :], grid_y[rows, None], float(wide[0]), float(wide[1]))
+    for some in np.array_split(np.arange(grid_y.size), -(-means.size // POINTS_AT_ONCE)):
+        means[some] = plane.pattern.mean(grid_x[None, :], grid_y[some, None], float(wide[0]), float(wide[1]))
     texture = _filtered(means, filters)
     return MaskLookup(
         texture=texture,

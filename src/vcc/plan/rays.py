@@ -27,6 +27,8 @@ TABLE = 2**16
 """Points of the sequence that all pixels share; a pixel takes an aligned block of them."""
 FIRST_COLUMNS = 4
 """Columns of the table that every plan has: place in the pixel (x, y), place in the aim (x, y)."""
+DIGITS = 24
+"""Binary digits of a point: as many as float32 holds of numbers below 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +79,10 @@ class CellWindows:
     """Where to aim in front of a lens array: in each cell only at the part whose light comes from the stop beyond.
 
     A ray that passes a cell with centre c and power P at place a meets the plane of the stop at gain·a + rest,
-    with gain = beyond + P·beyond_from_slope and rest as `_rest` says, one for each axis. Only cells where that
-    falls into the stop for some a are aimed at, and of these only the places a where it does.
+    with gain = beyond + P·beyond_from_slope, one for each axis. Only cells where that falls into the stop for some
+    a are aimed at, and of these only the places a where it does: the stop's image in the plane of the array, cut
+    by the borders of the cell's opening. Rays take x evenly from where both lie, and then y evenly from what of
+    them lies there: their weight is the width times the height, and what is seen jumps at no border.
 
     Args:
         place_from_sensor: place on the array from place on the sensor, factors (x, y).
@@ -94,7 +98,11 @@ class CellWindows:
         beyond_offset: of the place at the stop.
         middle: of the stop, (x, y).
         half: half the (width, height) of the stop.
-        cell_half: half the (width, height) of the rectangle around a cell.
+        disc: whether the stop is the ellipse in that rectangle, not all of it.
+        cell_half: half the (width, height) of the rectangle around a cell's opening.
+        borders: (slope, half height) of the strips that cut out the opening, (strips, 2): from the cell's centre,
+            y is within slope·x ± half height.
+        opening_radius: of round openings, infinite for others.
         reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are looked at.
         words: what is aimed at.
     """
@@ -111,7 +119,10 @@ class CellWindows:
     beyond_offset: Array
     middle: Array
     half: Array
+    disc: bool
     cell_half: Array
+    borders: Array
+    opening_radius: float
     reach: tuple[int, int]
     words: str
 
@@ -123,29 +134,43 @@ class CellWindows:
         ]
         return self.lattice.cell_of(*centre)
 
-    def box(
-        self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64]
-    ) -> tuple[Array, Array, Array, Array]:
-        """(low x, high x, low y, high y) of the places in cells that light from x, y can come through."""
+    def aimed(
+        self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64], points: Array
+    ) -> tuple[Array, Array, Array]:
+        """Places (a, b) in the cells that light from x, y can come through, and the area that each stands for.
+
+        ``points`` are (..., 2) of numbers −1 … 1.
+        """
         kind = row % self.powers.shape[0], column % self.powers.shape[1]
-        ends = []
-        for n, (place, centre) in enumerate(zip((x, y), self.lattice.centre_of(row, column), strict=True)):
-            power = self.powers[kind]
+        power = self.powers[kind]
+        centres = self.lattice.centre_of(row, column)
+        middles, halves = [], []  # of the stop's image
+        for n, (place, centre) in enumerate(zip((x, y), centres, strict=True)):
             gain = self.beyond[n] + power * self.beyond_from_slope[n]
+            gain = np.where(np.abs(gain) < SMALLEST_GAIN, SMALLEST_GAIN, gain)
             rest = (
                 self.beyond_from_sensor[n] * place
                 - self.beyond_from_slope[n] * (power * centre + self.slopes[(*kind, n)])
                 + self.beyond_offset[n]
             )
-            gain = np.where(np.abs(gain) < SMALLEST_GAIN, SMALLEST_GAIN, gain)
-            ends_here = (
-                (self.middle[n] - rest - self.half[n]) / gain,
-                (self.middle[n] - rest + self.half[n]) / gain,
-            )
-            low = np.maximum(np.minimum(*ends_here), centre - self.cell_half[n])
-            high = np.minimum(np.maximum(*ends_here), centre + self.cell_half[n])
-            ends += [low, np.maximum(high, low)]
-        return ends[0], ends[1], ends[2], ends[3]
+            middles.append((self.middle[n] - rest) / gain)
+            halves.append(self.half[n] / np.abs(gain))
+        low = np.maximum(middles[0] - halves[0], centres[0] - self.cell_half[0])
+        wide = np.maximum(np.minimum(middles[0] + halves[0], centres[0] + self.cell_half[0]) - low, 0.0)
+        a = low + wide * (0.5 + 0.5 * points[..., 0])
+        chord = halves[1]
+        if self.disc:
+            chord = chord * np.sqrt(np.maximum(1 - ((a - middles[0]) / halves[0]) ** 2, 0.0))
+        low, high = middles[1] - chord, middles[1] + chord
+        away = a - centres[0]
+        for slope, half in self.borders:
+            border = centres[1] + slope * away
+            low, high = np.maximum(low, border - half), np.minimum(high, border + half)
+        if np.isfinite(self.opening_radius):
+            chord = np.sqrt(np.maximum(self.opening_radius**2 - away**2, 0.0))
+            low, high = np.maximum(low, centres[1] - chord), np.minimum(high, centres[1] + chord)
+        tall = np.maximum(high - low, 0.0)
+        return a, low + tall * (0.5 + 0.5 * points[..., 1]), wide * tall
 
 
 SMALLEST_GAIN = 1e-12
@@ -170,11 +195,15 @@ class RayPlan:
         between_views: interpolate between views along the motion; else each view is its cell.
         views: (v, u, t, s) of the light field.
         scale: turns stored samples into radiance.
+        sharpening: weights of the filter by which views are made sharper before rays look them up, as
+            `vcc.plan.ray_sharpening.sharpening` gives them; None looks samples up as they are.
         samples: rays a pixel, a power of two (through an array of lenses: a cell).
         seed: of the choice of points for each pixel.
-        points: the table, (`TABLE`, columns) float32: place in the pixel (−½ … ½, twice), place in the window
-            (−1 … 1, twice), then what diffusers need.
+        points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
+            (0 … 1, twice, in `DIGITS` binary digits; of a disc −1 … 1), then what diffusers need.
         views_may_end: rays outside the grid of views are missing: a stop at the views says that they are wanted.
+        missing_rays: the share of the light asked for that the light field lacks, where the aim is narrower than
+            what is asked for; None where the rays that are traced tell.
         cautions: what a user should be warned of, in words.
         notes: what was decided and why, in words.
     """
@@ -190,10 +219,12 @@ class RayPlan:
     between_views: bool
     views: tuple[int, int, int, int]
     scale: float
+    sharpening: tuple[int, int, int] | None
     samples: int
     seed: int
     points: NDArray[np.float32]
     views_may_end: bool
+    missing_rays: float | None = None
     cautions: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
 
@@ -243,24 +274,35 @@ class RayPlan:
         index = self.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
         return index, rays.share
 
-    def _moved(self, points: NDArray[np.float32], pixel: NDArray[np.int64]) -> Array:
-        """Points (pixels, samples, columns) with each pixel's places in it and in the window shifted as one.
+    def held(self, index: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which rays, by indices (…, 4) of the light field, fall into the grid of views, and into pictures too."""
+        nv, nu, nt, ns = self.views
+        i, j, k, l = np.moveaxis(index, -1, 0)
+        inside = (i >= -0.5) & (i <= nu - 0.5) & (j >= -0.5) & (j <= nv - 0.5)
+        return inside, inside & (k >= -0.5) & (k <= ns - 0.5) & (l >= -0.5) & (l <= nt - 0.5)
 
-        There are fewer blocks than pixels: without the shift, pixels with one block would err alike, and an even
-        surface would show it. What leaves on one side comes back on the other; a disc is turned.
+    def _moved(self, points: NDArray[np.float32], pixel: NDArray[np.int64]) -> Array:
+        """Points (pixels, samples, columns), each pixel's its own: in the pixel −½ … ½, in the window −1 … 1.
+
+        There are fewer blocks than pixels: pixels with one block would err alike, and an even surface would show
+        it. So each pixel flips digits of its own in all of its points: boxes with sides of powers of ½ change
+        places as wholes, so that the points stay as even as they were, and none crosses from one border to the
+        other, where what is seen may jump (a digital shift; Owen 1995). A disc is turned.
         """
         moved = points.astype(np.float64)
-        shift = np.stack([hashed(pixel, self.seed + 1 + n) * 2.0**-32 for n in range(4)], axis=-1)
-        place = moved[..., :2] + shift[:, None, :2]
-        moved[..., :2] = place - np.floor(place + 0.5)
-        a, b = moved[..., 2], moved[..., 3]
-        if isinstance(self.aim, Window) and self.aim.disc:
-            turn = 2 * np.pi * shift[:, 2:3]
+        flipped = np.stack([hashed(pixel, self.seed + 1 + n) >> (32 - DIGITS) for n in range(4)], axis=-1)
+        disc = isinstance(self.aim, Window) and self.aim.disc
+        columns = 2 if disc else 4
+        digits = (points[..., :columns] * 2**DIGITS).astype(np.uint32) ^ flipped[:, None, :columns]
+        places = (digits + 0.5) * 2.0**-DIGITS
+        moved[..., :2] = places[..., :2] - 0.5
+        if disc:
+            a, b = moved[..., 2], moved[..., 3]
+            turn = 2 * np.pi * 2.0**-DIGITS * flipped[:, 2:3]
             cosine, sine = np.cos(turn), np.sin(turn)
             moved[..., 2], moved[..., 3] = cosine * a - sine * b, sine * a + cosine * b
         else:
-            aimed = moved[..., 2:4] + 2 * shift[:, None, 2:]
-            moved[..., 2:4] = aimed - 2 * np.floor(0.5 * aimed + 0.5)
+            moved[..., 2:4] = 2 * places[..., 2:] - 1
         return moved
 
     def _through_cells(
@@ -277,16 +319,10 @@ class RayPlan:
         cell_row = (nearest[0][:, None, None] + down[:, None]).repeat(len(across), axis=2)
         cell_column = (nearest[1][:, None, None] + across[None, :]).repeat(len(down), axis=1)
         cell_row, cell_column = (cells.reshape(len(pixel), -1, 1) for cells in (cell_row, cell_column))
-        low_x, high_x, low_y, high_y = aim.box(x, y, cell_row, cell_column)
-        a = (low_x + high_x) / 2 + (high_x - low_x) / 2 * points[..., 2]
-        b = (low_y + high_y) / 2 + (high_y - low_y) / 2 * points[..., 3]
+        a, b, area = aim.aimed(x, y, cell_row, cell_column, points[..., 2:4])
         s = (a - aim.place_from_sensor[0] * x - aim.offset[0]) / aim.place_from_slope[0]
         t = (b - aim.place_from_sensor[1] * y - aim.offset[1]) / aim.place_from_slope[1]
-        jacobian = abs(aim.place_from_slope[0] * aim.place_from_slope[1])
-        # A cell is its Voronoi cell: what of its rectangle lies in a neighbour is the neighbour's.
-        own_row, own_column = aim.lattice.cell_of(a, b)
-        own = (own_row == cell_row) & (own_column == cell_column)
-        weight = (high_x - low_x) * (high_y - low_y) / jacobian * own
+        weight = area / abs(aim.place_from_slope[0] * aim.place_from_slope[1])
         x, y = np.broadcast_to(x, s.shape), np.broadcast_to(y, s.shape)
         return x, y, s, t, weight
 

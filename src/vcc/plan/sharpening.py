@@ -71,7 +71,7 @@ def along_axis(losses: float, step: float) -> Array:
         An odd number of weights of sum 1; a single one where nothing is lost.
     """
     size = abs(step)
-    if size < 1e-3 or losses == 0:
+    if size < 1e-3 or losses < 1e-9:
         return np.ones(1)
     if size > 1:  # weights that lie between pixels take some more of them
         return symmetric(lambda frequency: gain(losses, size * frequency), math.ceil(2 * size - 1e-9) + 2)

@@ -358,7 +358,7 @@ def decode_heterodyne(
 
     Returns:
         float32 radiance, shape (v, u, t, s[, channels]), at the entrance plane, upright; 0 where ringing
-        went below.
+        went below. Samples are values at points: a tile is freed of the pixels' mean.
 
     Raises:
         InputError: a recording or calibration of another size than the camera says, or with NaNs; a dark
@@ -389,7 +389,7 @@ def decode_heterodyne(
     values = np.stack(pixels, axis=-1)
     if raw.ndim == 2:
         values = values[..., 0]
-    field_of_views = LightField(np.maximum(values, 0).astype(np.float32), _frame(setup))
+    field_of_views = LightField(np.maximum(values, 0).astype(np.float32), _frame(setup), sample="point")
     rows, columns = geometry.shape
     cut = math.ceil(border * rows), math.ceil(border * columns)
     return field_of_views[:, :, cut[0] : rows - cut[0], cut[1] : columns - cut[1]]

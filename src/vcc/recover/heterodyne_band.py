@@ -47,7 +47,7 @@ def band_limited(
 
     Yields:
         ``parts`` light fields of float32 radiance, (v, u, rows of samples, columns of samples[, channels]), whose
-        recordings add up to that of the whole.
+        recordings add up to that of the whole. Samples are values at points of what is left.
 
     Raises:
         InputError: views that do not lie along the axes, samples or parts below 1, a fineness of 0 or less, or
@@ -72,7 +72,7 @@ def band_limited(
         grid = Affine.from_parts(
             np.diag([frame.linear[0, 0], frame.linear[1, 1], *step]), [*frame.offset[:2], places[0][0], y[0]]
         )
-        yield LightField(values, _landing(camera).inverse() @ grid, disparity_range=(0.0, 0.0))
+        yield LightField(values, _landing(camera).inverse() @ grid, disparity_range=(0.0, 0.0), sample="point")
 
 
 def true_views(light_field: LightField, camera: Camera, decoded: LightField) -> LightField:

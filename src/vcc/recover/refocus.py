@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from vcc.optics import Element, Lens, Mask
 from vcc.sensor import Sensor
 
 if TYPE_CHECKING:
+    from vcc.plan.model import Plan
     from vcc.store import StoredLightField
 
 Progress = Callable[[int, int], None]
@@ -91,7 +92,7 @@ def refocused(
     *,
     diameter: float | None = None,
     centre: tuple[float, float] = (0.0, 0.0),
-    interpolation: str = "cubic",
+    interpolation: str = "sharp",
     between_views: str = "auto",
     memory_limit: int | None = None,
     progress: Progress | None = None,
@@ -106,7 +107,8 @@ def refocused(
         distance: metres before the light field's plane; may be infinite.
         diameter: of the round aperture, metres; None takes all views. Smaller ones have more depth of field.
         centre: (u, v) of the aperture's middle, metres.
-        interpolation: within a view, see `vcc.Camera.capture`. Cubic keeps detail that linear blurs.
+        interpolation: within a view, see `vcc.Camera.capture`. What ``"sharp"`` gives back it gives back after the
+            division by what the views cover, so that their borders do not ring.
         between_views: whether ghosts of views too far apart are filled, see `vcc.Camera.capture`.
         memory_limit: for a light field on disk, see `vcc.Camera.capture`.
         progress: called with (done, total).
@@ -122,9 +124,10 @@ def refocused(
         InputError: what `ideal_camera` and `vcc.Camera.capture` refuse, or an aperture that holds no view.
     """
     camera = ideal_camera(light_field, distance, diameter=diameter, centre=centre)
+    sharp = interpolation == "sharp"
     options: dict[str, Any] = {
         "method": "footprints",
-        "interpolation": interpolation,
+        "interpolation": "linear" if sharp else interpolation,
         "between_views": between_views,
     }
     outline = light_field if isinstance(light_field, LightField) else light_field.outline
@@ -146,11 +149,26 @@ def refocused(
     share = np.where(seen, covered, np.inf)
     values = taken.to_numpy().astype(np.float64)
     values /= share if values.ndim == 2 else share[..., None]
+    if sharp:
+        plan = camera.compile(outline, **(options | {"interpolation": "sharp"}))
+        values = _sharpened(values, cast("Plan", plan))
     nv, nu, nt, ns = light_field.shape[:4]
     s, t = light_field.frame([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2])[2:]
     on_sensor = Affine.translation(-camera.sensor.decentre[0], -camera.sensor.decentre[1]) @ taken.frame
     looks_at = Affine.translation(-s, -t) @ Affine.scaling(-1 / IMAGE_DISTANCE, -1 / IMAGE_DISTANCE) @ on_sensor
     return Image(values.astype(np.float32), looks_at).upright()
+
+
+def _sharpened(values: NDArray[np.float64], plan: Plan) -> NDArray[np.float64]:
+    """A picture with what a plan gives back to sharpness; beyond its border it goes on as its edge."""
+    from scipy.ndimage import convolve, convolve1d
+
+    if plan.sharpen is not None:
+        for axis in (0, 1):
+            values = convolve1d(values, plan.sharpen[axis], axis=axis, mode="nearest")
+    elif plan.blur is not None:  # of a turned grid of pixels
+        values = convolve(values, plan.blur if values.ndim == 2 else plan.blur[..., None], mode="nearest")
+    return values
 
 
 def _coverage(camera: Camera, outline: LightField, options: dict[str, Any]) -> NDArray[np.float64]:

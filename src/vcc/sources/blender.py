@@ -181,6 +181,8 @@ def set_up_pictures(scene):
         newer = (4, 2, 0) <= tuple(bpy.app.version) < (5, 0, 0)
         names = ["BLENDER_EEVEE_NEXT", "BLENDER_EEVEE"]
         first_of(render, "engine", names if newer else names[::-1])
+    if render.engine == "CYCLES":
+        first_of(scene.cycles, "pixel_filter_type", ["BOX"])  # a sample is the mean over its pixel
     if SETTINGS["samples"] is not None:
         if render.engine == "CYCLES":
             scene.cycles.samples = SETTINGS["samples"]

@@ -12,6 +12,7 @@ import numpy as np
 
 from vcc.affine import Affine
 from vcc.errors import InputError
+from vcc.light_field import Sample
 
 FORMAT_VERSION = 1
 """Of the attributes and the layout below; a reader refuses what is newer than it knows."""
@@ -39,6 +40,7 @@ class Attributes:
         description: all that the samples depend on, as JSON can hold it, so that views are never mixed; or None.
         lossy: codec, quality and measured PSNR, or None where samples are kept exactly.
         complete: whether all views are there.
+        sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; stores that do not state it hold means.
     """
 
     frame: Affine
@@ -49,6 +51,7 @@ class Attributes:
     description: dict[str, Any] | None = None
     lossy: dict[str, Any] | None = None
     complete: bool = False
+    sample: Sample = "mean"
 
     def as_json(self) -> dict[str, Any]:
         """The attributes as they are written."""
@@ -58,6 +61,7 @@ class Attributes:
             "units": UNITS,
             "frame": self.frame.matrix.tolist(),
             "transfer": self.transfer,
+            "sample": self.sample,
             "channel_names": None if self.channel_names is None else list(self.channel_names),
             "disparity_range": None if self.disparity_range is None else list(self.disparity_range),
             "provenance": plain(self.provenance, "provenance"),
@@ -103,6 +107,7 @@ class Attributes:
                 description=stated.get("description"),
                 lossy=stated.get("lossy"),
                 complete=stated["complete"],
+                sample=stated.get("sample", "mean"),
             )
         except (TypeError, ValueError, InputError) as error:
             raise InputError(f"{path}: its attributes cannot be used: {error}") from None
@@ -119,6 +124,8 @@ class Attributes:
             raise InputError(f"{owner}: frame is an invertible 5×5 map of indices to rays, not\n{self.frame!r}")
         if self.transfer not in get_args(Transfer):
             raise InputError(f'{owner}: transfer is "linear" or "srgb", not {self.transfer!r}')
+        if self.sample not in get_args(Sample):
+            raise InputError(f'{owner}: sample is "mean" or "point", not {self.sample!r}')
         if not isinstance(self.complete, bool):
             raise InputError(f"{owner}: complete is true or false, not {self.complete!r}")
         if self.disparity_range is not None:

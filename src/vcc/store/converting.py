@@ -90,6 +90,7 @@ def convert(
         transfer=now,
         channel_names=names,
         disparity_range=disparity_range,
+        sample=source.sample,
         chunks=chunks,
         compression=compression,
     )

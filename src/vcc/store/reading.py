@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vcc.affine import Affine
 from vcc.errors import InputError
 from vcc.formats.transfer import decode
-from vcc.light_field import DisparityRange, LightField, describe_geometry
+from vcc.light_field import SAMPLES_IN_WORDS, DisparityRange, LightField, Sample, describe_geometry
 from vcc.sampled import Index
 from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
 
@@ -167,6 +167,11 @@ class StoredLightField:
         return self.attributes.disparity_range
 
     @property
+    def sample(self) -> Sample:
+        """What a sample says of the scene; see `vcc.LightField`."""
+        return self.attributes.sample
+
+    @property
     def provenance(self) -> dict[str, Any]:
         """Where the light field comes from."""
         return self.attributes.provenance
@@ -204,6 +209,7 @@ class StoredLightField:
             OnDisk(self, tuple(map(range, self.shape))),
             self.frame,
             self.disparity_range,
+            self.sample,
             _shared_disparity=self._disparity,
             _checked=True,
         )
@@ -369,6 +375,7 @@ class StoredLightField:
         state = "" if self.complete else ", not complete"
         return (
             f"StoredLightField({self.path}: {sizes} {self.dtype}, {self.transfer}, "
+            f"{SAMPLES_IN_WORDS[self.sample]}, "
             f"{describe_geometry(self.outline)}{state})"
         )
 

@@ -18,7 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vcc.affine import Affine
 from vcc.errors import InputError
-from vcc.light_field import LightField
+from vcc.light_field import LightField, Sample
 from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
 from vcc.store.compression import Compression, Lossless, Lossy, layout
 from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata
@@ -185,6 +185,7 @@ def create_store(
     transfer: Transfer = "linear",
     channel_names: tuple[str, ...] | None = None,
     disparity_range: tuple[float, float] | None = None,
+    sample: Sample = "mean",
     chunks: int | None = None,
     compression: Compression | None = None,
 ) -> StoreWriter:
@@ -200,6 +201,7 @@ def create_store(
         transfer: ``"linear"``, or ``"srgb"`` for integers that are sRGB codes (read as linear float32).
         channel_names: one for each channel.
         disparity_range: (lowest, highest), pixels per view along u, where known.
+        sample: ``"mean"`` over a pixel or ``"point"``, see `vcc.LightField`.
         chunks: rows of pixels that are packed together; None takes what is about 128 KiB.
         compression: `Lossless` or `Lossy`; None is ``Lossless()``.
 
@@ -225,6 +227,8 @@ def create_store(
         "compression": packing.words,
         "chunks": chunks,
     }
+    if sample != "mean":  # as in stores from before samples were told apart, which are gone on with
+        settings["sample"] = sample
     made = None if description is None else {"maker": description, SETTINGS: settings}
     attributes = Attributes(
         frame,
@@ -233,6 +237,7 @@ def create_store(
         None if disparity_range is None else (float(disparity_range[0]), float(disparity_range[1])),
         provenance,
         None if made is None else plain(made, "description"),
+        sample=sample,
     )
     attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
     attributes.as_json()  # refuses what JSON cannot hold, before anything is made
@@ -288,6 +293,7 @@ def save_store(
         transfer=transfer,
         channel_names=channel_names,
         disparity_range=disparities_of(light_field),
+        sample=light_field.sample,
         chunks=chunks,
         compression=compression,
     )

@@ -312,19 +312,19 @@ def _loaded(mitsuba: Any, scene: Any, parameters: dict[str, str]) -> Any:
     """
     try:
         if isinstance(scene, Mapping):
-            return mitsuba.load_dict(_for_mitsuba(mitsuba, scene))
+            return mitsuba.load_dict(for_mitsuba(mitsuba, scene))
         return mitsuba.load_file(str(Path(fspath(scene)).expanduser()), **parameters)
     except (RuntimeError, TypeError, ValueError) as error:
         name = "the dict" if isinstance(scene, Mapping) else str(scene)
         raise InputError(f"Mitsuba cannot load {name}: {error}") from error
 
 
-def _for_mitsuba(mitsuba: Any, plugin: Mapping[str, Any]) -> dict[str, Any]:
+def for_mitsuba(mitsuba: Any, plugin: Mapping[str, Any]) -> dict[str, Any]:
     """A scene with Mitsuba's objects for NumPy's arrays: matrices of transforms, and pictures."""
     made: dict[str, Any] = {}
     for name, value in plugin.items():
         if isinstance(value, Mapping):
-            made[name] = _for_mitsuba(mitsuba, value)
+            made[name] = for_mitsuba(mitsuba, value)
         elif isinstance(value, np.ndarray) and name in ("to_world", "to_uv"):
             made[name] = mitsuba.ScalarTransform4f(value)
         elif isinstance(value, np.ndarray) and name == "bitmap":

@@ -1,0 +1,295 @@
+"""Adding up rows of samples, and mixing their sums, as vector instructions that stay in the processor's registers.
+
+A sample is loaded and converted once for four rows of the raster, and their sums do not leave the registers until
+all rows of samples have been added. Numba vectorises neither by itself, so that both are written in its
+intermediate language, for any type of samples; the compiler makes of it what the processor has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import llvmlite.binding
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+ROWS = 4
+"""Rows of the raster that are summed at once."""
+
+RANGES = [(first, last) for first in range(ROWS) for last in range(first, ROWS)]
+"""Which of them a row of samples can reach: from one row to another. Rows are listed range by range."""
+
+
+def _wide_registers() -> bool:
+    try:
+        return bool(llvmlite.binding.get_host_cpu_features().get("avx512f"))
+    except RuntimeError:  # a processor that LLVM cannot tell apart: narrow vectors suit all
+        return False
+
+
+LANES, VECTORS = (16, 4) if _wide_registers() else (8, 2)
+"""Numbers in a vector, and vectors along a row, so that the sums of four rows take half of the registers."""
+RUN = LANES * VECTORS
+"""Sample values of a row that `add_rows` adds at once."""
+RUN_OF_THREES = 3 * LANES
+"""Likewise with masks and three channels: whole pixels."""
+SHORTEST = max(RUN, RUN_OF_THREES)
+"""Rows are at least so long; what is shorter is continued by zeros."""
+
+_WIDE = ir.VectorType(ir.FloatType(), LANES)
+_PLACE, _NUMBER = ir.IntType(64), ir.IntType(32)
+_FLAGS = ["contract"]
+
+
+def _constant(number: int) -> Any:
+    return ir.Constant(_PLACE, number)
+
+
+def _everywhere(builder: Any, scalar: Any, lanes: int = LANES) -> Any:
+    """A scalar in all lanes of a vector."""
+    empty = ir.Constant(ir.VectorType(scalar.type, lanes), ir.Undefined)
+    first = builder.insert_element(empty, scalar, ir.Constant(_NUMBER, 0))
+    return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(_NUMBER, lanes), [0] * lanes))
+
+
+def _floats(builder: Any, pointer: Any, lanes: int = LANES) -> Any:
+    """A vector of float32 from memory."""
+    return builder.load(builder.bitcast(pointer, ir.VectorType(ir.FloatType(), lanes).as_pointer()), align=4)
+
+
+def _samples(context: Any, builder: Any, pointer: Any, kind: Any) -> Any:
+    """A vector of samples of any type from memory, as float32."""
+    run = ir.VectorType(context.get_value_type(kind), LANES).as_pointer()
+    samples = builder.load(builder.bitcast(pointer, run), align=kind.bitwidth // 8)
+    if isinstance(kind, types.Integer):
+        if kind.bitwidth < 32:  # with the sign bit clear: the cheap conversion
+            return builder.sitofp(builder.zext(samples, ir.VectorType(_NUMBER, LANES)), _WIDE)
+        return builder.uitofp(samples, _WIDE)
+    return builder.fptrunc(samples, _WIDE) if kind.bitwidth == 64 else samples
+
+
+def _plus(builder: Any, total: Any, weight: Any, values: Any) -> Any:
+    return builder.fadd(total, builder.fmul(weight, values, flags=_FLAGS), flags=_FLAGS)
+
+
+class _Masks:
+    """The weights of masks along a row of samples: their product, vector by vector.
+
+    A mask's weight is interpolated between two lines of it that were sampled at the columns of the samples.
+    """
+
+    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Sequence[Any], repeat: int) -> None:
+        lines, places, shares = (
+            context.make_array(kind)(context, builder, argument)
+            for kind, argument in zip(signature.args, arguments, strict=True)
+        )
+        self.builder, self.repeat, self.vectors = builder, repeat, 3 if repeat == 3 else VECTORS
+        self.lines, self.places, self.shares = lines.data, places.data, shares.data
+        self.count = cgutils.unpack_tuple(builder, shares.shape)[1]
+        self.narrow = 1 if repeat == 3 else self.vectors
+        self.weights = [cgutils.alloca_once(builder, _WIDE) for _ in range(self.narrow)]
+
+    def along(self, entry: Any, x: Any) -> list[Any]:
+        """The weights of row ``entry`` of the list from sample value ``x`` on, a vector for each of samples."""
+        builder = self.builder
+        if self.repeat == 3:
+            x = builder.udiv(x, _constant(3))
+        for weight in self.weights:
+            builder.store(ir.Constant(_WIDE, [1.0] * LANES), weight)
+        first = builder.mul(entry, self.count)
+        with cgutils.for_range(builder, self.count, intp=_PLACE) as loop:
+            at = builder.mul(builder.add(first, loop.index), _constant(2))
+            shares, lines = [], []
+            for n in range(2):
+                here = builder.add(at, _constant(n))
+                shares.append(_everywhere(builder, builder.load(builder.gep(self.shares, [here]))))
+                begin = builder.load(builder.gep(self.places, [here]))
+                lines.append(builder.gep(self.lines, [builder.add(begin, x)]))
+            for k, weight in enumerate(self.weights):
+                upper, lower = (_floats(builder, builder.gep(line, [_constant(k * LANES)])) for line in lines)
+                mean = _plus(builder, builder.fmul(shares[0], upper, flags=_FLAGS), shares[1], lower)
+                builder.store(builder.fmul(builder.load(weight), mean, flags=_FLAGS), weight)
+        weights = [builder.load(weight) for weight in self.weights]
+        if self.repeat == 3:  # one weight for the three channels of a pixel
+            one = weights[0]
+            indices = [[(k * LANES + lane) // 3 for lane in range(LANES)] for k in range(3)]
+            threes = [ir.Constant(ir.VectorType(_NUMBER, LANES), index) for index in indices]
+            weights = [builder.shuffle_vector(one, one, three) for three in threes]
+        return weights
+
+
+def _add_rows(
+    context: Any, builder: Any, signature: Any, arguments: Sequence[Any], vectors: int, masks: _Masks | None
+) -> Any:
+    """The body of `add_rows` and its kin: see there for the arguments."""
+    array = {n: context.make_array(signature.args[n])(context, builder, arguments[n]) for n in (0, 1, 2, 3, 4, 7)}
+    values, order, places, shares, ends, sums = (each.data for each in array.values())
+    x, skip, line = arguments[5], arguments[6], arguments[8]
+    pitch = cgutils.unpack_tuple(builder, array[7].shape)[1]
+    dark = ir.Constant(_WIDE, [0.0] * LANES)
+    totals = [[cgutils.alloca_once(builder, _WIDE) for _ in range(vectors)] for _ in range(ROWS)]
+    for total in (total for row in totals for total in row):
+        builder.store(dark, total)
+    start = _constant(0)
+    for number, (upper, lower) in enumerate(RANGES):
+        stop = builder.load(builder.gep(ends, [_constant(number)]))
+        with cgutils.for_range_slice(builder, start, stop, _constant(1), _PLACE) as (index, _):
+            entry = builder.load(builder.gep(order, [index]))
+            begin = builder.add(builder.load(builder.gep(places, [entry])), x)
+            weights = None if masks is None else masks.along(entry, x)
+            share = {}
+            for row in range(upper, lower + 1):
+                at = builder.add(builder.mul(entry, _constant(ROWS)), _constant(row))
+                share[row] = _everywhere(builder, builder.load(builder.gep(shares, [at])))
+            for k in range(vectors):
+                pointer = builder.gep(values, [builder.add(begin, _constant(k * LANES))])
+                samples = _samples(context, builder, pointer, signature.args[0].dtype)
+                if weights is not None:
+                    samples = builder.fmul(samples, weights[k], flags=_FLAGS)
+                for row, each in share.items():
+                    total = totals[row][k]
+                    builder.store(_plus(builder, builder.load(total), each, samples), total)
+        start = stop
+    skipped = _everywhere(builder, skip)
+    for row in range(ROWS):
+        begin = builder.add(builder.mul(builder.add(line, _constant(row)), pitch), x)
+        for k in range(vectors):
+            pointer = builder.gep(sums, [builder.add(begin, _constant(k * LANES))])
+            lanes = ir.Constant(ir.VectorType(_PLACE, LANES), [k * LANES + lane for lane in range(LANES)])
+            fresh = builder.select(builder.icmp_signed(">=", lanes, skipped), builder.load(totals[row][k]), dark)
+            here = builder.bitcast(pointer, _WIDE.as_pointer())
+            builder.store(builder.fadd(builder.load(here, align=4), fresh, flags=_FLAGS), here, align=4)
+    return context.get_dummy_value()
+
+
+@intrinsic
+def add_rows(typing_context, values, order, places, shares, ends, x, skip, sums, line):  # type: ignore[no-untyped-def]
+    """sums[line + r, x : x + RUN] += Σ shares[e, r] · values[places[e] + x : … + RUN], for r = 0 … 3.
+
+    Args:
+        typing_context: Numba's.
+        values: samples of any type, flat.
+        order: int64, the list's entries e sorted by which of the four rows they reach, as in ``RANGES``.
+        places: int64, where each entry's row of samples begins.
+        shares: float32 (entries, 4).
+        ends: int64, how many entries of ``order`` reach each of ``RANGES`` or one before it.
+        x: int64, where in the rows.
+        skip: int64, how many sample values from ``x`` on are not added: a row's last run may begin before the end
+            of the one before it.
+        sums: float32 (rows, sample values).
+        line: int64, the first of the four rows.
+    """
+    place = types.int64
+    signature = types.void(values, order, places, shares, ends, place, place, sums, place)
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return _add_rows(context, builder, signature, arguments, VECTORS, None)
+
+    return signature, generate
+
+
+def _add_masked_rows(repeat: int) -> Any:
+    @intrinsic
+    def add_masked_rows(  # type: ignore[no-untyped-def]
+        typing_context, values, order, places, shares, ends, x, skip, sums, line,
+        mask_lines, mask_places, mask_shares,
+    ):  # fmt: skip
+        """As `add_rows`, each sample times its weight from the masks.
+
+        ``RUN_OF_THREES`` sample values are added where a mask's weight counts for three channels.
+
+        Args:
+            typing_context: Numba's.
+            values: see `add_rows`, and so on.
+            order: see there.
+            places: see there.
+            shares: see there.
+            ends: see there.
+            x: see there; a multiple of 3 where a weight counts for three channels.
+            skip: see there.
+            sums: see there.
+            line: see there.
+            mask_lines: float32, flat: lines of masks' weights at the columns of the samples.
+            mask_places: int64 (entries, masks, 2): where the line above and the one below begin.
+            mask_shares: float32 (entries, masks, 2): what each counts.
+        """
+        place = types.int64
+        signature = types.void(
+            values, order, places, shares, ends, place, place, sums, place, mask_lines, mask_places, mask_shares
+        )
+
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            found = type(signature)(signature.return_type, signature.args[9:], None)
+            masks = _Masks(context, builder, found, arguments[9:], repeat)
+            return _add_rows(context, builder, signature, arguments, masks.vectors, masks)
+
+        return signature, generate
+
+    return add_masked_rows
+
+
+add_masked_rows = _add_masked_rows(1)
+add_masked_rows_of_threes = _add_masked_rows(3)
+
+
+@intrinsic
+def fetch(typing_context, values, place):  # type: ignore[no-untyped-def]
+    """Ask for the line of memory that holds ``values[place]``, which may lie anywhere: it is needed soon."""
+    signature = types.void(values, types.int64)
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        byte = ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [byte, _NUMBER, _NUMBER, _NUMBER])
+        prefetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+        # to be read, into the second-level cache, as data
+        hints = [ir.Constant(_NUMBER, hint) for hint in (0, 2, 1)]
+        builder.call(prefetch, [builder.bitcast(builder.gep(data, [arguments[1]]), byte), *hints])
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+EIGHT = 8
+"""Rows of the raster that `mix_eight` mixes at once, side by side in memory."""
+
+
+@intrinsic
+def mix_eight(typing_context, sums, place, step, shares, row, out, to):  # type: ignore[no-untyped-def]
+    """out[to : to + 8] += Σ shares[row, t] · sums[place + t · step : … + 8].
+
+    Args:
+        typing_context: Numba's.
+        sums: float32, flat.
+        place: int64.
+        step: int64.
+        shares: float32 (rows, width).
+        row: int64.
+        out: float32, flat.
+        to: int64.
+    """
+    signature = types.void(sums, types.int64, types.int64, shares, types.int64, out, types.int64)
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        sums, shares, out = (
+            context.make_array(signature.args[n])(context, builder, arguments[n]) for n in (0, 3, 5)
+        )
+        place, step, row, to = (arguments[n] for n in (1, 2, 4, 6))
+        width = cgutils.unpack_tuple(builder, shares.shape)[1]
+        wide = ir.VectorType(ir.FloatType(), EIGHT)
+        here = builder.bitcast(builder.gep(out.data, [to]), wide.as_pointer())
+        total = cgutils.alloca_once(builder, wide)
+        builder.store(builder.load(here, align=4), total)
+        first = builder.gep(shares.data, [builder.mul(row, width)])
+        with cgutils.for_range(builder, width, intp=_PLACE) as loop:
+            share = _everywhere(builder, builder.load(builder.gep(first, [loop.index])), EIGHT)
+            begin = builder.add(place, builder.mul(loop.index, step))
+            run = _floats(builder, builder.gep(sums.data, [begin]), EIGHT)
+            builder.store(_plus(builder, builder.load(total), share, run), total)
+        builder.store(builder.load(total), here, align=4)
+        return context.get_dummy_value()
+
+    return signature, generate
