@@ -51,7 +51,10 @@ def compile_best(
         )
     if method == "footprints":
         raise InputError(f"this camera's picture cannot be made by footprints: {reason}. Use method='rays'")
-    for name, given, by_rays in (("interpolation", interpolation, ("sharp", "linear")), ("refine", refine, ("auto",))):
+    for name, given, by_rays in (
+        ("interpolation", interpolation, ("sharp", "linear")),
+        ("refine", refine, ("auto",)),
+    ):
         if given not in by_rays:
             raise InputError(
                 f"{name}={given!r} is for pictures made by footprints; this one is made by rays ({reason}): "
