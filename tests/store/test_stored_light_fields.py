@@ -220,6 +220,18 @@ def test_opening_is_quick(stored):
 # --- written view by view ---
 
 
+def test_work_goes_on_in_a_store_from_before_samples_were_told_apart(tmp_path):
+    made = {"provenance": {}, "description": {"scene": 1}}
+    first = create_store(tmp_path / "a.zarr", CAMERAS, SHAPE, "float32", **made)
+    group = zarr.open_group(first.path, mode="r+")
+    stated = group.attrs["light_field"]
+    del stated["sample"], stated["description"]["settings"]["sample"]
+    group.attrs["light_field"] = stated
+    assert len(create_store(tmp_path / "a.zarr", CAMERAS, SHAPE, "float32", **made).missing()) == 12
+    with pytest.raises(vcc.InputError, match="sample is 'mean' there and 'point' now"):
+        create_store(tmp_path / "a.zarr", CAMERAS, SHAPE, "float32", sample="point", **made)
+
+
 def test_work_goes_on_where_it_stopped(tmp_path):
     def writer(scene=1, dtype="float32", **more):
         return create_store(
@@ -247,6 +259,8 @@ def test_work_goes_on_where_it_stopped(tmp_path):
         writer(dtype="float16")
     with pytest.raises(vcc.InputError, match="compression is"):
         writer(compression=Lossless("lz4"))
+    with pytest.raises(vcc.InputError, match="sample is 'mean' there and 'point' now"):
+        writer(sample="point")
     for row, column in again.missing():
         again.write_view(row, column, views[row, column])
     np.testing.assert_array_equal(again.finish().read().values, views)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vcc.affine import Affine
 from vcc.errors import InputError
-from vcc.light_field import LightField
+from vcc.light_field import LightField, Sample
 
 
 @dataclass(frozen=True)
@@ -156,15 +156,18 @@ class CameraArray:
         """
         return self.spacings[1] * (1 / distance - 1 / self.focus_distance) / self.slopes_per_pixel[1]
 
-    def light_field(self, values: Any, disparity_range: tuple[float, float] | None = None) -> LightField:
+    def light_field(
+        self, values: Any, disparity_range: tuple[float, float] | None = None, sample: Sample = "mean"
+    ) -> LightField:
         """The light field of pictures that these cameras took.
 
         Args:
             values: shape (v, u, t, s) or (v, u, t, s, channels).
             disparity_range: see `vcc.LightField`.
+            sample: ``"mean"`` as renderers give it, or ``"point"`` of a formula evaluated at pixels' middles.
         """
         return LightField.from_views(
-            values, self.spacings, self.slopes_per_pixel, self.focus_distance, disparity_range
+            values, self.spacings, self.slopes_per_pixel, self.focus_distance, disparity_range, sample
         )
 
 

@@ -226,9 +226,8 @@ def create_store(
         "disparity_range": None if disparity_range is None else list(disparity_range),
         "compression": packing.words,
         "chunks": chunks,
+        "sample": sample,
     }
-    if sample != "mean":  # as in stores from before samples were told apart, which are gone on with
-        settings["sample"] = sample
     made = None if description is None else {"maker": description, SETTINGS: settings}
     attributes = Attributes(
         frame,
@@ -403,6 +402,7 @@ def _continued(folder: Path, wanted: Attributes, packing: Compression) -> StoreW
             f"{folder} is there already{'' if found.complete else ', not finished'}, and without a description of "
             "what its views depend on it is not gone on with: remove it, or choose another name"
         )
+    found.description.get(SETTINGS, {}).setdefault("sample", "mean")  # of stores older than this setting
     if not same(wanted.description, found.description):
         raise InputError(
             f"{folder} was made from another description, and views of two are never mixed. "
