@@ -66,6 +66,10 @@ def record(
     from vcc.engines import rays
 
     rays.check_tolerance(tolerance, by_rays=isinstance(plan, RayPlan))
+    if plan.views_between is not None:
+        from vcc.engines import depth_views
+
+        return depth_views.record(plan, values, engine=engine, tolerance=tolerance, progress=progress)
     if isinstance(plan, Plan):
         picture = run_plan(plan, values, engine=engine, progress=progress)
         return Recorded(picture, plan.missing_rays, plan.missing_reason)
@@ -117,6 +121,8 @@ def run_plan(
         InputError: an unknown engine, or one that does not take arrays of this type.
     """
     engine = chosen(engine, values)
+    if plan.views_between is not None:
+        return record(plan, values, engine=engine, progress=progress).values
     if plan.view_blur is not None:
         from vcc.engines import view_blur
 

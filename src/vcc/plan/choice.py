@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from vcc.errors import InputError
 from vcc.plan.compiler import compile_plan, why_not_footprints
+from vcc.plan.depth_rule import denser
 from vcc.plan.model import Plan
 from vcc.plan.ray_compiler import compile_rays
 from vcc.plan.rays import RayPlan
@@ -34,6 +36,19 @@ def compile_best(
     """
     if method not in ("auto", "footprints", "rays"):
         raise InputError(f"method is 'auto', 'footprints' or 'rays', not {method!r}")
+    if between_views == "depth":
+        if scene_distance is not None:
+            raise InputError(
+                "scene_distance is for between_views='auto'; by 'depth' each pixel has a distance of its own: leave "
+                "it out"
+            )
+        made, between, reason = denser(camera, light_field)
+        plan = compile_best(
+            camera, made, method=method, interpolation=interpolation, refine=refine, samples=samples, seed=seed
+        )
+        return replace(plan, views_between=between, notes=(*plan.notes, reason))
+    if between_views not in ("auto", "none"):
+        raise InputError(f"between_views is 'auto', 'none' or 'depth', not {between_views!r}")
     reason = "asked for" if method == "rays" else why_not_footprints(camera, light_field)
     if reason is None:
         if samples is not None:

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.plan.depth_rule import ViewsBetween
+
 Array = NDArray[np.float64]
 
 
@@ -80,6 +82,7 @@ class Plan:
         blur: kernel that the picture is convolved with, odd rows × odd columns of sum 1 (a diffuser), or None.
         view_blur: kernel that each view is convolved with before all else (a diffuser at the views), growing by
             half the kernel on each side, or None; ``samples`` and places count what is there after that.
+        views_between: how views in between are made before all else, or None; taps count what is there after that.
         swap_pixel_axes: whether rows and columns of pixels change places before all else.
         samples: (rows, columns) of pixels of a view, after that change.
         missing_rays: share of the rays asked for that the light field lacks.
@@ -112,6 +115,7 @@ class Plan:
     opening: float = 1.0
     blur: Array | None = None
     view_blur: Array | None = None
+    views_between: ViewsBetween | None = None
 
     def columns(self, columns: NDArray[np.int64]) -> Plan:
         """The plan with some of its columns of view taps only: pictures of such pieces add up."""

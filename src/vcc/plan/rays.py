@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.optics.lattice import Lattice
+from vcc.plan.depth_rule import ViewsBetween
 from vcc.plan.steps import Bundle, Move, Packer, Step
 
 Array = NDArray[np.float64]
@@ -177,6 +178,7 @@ class RayPlan:
         views_may_end: rays outside the grid of views are missing: a stop at the views says that they are wanted.
         cautions: what a user should be warned of, in words.
         notes: what was decided and why, in words.
+        views_between: how views in between are made before all else, or None; ``views`` counts them.
     """
 
     sensor_shape: tuple[int, int]
@@ -196,6 +198,7 @@ class RayPlan:
     views_may_end: bool
     cautions: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
+    views_between: ViewsBetween | None = None
 
     @property
     def rays(self) -> int:

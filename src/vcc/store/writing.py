@@ -276,6 +276,7 @@ def save_store(
     from vcc.sampled import to_numpy
 
     values = to_numpy(light_field.values)
+    known = light_field.disparity.maps() if light_field.disparity.known else None
     return write_views(
         Path(path).expanduser(),
         light_field.frame,
@@ -284,6 +285,7 @@ def save_store(
         lambda j, i: values[j, i],
         overwrite=overwrite,
         progress=progress,
+        disparity=known,
         provenance={"written_by": f"vcc {__version__}"} if provenance is None else provenance,
         transfer=transfer,
         channel_names=channel_names,
@@ -302,6 +304,7 @@ def write_views(
     *,
     overwrite: bool,
     progress: Progress | None,
+    disparity: DisparityMaps | None = None,
     **stated: Any,
 ) -> StoredLightField:
     """Write a whole store under a temporary name and rename it.
@@ -314,6 +317,7 @@ def write_views(
         view: gives the samples of view (row, column).
         overwrite: see `save_store`.
         progress: see there.
+        disparity: maps to be kept beside the samples, where known.
         stated: further arguments of `create_store`.
 
     Raises:
