@@ -19,6 +19,8 @@ TILE = 16
 """Pixels a side of the squares whose ranges of disparities bound the marches."""
 MET = 0.1
 """Of a pixel per view: a map is met where it and the march differ by less."""
+SAME_SURFACE = 2
+"""Tears by which pixels two apart may differ and still show one surface."""
 HALVINGS = 6
 """Of a step of at most a pixel, to find which two pixels a tear lies between."""
 
@@ -44,12 +46,15 @@ def _surface(nearness, x, y, tear):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _taps(f):  # type: ignore[no-untyped-def]
-    """Weights of samples −1, 0, 1 and 2 for the place f between 0 and 1 (Keys 1981, a = −½)."""
+    """Weights of samples −1, 0, 1 and 2 for the place f between 0 and 1 (Keys 1981, a = −½), float32."""
+    half, one, two = np.float32(0.5), np.float32(1), np.float32(2)
+    f2 = f * f
+    f3 = f2 * f
     return (
-        ((-0.5 * f + 1) * f - 0.5) * f,
-        (1.5 * f - 2.5) * f * f + 1,
-        ((-1.5 * f + 2) * f + 0.5) * f,
-        (0.5 * f - 0.5) * f * f,
+        half * (two * f2 - f3 - f),
+        half * (np.float32(3) * f3 - np.float32(5) * f2) + one,
+        half * (np.float32(4) * f2 - np.float32(3) * f3 + f),
+        half * (f3 - f2),
     )
 
 
@@ -60,49 +65,123 @@ def _add_colour(view, x, y, weight, out):  # type: ignore[no-untyped-def]
     x = min(max(x, 0.0), columns - 1.0)
     y = min(max(y, 0.0), rows - 1.0)
     c, r = int(x), int(y)
-    across, down = _taps(x - c), _taps(y - r)
-    inside = 1 <= c < columns - 2 and 1 <= r < rows - 2
+    across, down = _taps(np.float32(x - c)), _taps(np.float32(y - r))
+    if channels == 3 and 1 <= c < columns - 2 and 1 <= r < rows - 2:
+        red = green = blue = np.float32(0)
+        for n in range(4):
+            for m in range(4):
+                share = down[n] * across[m]
+                red += share * np.float32(view[r + n - 1, c + m - 1, 0])
+                green += share * np.float32(view[r + n - 1, c + m - 1, 1])
+                blue += share * np.float32(view[r + n - 1, c + m - 1, 2])
+        out[0] += weight * red
+        out[1] += weight * green
+        out[2] += weight * blue
+        return
     for channel in range(channels):
         total = 0.0
         for n in range(4):
-            if down[n] == 0:
-                continue
-            row = r + n - 1 if inside else min(max(r + n - 1, 0), rows - 1)
-            if inside:
-                line = (
-                    across[0] * view[row, c - 1, channel] + across[1] * view[row, c, channel]
-                    + across[2] * view[row, c + 1, channel] + across[3] * view[row, c + 2, channel]
-                )  # fmt: skip
-            else:
-                line = 0.0
-                for m in range(4):
-                    line += across[m] * view[row, min(max(c + m - 1, 0), columns - 1), channel]
-            total += down[n] * line
+            row = min(max(r + n - 1, 0), rows - 1)
+            for m in range(4):
+                total += down[n] * across[m] * view[row, min(max(c + m - 1, 0), columns - 1), channel]
         out[channel] += weight * total
 
 
 @_compiled
-def _along(place, d):  # type: ignore[no-untyped-def]
-    """The disparity along v of what has the disparity d along u; see `vcc.plan.depth_rule.Parallax`."""
-    return (place[0] + place[1] * d) / (place[2] + place[3] * d)
+def _add_colour_beside_tear(view, nearness, x, y, here, tear, weight, out):  # type: ignore[no-untyped-def]
+    """`_add_colour` where other surfaces may be close: of the pixels around only those of this surface count."""
+    rows, columns, channels = view.shape
+    x = min(max(x, 0.0), columns - 1.0)
+    y = min(max(y, 0.0), rows - 1.0)
+    c, r = int(x), int(y)
+    across, down = _taps(np.float32(x - c)), _taps(np.float32(y - r))
+    # The closest pixel of this surface stands for those of others.
+    own_row, own_column, closest = int(y + 0.5), int(x + 0.5), np.inf
+    for row in range(max(r - 1, 0), min(r + 3, rows)):
+        for column in range(max(c - 1, 0), min(c + 3, columns)):
+            away = (x - column) ** 2 + (y - row) ** 2
+            if away < closest and abs(nearness[row, column] - here) <= SAME_SURFACE * tear:
+                own_row, own_column, closest = row, column, away
+    for n in range(4):
+        row = min(max(r + n - 1, 0), rows - 1)
+        for m in range(4):
+            column = min(max(c + m - 1, 0), columns - 1)
+            share = weight * down[n] * across[m]
+            if abs(nearness[row, column] - here) > SAME_SURFACE * tear:
+                row_taken, column_taken = own_row, own_column
+            else:
+                row_taken, column_taken = row, column
+            for channel in range(channels):
+                out[channel] += share * view[row_taken, column_taken, channel]
+
+
+@_compiled
+def _beyond(nearness, k, l, w, way, tear):  # type: ignore[no-untyped-def]
+    """How much nearer than w a map is where a march that has come to w is."""
+    x, y = _place(k, l, w, way)
+    return _surface(nearness, x, y, tear) - w
+
+
+@_compiled
+def _place(k, l, w, way):  # type: ignore[no-untyped-def]
+    """Where what is seen at (k, l) and has the nearness w is in a view; ``way`` as of `look_from_between`."""
+    columns_before, rows_before, sign, n0, n1, m0, m1 = way
+    d = sign * w
+    return k + d * columns_before, l + (n0 + n1 * d) / (m0 + m1 * d) * rows_before
+
+
+@_compiled
+def _march(nearness, k, l, low, high, reach, way, tear):  # type: ignore[no-untyped-def]
+    """(whether a surface is met, its nearness; at a tear not met, the nearness of its far and of its near side)."""
+    if high - low < tear:
+        # One smooth surface is met once, and going where it would be if it were even leads there.
+        w = 0.5 * (high + low)
+        w += _beyond(nearness, k, l, w, way, tear)
+        w += _beyond(nearness, k, l, w, way, tear)
+        return True, w, w
+    f0 = _beyond(nearness, k, l, high, way, tear)
+    if f0 >= 0:
+        return True, high, high
+    steps = max(1, math.ceil((high - low) * reach))
+    w0, w1, f1 = high, high, f0
+    for n in range(steps):
+        w1 = high + (low - high) * (n + 1) / steps
+        f1 = _beyond(nearness, k, l, w1, way, tear)
+        if f1 >= 0:
+            break
+        if n < steps - 1:
+            w0, f0 = w1, f1
+    if f1 < 0:
+        return True, w1, w1  # by rounding: nothing is farther
+    # Between the two the map is met: soon where it is smooth, at a tear never.
+    for n in range(2 + HALVINGS):
+        w = w0 + (w1 - w0) * (f0 / (f0 - f1) if n < 2 else 0.5)
+        f = _beyond(nearness, k, l, w, way, tear)
+        if abs(f) < MET:
+            return True, w + f, w + f
+        if f > 0:
+            w1, f1 = w, f
+        else:
+            w0, f0 = w, f
+    return False, w0 + f0, w1 + f1
 
 
 @_compiled
 def look_from_between(  # type: ignore[no-untyped-def]
-    view, nearness, bounds, columns_before, rows_before, reach, sign, along_v, tear, weight, torn_only, first, out,
-    seen, far, near,
-):  # fmt: skip
+    view, nearness, bounds, way, reach, tear, weight, torn_only, first, out, seen, far, near
+):
     """Rows of the picture from a place between views, as one view shows them.
 
     view: (t, s, channels). nearness: (t, s), sign · disparity, larger is nearer. bounds: (tiles, tiles, 2), the
-    lowest and highest nearness that marches from the pixels of a tile may meet.
-    columns_before, rows_before: how many views the view lies before the place. along_v: 4 numbers, see `_along`.
+    lowest and highest nearness that marches from the pixels of a tile may meet, see `march_bounds`.
+    way: (columns, rows) that the view lies before the place, sign, and the four numbers by which disparities along
+    u are those along v, see `vcc.plan.depth_rule.Parallax`.
     reach: pixels of the view, at most, that a march goes for each pixel per view of disparity.
     tear: steps of nearness from pixel to pixel that are borders. weight: of what is added.
     torn_only: only pixels of ``seen`` below 0 are looked for, and only what fits their far side, else all.
     first: row of the picture of the first row of out. out: (rows, s, channels), is added to.
-    seen: (rows, s), 1 where the view shows what is there, else −1; with ``torn_only`` it stays, and weights are
-    added to −1 − … of what was found. far, near: (rows, s), the nearness met, and of tears that of both sides.
+    seen: (rows, s), 1 where the view shows what is there, else −1; with ``torn_only`` the weights of what is found
+    are taken from −1. far, near: (rows, s), the nearness met, or of tears that of both sides.
     """
     rows, columns = nearness.shape
     for row in range(out.shape[0]):
@@ -110,60 +189,23 @@ def look_from_between(  # type: ignore[no-untyped-def]
         for k in range(columns):
             if torn_only and seen[row, k] > 0:
                 continue
-            low = bounds[l // TILE, k // TILE, 0]
-            high = bounds[l // TILE, k // TILE, 1]
-            steps = max(1, math.ceil((high - low) * reach))
-            step = (high - low) / steps
-            w0 = high
-            d = sign * w0
-            f0 = _surface(nearness, k + d * columns_before, l + _along(along_v, d) * rows_before, tear) - w0
-            w1, f1 = w0, f0
-            for n in range(steps):
-                if f0 >= 0:
-                    break
-                w1 = high - (n + 1) * step
-                d = sign * w1
-                f1 = _surface(nearness, k + d * columns_before, l + _along(along_v, d) * rows_before, tear) - w1
-                if f1 >= 0 or n == steps - 1:
-                    break
-                w0, f0 = w1, f1
-            met = f0 >= 0 or f1 < 0
-            w = w0 if f0 >= 0 else w1
-            if f0 < 0 <= f1:
-                # Between the two the map is met: at once where it is smooth, at a tear never.
-                for n in range(2 + HALVINGS):
-                    w = w0 + (w1 - w0) * (f0 / (f0 - f1) if n < 2 else 0.5)
-                    d = sign * w
-                    f = _surface(nearness, k + d * columns_before, l + _along(along_v, d) * rows_before, tear) - w
-                    if abs(f) < 0.01 * MET:
-                        met = True
-                        break
-                    if f >= 0:
-                        w1, f1 = w, f
-                    else:
-                        w0, f0 = w, f
-                    if n > 0 and min(abs(f0), abs(f1)) < MET:
-                        met = True
-                        w = w0 if -f0 < f1 else w1
-                        break
-            here, beyond = w, w
-            if not met:
-                here, beyond = w0 + f0, w1 + f1
-                w = w0
-            d = sign * w
-            x, y = k + d * columns_before, l + _along(along_v, d) * rows_before
+            low, high = bounds[l // TILE, k // TILE, 0], bounds[l // TILE, k // TILE, 1]
+            met, here, beyond = _march(nearness, k, l, low, high, reach, way, tear)
+            x, y = _place(k, l, here, way)
             shown = met and -0.5 <= x <= columns - 0.5 and -0.5 <= y <= rows - 0.5
-            if torn_only:
-                # Of what the other views show, that which lies on the far side of the tear.
-                if shown and abs(here - far[row, k]) <= abs(here - near[row, k]):
-                    if seen[row, k] == -1:
-                        out[row, k, :] = 0
-                    seen[row, k] -= weight
-                    _add_colour(view, x, y, weight, out[row, k])
-                continue
-            far[row, k], near[row, k] = here, beyond
-            seen[row, k] = 1 if shown else -1
-            _add_colour(view, x, y, 1.0, out[row, k])
+            if not torn_only:
+                far[row, k], near[row, k] = here, beyond
+                seen[row, k] = 1 if shown else -1
+                if high - low < tear:
+                    _add_colour(view, x, y, np.float32(1), out[row, k])
+                else:
+                    _add_colour_beside_tear(view, nearness, x, y, here, tear, np.float32(1), out[row, k])
+            # Of what other views show, that which lies on the far side of the tear.
+            elif shown and abs(here - far[row, k]) <= abs(here - near[row, k]):
+                if seen[row, k] == -1:
+                    out[row, k, :] = 0
+                seen[row, k] -= weight
+                _add_colour_beside_tear(view, nearness, x, y, here, tear, np.float32(weight), out[row, k])
 
 
 @_compiled
@@ -184,7 +226,7 @@ def tile_ranges(nearness):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def march_bounds(ranges, columns_before, rows_before, sign, along_v):  # type: ignore[no-untyped-def]
+def march_bounds(ranges, way):  # type: ignore[no-untyped-def]
     """The lowest and highest nearness that marches from the pixels of each tile may meet; shape of ``ranges``."""
     down, across, _ = ranges.shape
     bounds = np.empty_like(ranges)
@@ -193,10 +235,8 @@ def march_bounds(ranges, columns_before, rows_before, sign, along_v):  # type: i
         for c in range(across):
             low, high = lowest, highest
             for _ in range(2):  # what they may meet bounds how far they go
-                x0, x1 = sorted_pair(sign * low * columns_before, sign * high * columns_before)
-                y0, y1 = sorted_pair(
-                    _along(along_v, sign * low) * rows_before, _along(along_v, sign * high) * rows_before
-                )
+                (xa, ya), (xb, yb) = _place(0, 0, low, way), _place(0, 0, high, way)
+                x0, x1, y0, y1 = min(xa, xb), max(xa, xb), min(ya, yb), max(ya, yb)
                 first_c = min(max(int(math.floor(c + x0 / TILE)), 0), across - 1)
                 last_c = min(max(int(math.floor(c + 1 + x1 / TILE)), 0), across - 1)
                 first_r = min(max(int(math.floor(r + y0 / TILE)), 0), down - 1)
@@ -205,12 +245,6 @@ def march_bounds(ranges, columns_before, rows_before, sign, along_v):  # type: i
                 low, high = part[:, :, 0].min(), part[:, :, 1].max()
             bounds[r, c, 0], bounds[r, c, 1] = low, high
     return bounds
-
-
-@_compiled
-def sorted_pair(one, other):  # type: ignore[no-untyped-def]
-    """The smaller and the larger of two numbers."""
-    return (one, other) if one <= other else (other, one)
 
 
 @_compiled

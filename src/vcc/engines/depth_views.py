@@ -165,7 +165,7 @@ class DenserViews:
 
         view = self._source.linear_view(row, column, 0, self._given[2])
         view = np.ascontiguousarray(view, dtype=np.float32 if view.dtype == np.float16 else view.dtype)
-        nearness = self._nearness(row, column)
+        nearness = _with_rims(self._nearness(row, column))
         return view.reshape(*view.shape[:2], -1), nearness, tile_ranges(nearness)
 
     def _nearness(self, row: int, column: int) -> Array:
@@ -216,7 +216,8 @@ class DenserViews:
         samples, nearness, ranges = view
         parallax = self._between.parallax
         down, across = away
-        bounds = march_bounds(ranges, across, down, parallax.sign, parallax.along_v)
+        way = (float(across), float(down), parallax.sign, *parallax.along_v)
+        bounds = march_bounds(ranges, way)
         ends = np.linspace(parallax.sign * float(nearness.min()), parallax.sign * float(nearness.max()), 17)
         steps = np.abs(np.diff(parallax.down(ends))).max() / max(np.abs(np.diff(ends)).max(), 1e-30)
         reach = max(abs(across), abs(down) * float(steps))
@@ -224,11 +225,21 @@ class DenserViews:
         def band(start: int) -> None:
             parts = [part[start : start + BAND] for part in into]
             look_from_between(
-                samples, nearness, bounds, across, down, reach, parallax.sign, parallax.along_v, TEAR, weight,
-                torn_only, first + start, *parts,
-            )  # fmt: skip
+                samples, nearness, bounds, way, reach, TEAR, weight, torn_only, first + start, *parts
+            )
 
         list(pool.map(band, range(0, len(into[0]), BAND)))
+
+
+def _with_rims(nearness: Array) -> Array:
+    """A map whose near things reach one pixel farther: pixels that their borders cut show them in part.
+
+    Such a pixel then moves with the near thing, as a soft border does, and does not stay behind as a ghost of it.
+    """
+    from scipy.ndimage import maximum_filter
+
+    around = maximum_filter(nearness, 3, mode="nearest")
+    return np.where(around - nearness > TEAR, around, nearness)
 
 
 def record(

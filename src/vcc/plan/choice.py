@@ -44,7 +44,14 @@ def compile_best(
             )
         made, between, reason = denser(camera, light_field)
         plan = compile_best(
-            camera, made, method=method, interpolation=interpolation, refine=refine, samples=samples, seed=seed
+            camera,
+            made,
+            method=method,
+            interpolation=interpolation,
+            between_views="none",
+            refine=refine,
+            samples=samples,
+            seed=seed,
         )
         return replace(plan, views_between=between, notes=(*plan.notes, reason))
     if between_views not in ("auto", "none"):

@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vcc.affine import Affine
+from vcc.disparity import DisparityMaps
 from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
 from vcc.store.compression import Compression, Lossless, Lossy, layout
+from vcc.store.disparity_maps import keep_maps
 from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata
 
 if TYPE_CHECKING:
@@ -334,6 +336,8 @@ def write_views(
                 if progress is not None:
                     progress(done, total)
             writer.finish()
+            if disparity is not None:
+                keep_maps(part, disparity)
         _put_in_place(part, folder)
     except InputError as error:
         raise InputError(str(error).replace(str(part), str(folder))) from error.__cause__
