@@ -26,12 +26,12 @@ class DisparityMaps:
     """Maps of the disparities that some views of a light field show.
 
     Args:
-        values: pixels per view along u, shape (maps, t, s): what is at column k of view i is at column k − d of the
-            next one to the right.
+        values: pixels per view along u, shape (maps, t, s): what is at column k of view i is at column k − d of
+            the next one to the right.
         views: (row, column) of the view that each map belongs to; of a piece of a light field these may be views
             outside it, or between its own.
         source: where the maps come from, in words.
-        whole_range: (lowest, highest) that a piece takes over from the whole; None takes it from the values.
+        whole_extent: (lowest, highest) that a piece takes over from the whole; None takes it from the values.
 
     Raises:
         InputError: other shapes, or values that are not finite.
@@ -40,7 +40,7 @@ class DisparityMaps:
     values: NDArray[np.float32]
     views: tuple[tuple[float, float], ...]
     source: str
-    whole_range: tuple[float, float] | None = None
+    whole_extent: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.values.ndim != 3 or 0 in self.values.shape or len(self.views) != len(self.values):
@@ -76,13 +76,13 @@ class DisparityMaps:
         )
 
     @cached_property
-    def range(self) -> tuple[float, float]:
+    def extent(self) -> tuple[float, float]:
         """(lowest, highest) disparity, pixels per view along u, but for the outermost half per cent of each map.
 
         Of a piece it is that of the whole, so that all pieces are treated alike.
         """
-        if self.whole_range is not None:
-            return self.whole_range
+        if self.whole_extent is not None:
+            return self.whole_extent
         ends = np.percentile(self.values, (OUTERMOST, 100 - OUTERMOST), axis=(1, 2))
         return float(ends[0].min()), float(ends[1].max())
 
@@ -96,7 +96,7 @@ class DisparityMaps:
         factor = u.step / s.step
         values = self.values[:, _slice(t), _slice(s)] * np.float32(factor)
         views = tuple(((row - v.start) / v.step, (column - u.start) / u.step) for row, column in self.views)
-        low, high = sorted(end * factor for end in self.range)
+        low, high = sorted(end * factor for end in self.extent)
         return DisparityMaps(values, views, self.source, (low, high))
 
 
@@ -146,4 +146,3 @@ class Disparities:
 def _slice(part: range) -> slice:
     """The slice that takes a range of indices from an axis that begins at 0."""
     return slice(part.start, None if part.stop < 0 else part.stop, part.step)
-

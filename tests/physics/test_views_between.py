@@ -37,12 +37,16 @@ def planes(near: float, far: float) -> Scene:
 
 
 def field(near: float, far: float, shape=(VIEWS, VIEWS, PIXELS, PIXELS)) -> vcc.LightField:
-    fine = views(planes(near, far), (*shape[:2], shape[2] * MEANS, shape[3] * MEANS), SPACING, SLOPE / MEANS, FOCUS)
+    fine = views(
+        planes(near, far), (*shape[:2], shape[2] * MEANS, shape[3] * MEANS), SPACING, SLOPE / MEANS, FOCUS
+    )
     samples = fine.reshape(*shape[:2], shape[2], MEANS, shape[3], MEANS).mean(axis=(3, 5)).astype(np.float32)
     # The same tracer, asked for disparities in place of radiance.
     known = Scene(
         [
-            Layer(layer.distance, lambda x, y, d=d: np.full(np.broadcast_shapes(x.shape, y.shape), d), layer.opacity)
+            Layer(
+                layer.distance, lambda x, y, d=d: np.full(np.broadcast_shapes(x.shape, y.shape), d), layer.opacity
+            )
             for layer, d in zip(planes(near, far).layers, (near, far), strict=True)
         ]
     )

@@ -66,10 +66,6 @@ def record(
     from vcc.engines import rays
 
     rays.check_tolerance(tolerance, by_rays=isinstance(plan, RayPlan))
-    if plan.views_between is not None:
-        from vcc.engines import depth_views
-
-        return depth_views.record(plan, values, engine=engine, tolerance=tolerance, progress=progress)
     if isinstance(plan, Plan):
         picture = run_plan(plan, values, engine=engine, progress=progress)
         return Recorded(picture, plan.missing_rays, plan.missing_reason)
@@ -122,7 +118,9 @@ def run_plan(
     """
     engine = chosen(engine, values)
     if plan.views_between is not None:
-        return record(plan, values, engine=engine, progress=progress).values
+        from vcc.engines import depth_views
+
+        return depth_views.run(plan, values, engine, progress)
     if plan.view_blur is not None:
         from vcc.engines import view_blur
 

@@ -107,7 +107,7 @@ def _add_colour_beside_tear(view, nearness, x, y, here, tear, weight, out):  # t
         for m in range(4):
             column = min(max(c + m - 1, 0), columns - 1)
             share = weight * down[n] * across[m]
-            if abs(nearness[row, column] - here) > SAME_SURFACE * tear:
+            if nearness[row, column] - here > SAME_SURFACE * tear:
                 row_taken, column_taken = own_row, own_column
             else:
                 row_taken, column_taken = row, column
@@ -132,7 +132,7 @@ def _place(k, l, w, way):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _march(nearness, k, l, low, high, reach, way, tear):  # type: ignore[no-untyped-def]
-    """(whether a surface is met, its nearness; at a tear not met, the nearness of its far and of its near side)."""
+    """(whether a surface is met, its nearness twice; at a tear, where none is, that of its far and near side)."""
     if high - low < tear:
         # One smooth surface is met once, and going where it would be if it were even leads there.
         w = 0.5 * (high + low)
@@ -237,10 +237,10 @@ def march_bounds(ranges, way):  # type: ignore[no-untyped-def]
             for _ in range(2):  # what they may meet bounds how far they go
                 (xa, ya), (xb, yb) = _place(0, 0, low, way), _place(0, 0, high, way)
                 x0, x1, y0, y1 = min(xa, xb), max(xa, xb), min(ya, yb), max(ya, yb)
-                first_c = min(max(int(math.floor(c + x0 / TILE)), 0), across - 1)
-                last_c = min(max(int(math.floor(c + 1 + x1 / TILE)), 0), across - 1)
-                first_r = min(max(int(math.floor(r + y0 / TILE)), 0), down - 1)
-                last_r = min(max(int(math.floor(r + 1 + y1 / TILE)), 0), down - 1)
+                first_c = min(max(math.floor(c + x0 / TILE), 0), across - 1)
+                last_c = min(max(math.floor(c + 1 + x1 / TILE), 0), across - 1)
+                first_r = min(max(math.floor(r + y0 / TILE), 0), down - 1)
+                last_r = min(max(math.floor(r + 1 + y1 / TILE), 0), down - 1)
                 part = ranges[first_r : last_r + 1, first_c : last_c + 1]
                 low, high = part[:, :, 0].min(), part[:, :, 1].max()
             bounds[r, c, 0], bounds[r, c, 1] = low, high

@@ -12,6 +12,7 @@ filled from others: Chen and Williams 1993.)
 
 from __future__ import annotations
 
+import math
 import os
 from collections import OrderedDict
 from collections.abc import Callable
@@ -27,10 +28,9 @@ from vcc.light_field import LightField
 from vcc.plan.depth_rule import ViewsBetween
 
 if TYPE_CHECKING:
-    from vcc.engines import EngineName, Progress, Recorded
+    from vcc.engines import EngineName, Progress
     from vcc.engines.pieces import Unread
     from vcc.plan.model import Plan
-    from vcc.plan.rays import RayPlan
 
 Array = NDArray[np.float32]
 
@@ -150,7 +150,10 @@ class DenserViews:
         picture, unseen = self._looked_from(
             (view, nearness, ranges),
             (y, x),
-            ((self._views(row, column), (y - (row - j), x - (column - i)), weight) for row, column, weight in others),
+            (
+                (self._views(row, column), (y - (row - j), x - (column - i)), weight)
+                for row, column, weight in others
+            ),
             first,
             stop,
         )
@@ -165,7 +168,7 @@ class DenserViews:
 
         view = self._source.linear_view(row, column, 0, self._given[2])
         view = np.ascontiguousarray(view, dtype=np.float32 if view.dtype == np.float16 else view.dtype)
-        nearness = _with_rims(self._nearness(row, column))
+        nearness = self._nearness(row, column)
         return view.reshape(*view.shape[:2], -1), nearness, tile_ranges(nearness)
 
     def _nearness(self, row: int, column: int) -> Array:
@@ -185,7 +188,7 @@ class DenserViews:
     def _looked_from(
         self, view: tuple[NDArray[Any], ...], away: tuple[float, float], others: Any, first: int, stop: int
     ) -> tuple[Array, int]:
-        """The picture (rows, s, channels) from a place some views (down, across) away, and how many pixels are unseen.
+        """The picture (rows, s, channels) from a place (down, across) views away, and how many pixels are unseen.
 
         ``others``: more views, as far away as they are, and weights, for what the first one does not show.
         """
@@ -231,41 +234,28 @@ class DenserViews:
         list(pool.map(band, range(0, len(into[0]), BAND)))
 
 
-def _with_rims(nearness: Array) -> Array:
-    """A map whose near things reach one pixel farther: pixels that their borders cut show them in part.
-
-    Such a pixel then moves with the near thing, as a soft border does, and does not stay behind as a ghost of it.
-    """
-    from scipy.ndimage import maximum_filter
-
-    around = maximum_filter(nearness, 3, mode="nearest")
-    return np.where(around - nearness > TEAR, around, nearness)
-
-
-def record(
-    plan: Plan | RayPlan,
-    values: Any,
-    *,
-    engine: EngineName | None = None,
-    tolerance: float | None = None,
-    progress: Progress | None = None,
-) -> Recorded:
-    """The picture of samples (v, u, t, s[, channels]) by a plan with ``views_between``; see `vcc.engines.record`.
+def run(plan: Plan, values: Any, engine: EngineName, progress: Progress | None = None) -> Any:
+    """The picture of samples (v, u, t, s[, channels]) by a plan with ``views_between``; see `run_plan`.
 
     Raises:
-        InputError: samples that are no NumPy array, or what `vcc.engines.pieces.record_pieces` refuses.
+        InputError: samples that are no NumPy array.
     """
     from vcc.engines.pieces import record_pieces
 
     if not isinstance(values, np.ndarray):
         raise InputError(
-            f"between_views='depth' takes NumPy arrays, not {type(values).__module__}.{type(values).__name__}: pass "
-            "light_field.replaced(numpy.asarray(values)), or between_views='auto', which carries gradients"
+            f"between_views='depth' takes NumPy arrays, not {type(values).__module__}.{type(values).__name__}: "
+            "pass light_field.replaced(numpy.asarray(values)), or between_views='auto', which carries gradients"
         )
     source = InMemory(values)
-    return record_pieces(
-        plan, source, engine=engine, tolerance=tolerance, memory_limit=IN_MEMORY, progress=progress
-    )
+    return record_pieces(plan, source, engine=engine, memory_limit=_room(plan, source), progress=progress).values
+
+
+def _room(plan: Plan, source: InMemory) -> int:
+    """Bytes for blocks of denser views: as few as serve well, and as many as a block of one view takes."""
+    from vcc.engines.pieces import least_memory
+
+    return max(IN_MEMORY, math.ceil(least_memory(plan, source.outline) / (1 - HELD)))
 
 
 def warn_of_unseen(views: DenserViews, stacklevel: int) -> None:
@@ -274,8 +264,8 @@ def warn_of_unseen(views: DenserViews, stacklevel: int) -> None:
 
     if views.made and views.unseen > MUCH_UNSEEN * views.made:
         warnings.warn(
-            f"{views.unseen / views.made:.1%} of the samples between views show what none of the views around them "
-            "shows (it is hidden there, or outside their pictures): borders go on there",
+            f"{views.unseen / views.made:.1%} of the samples between views show what none of the views around "
+            "them shows (it is hidden there, or outside their pictures): borders go on there",
             ResultWarning,
             stacklevel=stacklevel,
         )

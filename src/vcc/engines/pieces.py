@@ -150,8 +150,8 @@ def record_pieces(
     """
     check_tolerance(tolerance, by_rays=isinstance(plan, RayPlan))
     light_field.check_complete()
-    if plan.views_between is not None:
-        return _with_views_between(plan, light_field, engine, tolerance, memory_limit, progress)
+    if isinstance(plan, Plan) and plan.views_between is not None:
+        return _with_views_between(plan, light_field, engine, memory_limit, progress)
     blocks = cut(plan, light_field, engine, memory_limit)
     try:
         if isinstance(plan, Plan):
@@ -166,32 +166,27 @@ def record_pieces(
 
 
 def _with_views_between(
-    plan: Plan | RayPlan,
-    light_field: Unread,
-    engine: EngineName | None,
-    tolerance: float | None,
-    memory_limit: int | None,
-    progress: Progress | None,
+    plan: Plan, light_field: Unread, engine: EngineName | None, memory_limit: int | None, progress: Progress | None
 ) -> Recorded:
     """`record_pieces` of the denser light field, whose views are made when they are read."""
     made, limit = _denser(plan, light_field, memory_limit)
-    recorded = record_pieces(
-        replace(plan, views_between=None),
-        made,
-        engine=engine,
-        tolerance=tolerance,
-        memory_limit=limit,
-        progress=progress,
-    )
+    whole = replace(plan, views_between=None)
+    recorded = record_pieces(whole, made, engine=engine, memory_limit=limit, progress=progress)
     warn_of_unseen(made, 4)
     return recorded
 
 
-def _denser(plan: Plan | RayPlan, light_field: Unread, memory_limit: int | None) -> tuple[DenserViews, int]:
+def _denser(plan: Plan, light_field: Unread, memory_limit: int | None) -> tuple[DenserViews, int]:
     """The denser light field of a plan with ``views_between``, and the memory that it leaves to blocks."""
     limit = _checked_limit(memory_limit)
     assert plan.views_between is not None
     return DenserViews(light_field, plan.views_between, limit), math.ceil(limit * (1 - HELD))
+
+
+def least_memory(plan: Plan, outline: LightField) -> int:
+    """Bytes within which `record_pieces` of a plan with ``views_between`` runs block by block of whole views."""
+    view = 4 * math.prod(outline.shape[2:])
+    return _fixed(plan, outline) + 8 * view
 
 
 def explain_pieces(camera: Camera, light_field: Unread, **options: Any) -> Explanation:
@@ -210,7 +205,7 @@ def explain_pieces(camera: Camera, light_field: Unread, **options: Any) -> Expla
     words = explain(camera, light_field.outline, **options)
     plan = words.plan
     made: Unread = light_field
-    if plan.views_between is not None:
+    if isinstance(plan, Plan) and plan.views_between is not None:
         made, limit = _denser(plan, light_field, limit)
         plan = replace(plan, views_between=None)
     blocks = cut(plan, made, engine, limit)
@@ -271,7 +266,7 @@ def _checked_limit(memory_limit: int | None) -> int:
     limit = MEMORY_LIMIT if memory_limit is None else memory_limit
     if isinstance(limit, bool) or not isinstance(limit, int | float | np.integer) or not limit > 0:
         raise InputError(f"memory_limit is a number of bytes above 0, not {limit!r}")
-    return int(math.ceil(limit))
+    return math.ceil(limit)
 
 
 def _looked_at(views: NDArray[np.int64]) -> tuple[int, int]:

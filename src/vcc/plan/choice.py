@@ -39,10 +39,16 @@ def compile_best(
     if between_views == "depth":
         if scene_distance is not None:
             raise InputError(
-                "scene_distance is for between_views='auto'; by 'depth' each pixel has a distance of its own: leave "
-                "it out"
+                "scene_distance is for between_views='auto'; by 'depth' each pixel has a distance of its own: "
+                "leave it out"
             )
-        made, between, reason = denser(camera, light_field)
+        by_rays = "asked for" if method == "rays" else why_not_footprints(camera, light_field)
+        if by_rays is not None:
+            raise InputError(
+                f"between_views='depth' is for pictures made by footprints; this one is made by rays ({by_rays}): "
+                "leave it out, and rays interpolate along the parallax of one depth"
+            )
+        made, between, why = denser(camera, light_field)
         plan = compile_best(
             camera,
             made,
@@ -51,9 +57,9 @@ def compile_best(
             between_views="none",
             refine=refine,
             samples=samples,
-            seed=seed,
         )
-        return replace(plan, views_between=between, notes=(*plan.notes, reason))
+        assert isinstance(plan, Plan)
+        return replace(plan, views_between=between, notes=(*plan.notes, why))
     if between_views not in ("auto", "none"):
         raise InputError(f"between_views is 'auto', 'none' or 'depth', not {between_views!r}")
     reason = "asked for" if method == "rays" else why_not_footprints(camera, light_field)

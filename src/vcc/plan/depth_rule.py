@@ -1,8 +1,8 @@
 """How to fill the gaps between views by depth: as many views in between as the sensor can tell apart.
 
 A view stands for a cell of the aperture. Where the pictures of a point that neighbouring views throw on the sensor
-lie more than a pixel apart, each cell is divided, and what the scene looks like from the middle of each part is made
-of the views and their disparities (`vcc.engines.depth_views`). The denser light field is then like any other.
+lie more than a pixel apart, each cell is divided, and what the scene looks like from the middle of each part is
+made of the views and their disparities (`vcc.engines.depth_views`). The denser light field is then like any other.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class Parallax:
     def of(cls, frame: Affine) -> Parallax:
         """As a light field's frame says.
 
-        A point at 1/Z sends rays with s − u/Z constant, so that d = (∂s/∂i − ∂u/∂i/Z) / (∂s/∂k − ∂u/∂k/Z); likewise
-        along v. Solved for the homogeneous Z, which is finite at infinity.
+        A point at 1/Z sends rays with s − u/Z constant, so that d = (∂s/∂i − ∂u/∂i/Z) / (∂s/∂k − ∂u/∂k/Z);
+        likewise along v. Solved for the homogeneous Z, which is finite at infinity.
 
         Raises:
             InputError: a frame that turns view axes against those of pixels.
@@ -56,8 +56,9 @@ class Parallax:
         across, within = [0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]
         if (np.abs(linear[across, within]) > 1e-9 * scale[across]).any():
             raise InputError(
-                "between_views='depth' needs a light field whose view axes are along those of its pixels; this frame "
-                "turns or mixes them. Resample it first (vcc.LightField.resampled), or pass between_views='auto'"
+                "between_views='depth' needs a light field whose view axes are along those of its pixels; this "
+                "frame turns or mixes them. Resample it first (vcc.LightField.resampled), or pass "
+                "between_views='auto'"
             )
         (ui, uk), (si, sk) = linear[0, [0, 2]], linear[2, [0, 2]]
         (vj, vl), (tj, tl) = linear[1, [1, 3]], linear[3, [1, 3]]
@@ -111,7 +112,7 @@ def denser(camera: Camera, light_field: LightField) -> tuple[LightField, ViewsBe
         return light_field, None, "a single view: nothing between views"
     parallax = Parallax.of(light_field.frame)
     maps = light_field.disparity.maps()
-    low, high = maps.range
+    low, high = maps.extent
     pixels_from_metres = camera.sensor.frame.inverse()
     on_sensor = pixels_from_metres.linear @ camera.rays_at(camera.sensor.z).linear[:2]
     views = (math.ceil(rows), math.ceil(columns))

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.optics.lattice import Lattice
-from vcc.plan.depth_rule import ViewsBetween
 from vcc.plan.steps import Bundle, Move, Packer, Step
 
 Array = NDArray[np.float64]
@@ -178,7 +177,6 @@ class RayPlan:
         views_may_end: rays outside the grid of views are missing: a stop at the views says that they are wanted.
         cautions: what a user should be warned of, in words.
         notes: what was decided and why, in words.
-        views_between: how views in between are made before all else, or None; ``views`` counts them.
     """
 
     sensor_shape: tuple[int, int]
@@ -198,7 +196,6 @@ class RayPlan:
     views_may_end: bool
     cautions: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
-    views_between: ViewsBetween | None = None
 
     @property
     def rays(self) -> int:

@@ -283,8 +283,10 @@ def disparity_maps(
         raise InputError(
             f"disparities between views cannot be found: {error}. Or give them: vcc.LightField(…, disparity=maps)"
         ) from error
-    source = f"found for the middle view by vcc.recover.depth_by_plane_sweep, steps of {step:.2g}, vcc {__version__}"
-    return DisparityMaps(found.disparity, (found.view,), source)
+    source = (
+        f"found for the middle view by vcc.recover.depth_by_plane_sweep, steps of {step:.2g}, vcc {__version__}"
+    )
+    return DisparityMaps(found.disparity[None], (found.view,), source)
 
 
 @dataclass(frozen=True)

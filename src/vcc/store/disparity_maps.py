@@ -6,6 +6,7 @@ import json
 import secrets
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,8 @@ def read_maps(store: Path, shape: tuple[int, ...]) -> DisparityMaps | None:
     try:
         array = zarr.open_array(store=zarr.storage.LocalStore(folder, read_only=True), mode="r")
         values = np.asarray(array[:], dtype=np.float32)
-        views = tuple((float(row), float(column)) for row, column in array.attrs["views"])
+        stated: Any = array.attrs["views"]
+        views = tuple((float(row), float(column)) for row, column in stated)
         maps = DisparityMaps(values, views, str(array.attrs["source"]))
         if values.shape[1:] != tuple(shape[2:4]):
             raise ValueError(f"maps of {values.shape[1:]} pixels for views of {tuple(shape[2:4])}")

@@ -172,7 +172,7 @@ class StoredLightField:
 
     @property
     def disparity(self) -> Disparities:
-        """Maps of the disparities of its pixels: kept in the store, or found when first asked for and then kept."""
+        """Maps of its pixels' disparities: kept in the store, or found when first asked for and then kept."""
         assert self._maps is not None
         return self._maps
 

@@ -337,13 +337,20 @@ def write_views(
                     progress(done, total)
             writer.finish()
             if disparity is not None:
-                keep_maps(part, disparity)
+                _keep(part, disparity)
         _put_in_place(part, folder)
     except InputError as error:
         raise InputError(str(error).replace(str(part), str(folder))) from error.__cause__
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return open_store(folder)
+
+
+def _keep(part: Path, disparity: DisparityMaps) -> None:
+    try:
+        keep_maps(part, disparity)
+    except OSError as error:
+        raise InputError(f"the disparities could not be written to {part}: {error.strerror or error}") from error
 
 
 def _check(folder: Path, shape: tuple[int, ...], kind: np.dtype[Any], transfer: str, packing: Compression) -> None:
