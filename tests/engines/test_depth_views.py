@@ -1,7 +1,7 @@
-"""Views in between, made from neighbouring ones and their disparities: against closed-form views, and as an operator.
+"""Views in between, made from neighbouring ones and their disparities.
 
-The oracles are the closed-form planes of tests/physics, seen from in between; linearity; and symmetry: a transposed
-or mirrored light field has transposed or mirrored views in between.
+The oracles are closed-form planes, seen from in between; linearity; and symmetry: a transposed or mirrored light
+field has transposed or mirrored views in between.
 """
 
 from __future__ import annotations
@@ -82,18 +82,18 @@ def test_near_things_hide_what_is_behind_and_show_it_beside():
     pictures, views = made(values, between((4, 4), disparity))
     expected, _, inside = two_planes(4)
     error = np.abs(pictures - expected)
-    # Borders of point samples are known to a pixel: all within one of them may be either side.
-    sides = sum(np.roll(inside, (a, b), (2, 3)).astype(int) for a in (-1, 0, 1) for b in (-1, 0, 1))
-    beside = (sides > 0) & (sides < 9)
-    clear = np.zeros_like(beside)
+    # Borders of point samples are known to a pixel, and cubic interpolation reaches two.
+    sides = sum(np.roll(inside, (a, b), (2, 3)).astype(int) for a in range(-2, 3) for b in range(-2, 3))
+    clear = np.zeros_like(inside)
     clear[:, :, 4:-4, 4:-4] = True
-    clear &= ~beside
-    hidden = error[clear] > 0.02
-    # Views 0.5 away on both axes leave a strip that the nearest view does not show; the others do, but for
-    # the grid's corners, which have no views beyond.
-    assert hidden.mean() < 0.005
-    assert np.sqrt(np.mean(error[clear][~hidden] ** 2)) < 0.004
-    assert views.unseen < 0.02 * views.made
+    clear &= (sides == 0) | (sides == 25)
+    wrong = error[clear] > 0.02
+    # Strips that the nearest view does not show are shown by others, but for those at the ends of the grid of views,
+    # which have none beyond: these are counted, and borders go on there.
+    assert 0 < views.unseen < 0.01 * views.made
+    assert wrong.sum() <= views.unseen
+    # Keys' cubic, as above.
+    assert np.sqrt(np.mean(error[clear][~wrong] ** 2)) < 0.003
 
 
 @pytest.mark.parametrize("turn", ["transposed", "upside down", "left to right", "turned over"])
@@ -169,7 +169,9 @@ def test_a_light_field_on_disk_keeps_its_disparities(tmp_path):
     assert stored.disparity.maps().source == "given for each view"
     image = FAR_OUT_OF_FOCUS.capture(stored, between_views="depth", memory_limit=2**22).values
     np.testing.assert_allclose(image, expected, atol=1e-5 * expected.max())
-    assert "views are made for each one" in str(FAR_OUT_OF_FOCUS.explain(stored, between_views="depth"))
+    words = " ".join(str(FAR_OUT_OF_FOCUS.explain(stored, between_views="depth")).split())
+    assert "views are made for each one" in words
+    assert "given for each view" in words
 
 
 @pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
@@ -215,12 +217,10 @@ def test_pieces_have_the_disparities_of_the_whole():
 def test_a_map_of_the_middle_view_serves_all():
     lf = field()
     one = replace(lf, disparity=two_planes()[1][1, 1])
-    apart = (
-        FAR_OUT_OF_FOCUS.capture(one, between_views="depth").values
-        - FAR_OUT_OF_FOCUS.capture(lf, between_views="depth").values
-    )
-    # What the middle view does not see of the far plane, strips of 3 pixels beside the square, is its own kind.
-    assert np.abs(apart).max() < 0.005 * FAR_OUT_OF_FOCUS.capture(lf, between_views="none").values.max()
+    one_picture = FAR_OUT_OF_FOCUS.capture(one, between_views="depth").values
+    all_pictures = FAR_OUT_OF_FOCUS.capture(lf, between_views="depth").values
+    # The map of another view follows: a far plane that the middle view does not see goes on as what it sees beside.
+    np.testing.assert_allclose(one_picture, all_pictures, atol=1e-5 * all_pictures.max())
 
 
 def test_what_cannot_be_is_refused():
@@ -238,10 +238,9 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(vcc.InputError, match="finite"):
         field(disparity=np.full((40, 48), np.nan))
     c, s = np.cos(0.4), np.sin(0.4)
-    rolled = vcc.Affine.from_parts(np.kron(np.diag([1, 1]), [[c, -s], [s, c]]), np.zeros(4))
-    turned = replace(lf, frame=lf.frame @ vcc.Affine.from_parts(np.kron(np.diag([1, 0]), [[c, -s], [s, c]])
-                     + np.diag([0, 0, 1, 1]), np.zeros(4)))  # fmt: skip
-    assert rolled.dimensions == 4
+    slopes_turned = np.eye(4)
+    slopes_turned[2:, 2:] = [[c, -s], [s, c]]
+    turned = replace(lf, frame=vcc.Affine.from_parts(slopes_turned, np.zeros(4)) @ lf.frame)
     with pytest.raises(vcc.InputError, match="turns or mixes"):
         FAR_OUT_OF_FOCUS.capture(turned, **depth)
     even = vcc.LightField.from_views(np.ones((3, 3, 20, 20), np.float32), SPACING, SLOPE, FOCUS)

@@ -19,6 +19,8 @@ TILE = 16
 """Pixels a side of the squares whose ranges of disparities bound the marches."""
 MET = 0.1
 """Of a pixel per view: a map is met where it and the march differ by less."""
+TIE = 1e-6
+"""Of a pixel: what differs by less is half way between two."""
 SAME_SURFACE = 2
 """Tears by which pixels two apart may differ and still show one surface."""
 HALVINGS = 6
@@ -38,9 +40,10 @@ def _surface(nearness, x, y, tear):  # type: ignore[no-untyped-def]
     p00, p01, p10, p11 = nearness[r, c], nearness[r, d], nearness[q, c], nearness[q, d]
     fx, fy = x - c, y - r
     if max(max(p00, p01), max(p10, p11)) - min(min(p00, p01), min(p10, p11)) > tear:
-        if fy < 0.5:
-            return p00 if fx < 0.5 else p01
-        return p10 if fx < 0.5 else p11
+        # Half way between two pixels the nearer surface, so that mirrored maps are met alike.
+        upper = p00 if fx < 0.5 - TIE else (p01 if fx > 0.5 + TIE else max(p00, p01))
+        lower = p10 if fx < 0.5 - TIE else (p11 if fx > 0.5 + TIE else max(p10, p11))
+        return upper if fy < 0.5 - TIE else (lower if fy > 0.5 + TIE else max(upper, lower))
     return (p00 * (1 - fx) + p01 * fx) * (1 - fy) + (p10 * (1 - fx) + p11 * fx) * fy
 
 
@@ -132,16 +135,19 @@ def _place(k, l, w, way):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _march(nearness, k, l, low, high, reach, way, tear):  # type: ignore[no-untyped-def]
-    """(whether a surface is met, its nearness twice; at a tear, where none is, that of its far and near side)."""
+    """(whether a surface is met, how far the march came, the nearness of what is there, and beyond a tear).
+
+    At a tear no surface is met: the march stops on its far side, short of its near side.
+    """
     if high - low < tear:
         # One smooth surface is met once, and going where it would be if it were even leads there.
         w = 0.5 * (high + low)
         w += _beyond(nearness, k, l, w, way, tear)
         w += _beyond(nearness, k, l, w, way, tear)
-        return True, w, w
+        return True, w, w, w
     f0 = _beyond(nearness, k, l, high, way, tear)
     if f0 >= 0:
-        return True, high, high
+        return True, high, high, high
     steps = max(1, math.ceil((high - low) * reach))
     w0, w1, f1 = high, high, f0
     for n in range(steps):
@@ -152,18 +158,18 @@ def _march(nearness, k, l, low, high, reach, way, tear):  # type: ignore[no-unty
         if n < steps - 1:
             w0, f0 = w1, f1
     if f1 < 0:
-        return True, w1, w1  # by rounding: nothing is farther
+        return True, w1, w1, w1  # by rounding: nothing is farther
     # Between the two the map is met: soon where it is smooth, at a tear never.
     for n in range(2 + HALVINGS):
         w = w0 + (w1 - w0) * (f0 / (f0 - f1) if n < 2 else 0.5)
         f = _beyond(nearness, k, l, w, way, tear)
         if abs(f) < MET:
-            return True, w + f, w + f
+            return True, w + f, w + f, w + f
         if f > 0:
             w1, f1 = w, f
         else:
             w0, f0 = w, f
-    return False, w0 + f0, w1 + f1
+    return False, w0, w0 + f0, w1 + f1
 
 
 @_compiled
@@ -190,8 +196,8 @@ def look_from_between(  # type: ignore[no-untyped-def]
             if torn_only and seen[row, k] > 0:
                 continue
             low, high = bounds[l // TILE, k // TILE, 0], bounds[l // TILE, k // TILE, 1]
-            met, here, beyond = _march(nearness, k, l, low, high, reach, way, tear)
-            x, y = _place(k, l, here, way)
+            met, w, here, beyond = _march(nearness, k, l, low, high, reach, way, tear)
+            x, y = _place(k, l, w, way)
             shown = met and -0.5 <= x <= columns - 0.5 and -0.5 <= y <= rows - 0.5
             if not torn_only:
                 far[row, k], near[row, k] = here, beyond
