@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from vcc.affine import Affine
+from vcc.disparity import Disparities, DisparityMaps
 from vcc.errors import InputError
 from vcc.sampled import LIGHT_FIELD_AXES, Index, known, sliced, to_dtype, to_numpy
 
@@ -62,17 +63,22 @@ class LightField:
         sample: what a sample says of the scene: ``"mean"``, the mean radiance over the cell of its pixel, as
             cameras and renderers give it; ``"point"``, the radiance of the ray in the middle of the cell, as a
             formula evaluated there gives it. A camera undoes what the samples' own averaging took from sharpness.
+        disparity: pixels per view along u of each pixel, (v, u, t, s) for all views or (t, s) for the middle one,
+            which is ((rows − 1) // 2, (columns − 1) // 2), where known: what ``between_views="depth"`` of
+            `vcc.Camera.capture` goes by. None finds it when it is first asked for. The attribute is a
+            `vcc.disparity.Disparities`.
 
     Raises:
         InputError: not 4-D or 5-D, an empty axis, a dtype that is not unsigned integer or floating point,
-            samples that are NaN, infinite or negative, a frame that is not 5×5 and invertible, or another word for
-            ``sample``.
+            samples that are NaN, infinite or negative, a frame that is not 5×5 and invertible, another word for
+            ``sample``, or a disparity of another shape or that is not finite.
     """
 
     values: Any
     frame: Affine
     disparity_range: tuple[float, float] | None = None
     sample: Sample = "mean"
+    disparity: Any = None
     _shared_disparity: DisparityRange | None = field(default=None, repr=False)
     _disparity_factor: float = field(default=1.0, repr=False)
     _whole_views: tuple[float, float] | None = field(default=None, repr=False)
@@ -107,6 +113,13 @@ class LightField:
             object.__setattr__(self, "_whole_views", (float(shape[0]), float(shape[1])))
         if self._shared_disparity is None:
             object.__setattr__(self, "_shared_disparity", DisparityRange(self._measure_disparity))
+        if not isinstance(self.disparity, Disparities):
+            shared = (
+                Disparities(find=self._find_disparities)
+                if self.disparity is None
+                else Disparities(DisparityMaps.given(self.disparity, shape))
+            )
+            object.__setattr__(self, "disparity", shared)
 
     @classmethod
     def from_views(
@@ -117,6 +130,7 @@ class LightField:
         focus_distance: float = math.inf,
         disparity_range: tuple[float, float] | None = None,
         sample: Sample = "mean",
+        disparity: Any = None,
     ) -> LightField:
         """A light field from pictures taken by a planar array of parallel cameras, upright, row 0 at the top.
 
@@ -132,6 +146,7 @@ class LightField:
                 their axes are parallel.
             disparity_range: see `LightField`.
             sample: see `LightField`.
+            disparity: see `LightField`.
 
         Raises:
             InputError: a spacing, slope or focus distance of zero or less, or what `LightField` refuses.
@@ -156,7 +171,7 @@ class LightField:
         matrix[2, 0], matrix[3, 1] = du / focus_distance, dv / focus_distance
         matrix[2, 2], matrix[3, 3] = -ps, -pt
         centre = np.array([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2])
-        return cls(values, Affine(matrix) @ Affine.translation(*-centre), disparity_range, sample)
+        return cls(values, Affine(matrix) @ Affine.translation(*-centre), disparity_range, sample, disparity)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -202,12 +217,14 @@ class LightField:
         n pixels wide each sample covers 1/n, and what that took from sharpness is 1/n² of what a mean over the
         cell takes.
         """
-        values, frame, steps = sliced(self.values, self.frame, index, LIGHT_FIELD_AXES, "a light field")
+        values, frame, ranges = sliced(self.values, self.frame, index, LIGHT_FIELD_AXES, "a light field")
+        v, u, t, s = (part.step for part in ranges[:4])
         rows, columns = self.whole_views
         return replace(
-            self._with(values, frame, steps[0] / steps[2]),
-            sample="point" if min(abs(steps[2]), abs(steps[3])) > 1 else self.sample,
-            _whole_views=(rows / abs(steps[1]), columns / abs(steps[0])),
+            self._with(values, frame, u / s),
+            sample="point" if min(abs(t), abs(s)) > 1 else self.sample,
+            disparity=self.disparity.piece(ranges),
+            _whole_views=(rows / abs(v), columns / abs(u)),
         )
 
     def view(self, row: int, column: int) -> Image:
@@ -407,6 +424,11 @@ class LightField:
         # 1/Z = numerator / denominator; as `disparity_of`, without the quotient, which may be infinite
         moved = angle[2] * denominator - place[2] * numerator
         return None if moved == 0 else float((angle[0] * denominator - place[0] * numerator) / moved)
+
+    def _find_disparities(self, progress: Callable[[int, int], None] | None) -> DisparityMaps:
+        from vcc.recover.depth import disparity_maps  # late: light fields come before what looks at them
+
+        return disparity_maps(self, progress=progress)
 
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))

@@ -162,7 +162,8 @@ def scattered_by(light_field: LightField, stage: Stage, memory_limit: int | None
         # In double precision: what Fourier transforms round to in the dark would else add up over a view.
         view = values[j, i].astype(np.float64) / light_field.full_scale
         np.maximum(oaconvolve(view, kernel, axes=(0, 1)), 0.0, out=inside, casting="same_kind")
-    return replace(light_field, values=result, frame=frame @ Affine.translation(0, 0, -wide, -high))
+    grown = frame @ Affine.translation(0, 0, -wide, -high)
+    return replace(light_field, values=result, frame=grown, disparity=None)
 
 
 def _view_weights(
@@ -234,6 +235,7 @@ def resampled(
         values=final,
         frame=frame,
         disparity_range=None,
+        disparity=None,
         _shared_disparity=None,
         _disparity_factor=1.0,
         _whole_views=None,

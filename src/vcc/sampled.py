@@ -24,8 +24,8 @@ IMAGE_AXES = (1, 0)
 
 def sliced(
     values: Any, frame: Affine, index: Index | tuple[Index, ...], axes: tuple[int, ...], what: str
-) -> tuple[Any, Affine, tuple[int, ...]]:
-    """A piece of ``values``, its frame, and the step taken along each frame index.
+) -> tuple[Any, Affine, list[range]]:
+    """A piece of ``values``, its frame, and the indices taken along each axis of ``values``.
 
     Args:
         values: an array whose first axes are the sampled ones.
@@ -62,7 +62,7 @@ def sliced(
     steps = [ranges[axis].step for axis in axes]
     piece = values[tuple(parts)]
     moved = frame @ Affine.translation(*starts) @ Affine.scaling(*steps)
-    return piece, moved, tuple(steps)
+    return piece, moved, ranges
 
 
 def to_numpy(values: Any) -> np.ndarray[Any, Any]:

@@ -2,7 +2,7 @@
 
 Layers, lowest first; a module may import from its own layer and from those below::
 
-    errors < units, memory < describe, electronics < affine < sampled < light_field, image, sensor
+    errors < units, memory < describe, electronics < affine < sampled, disparity < light_field, image, sensor
     < patterns, kernels, surfaces < sheets < optics < camera < plan < engines < operators, formats, sources,
     parallax, plot, cli, demo, ...
 
@@ -27,7 +27,7 @@ LAYERS: list[set[str]] = [
     {"units", "memory"},
     {"describe", "electronics"},
     {"affine"},
-    {"sampled"},
+    {"sampled", "disparity"},
     {"light_field", "image", "sensor"},
     {"patterns", "kernels", "surfaces"},
     {"sheets"},
@@ -42,6 +42,7 @@ TOP = len(LAYERS)
 ALLOWED_UP = {
     ("light_field", "operators"): "the paper's operators are methods of a light field; their work is elsewhere",
     ("light_field", "parallax"): "disparity is measured from the samples when first asked for",
+    ("light_field", "recover"): "maps of disparity are found from the samples when first asked for",
     ("image", "formats"): "image.save(path) writes through the formats",
     ("camera", "plan"): "camera.compile and explain make the plan",
     ("camera", "engines"): "camera.capture runs the plan",

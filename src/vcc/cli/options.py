@@ -109,9 +109,11 @@ Interpolation = Annotated[
     ),
 ]
 BetweenViews = Annotated[
-    Literal["auto", "none"],
+    Literal["auto", "none", "depth"],
     typer.Option(
-        help="Whether to interpolate between views where neighbouring ones differ by more than a pixel.",
+        help="Whether to interpolate between views where neighbouring ones differ by more than a pixel: auto does "
+        "along one parallax, where nothing is in focus; depth makes views in between by each pixel's own depth, "
+        "which is found first and kept in a store; none never does.",
         rich_help_panel=_CAPTURING,
     ),
 ]

@@ -117,6 +117,10 @@ def run_plan(
         InputError: an unknown engine, or one that does not take arrays of this type.
     """
     engine = chosen(engine, values)
+    if plan.views_between is not None:
+        from vcc.engines import depth_views
+
+        return depth_views.run(plan, values, engine, progress)
     if plan.view_blur is not None:
         from vcc.engines import view_blur
 

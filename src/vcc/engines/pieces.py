@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from vcc.affine import Affine
 from vcc.engines import EngineName, Progress, Recorded, record
+from vcc.engines.depth_views import HELD, DenserViews, warn_of_unseen
 from vcc.engines.rays import check_tolerance, warn_of_error
 from vcc.engines.sharpening import kept_as, sharpened
 from vcc.errors import InputError
@@ -151,6 +152,8 @@ def record_pieces(
     """
     check_tolerance(tolerance, by_rays=isinstance(plan, RayPlan))
     light_field.check_complete()
+    if isinstance(plan, Plan) and plan.views_between is not None:
+        return _with_views_between(plan, light_field, engine, memory_limit, progress)
     blocks = cut(plan, light_field, engine, memory_limit)
     try:
         if isinstance(plan, Plan):
@@ -162,6 +165,30 @@ def record_pieces(
         raise InputError(
             f"memory ran out within memory_limit={int(limit)} bytes: there is less than that. Pass a smaller one"
         ) from None
+
+
+def _with_views_between(
+    plan: Plan, light_field: Unread, engine: EngineName | None, memory_limit: int | None, progress: Progress | None
+) -> Recorded:
+    """`record_pieces` of the denser light field, whose views are made when they are read."""
+    made, limit = _denser(plan, light_field, memory_limit)
+    whole = replace(plan, views_between=None)
+    recorded = record_pieces(whole, made, engine=engine, memory_limit=limit, progress=progress)
+    warn_of_unseen(made, 4)
+    return recorded
+
+
+def _denser(plan: Plan, light_field: Unread, memory_limit: int | None) -> tuple[DenserViews, int]:
+    """The denser light field of a plan with ``views_between``, and the memory that it leaves to blocks."""
+    limit = _checked_limit(memory_limit)
+    assert plan.views_between is not None
+    return DenserViews(light_field, plan.views_between, limit), math.ceil(limit * (1 - HELD))
+
+
+def least_memory(plan: Plan, outline: LightField) -> int:
+    """Bytes within which `record_pieces` of a plan with ``views_between`` runs block by block of whole views."""
+    view = 4 * math.prod(outline.shape[2:])
+    return _fixed(plan, outline) + 8 * view
 
 
 def explain_pieces(camera: Camera, light_field: Unread, **options: Any) -> Explanation:
@@ -179,16 +206,20 @@ def explain_pieces(camera: Camera, light_field: Unread, **options: Any) -> Expla
     limit, engine = options.pop("memory_limit", None), options.get("engine")
     words = explain(camera, light_field.outline, **options)
     plan = words.plan
-    blocks = cut(plan, light_field, engine, limit)
+    made: Unread = light_field
+    if isinstance(plan, Plan) and plan.views_between is not None:
+        made, limit = _denser(plan, light_field, limit)
+        plan = replace(plan, views_between=None)
+    blocks = cut(plan, made, engine, limit)
     lines = [f"  read in {blocks.words}", f"  {light_field.stored_bytes / 1e6:.0f} MB on disk, as packed"]
     seconds = None
     if isinstance(plan, Plan):
-        seconds = _expected_seconds(plan, light_field, engine)
+        seconds = _expected_seconds(plan, made, engine)
         lines.append(f"  about {seconds:.2g} s expected (some views were read and timed on this machine)")
     else:
         lines.append("  all rays are traced once for each block; the time is not foretold")
     result = Explanation(f"{words}\n\nLight field on disk\n" + "\n".join(lines))
-    result.plan, result.expected_seconds = plan, seconds
+    result.plan, result.expected_seconds = words.plan, seconds
     return result
 
 
@@ -198,9 +229,7 @@ def cut(plan: Plan | RayPlan, light_field: Unread, engine: EngineName | None, me
     Raises:
         InputError: see `record_pieces`.
     """
-    limit = MEMORY_LIMIT if memory_limit is None else memory_limit
-    if isinstance(limit, bool) or not isinstance(limit, int | float | np.integer) or not limit > 0:
-        raise InputError(f"memory_limit is a number of bytes above 0, not {limit!r}")
+    limit = _checked_limit(memory_limit)
     outline = light_field.outline
     nv, nu, nt = outline.shape[:3]
     rows, columns = (0, nv), (0, nu)
@@ -234,6 +263,13 @@ def cut(plan: Plan | RayPlan, light_field: Unread, engine: EngineName | None, me
         f"memory_limit={int(limit)} bytes is too little: this picture takes {math.ceil(least / 1e6)} MB however "
         f"small the blocks are, and about {math.ceil((fixed + 8 * view) / 1e6)} MB to go well"
     )
+
+
+def _checked_limit(memory_limit: int | None) -> int:
+    limit = MEMORY_LIMIT if memory_limit is None else memory_limit
+    if isinstance(limit, bool) or not isinstance(limit, int | float | np.integer) or not limit > 0:
+        raise InputError(f"memory_limit is a number of bytes above 0, not {limit!r}")
+    return math.ceil(limit)
 
 
 def _looked_at(views: NDArray[np.int64]) -> tuple[int, int]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from vcc.errors import InputError
 from vcc.plan.compiler import compile_plan, why_not_footprints
+from vcc.plan.depth_rule import denser
 from vcc.plan.model import Plan
 from vcc.plan.ray_compiler import compile_rays
 from vcc.plan.rays import RayPlan
@@ -34,6 +36,32 @@ def compile_best(
     """
     if method not in ("auto", "footprints", "rays"):
         raise InputError(f"method is 'auto', 'footprints' or 'rays', not {method!r}")
+    if between_views == "depth":
+        if scene_distance is not None:
+            raise InputError(
+                "scene_distance is for between_views='auto'; by 'depth' each pixel has a distance of its own: "
+                "leave it out"
+            )
+        by_rays = "asked for" if method == "rays" else why_not_footprints(camera, light_field)
+        if by_rays is not None:
+            raise InputError(
+                f"between_views='depth' is for pictures made by footprints; this one is made by rays ({by_rays}): "
+                "leave it out, and rays interpolate along the parallax of one depth"
+            )
+        made, between, why = denser(camera, light_field)
+        plan = compile_best(
+            camera,
+            made,
+            method=method,
+            interpolation=interpolation,
+            between_views="none",
+            refine=refine,
+            samples=samples,
+        )
+        assert isinstance(plan, Plan)
+        return replace(plan, views_between=between, notes=(*plan.notes, why))
+    if between_views not in ("auto", "none"):
+        raise InputError(f"between_views is 'auto', 'none' or 'depth', not {between_views!r}")
     reason = "asked for" if method == "rays" else why_not_footprints(camera, light_field)
     if reason is None:
         if samples is not None:
@@ -51,11 +79,11 @@ def compile_best(
         )
     if method == "footprints":
         raise InputError(f"this camera's picture cannot be made by footprints: {reason}. Use method='rays'")
-    for name, given, by_rays in (
+    for name, given, allowed in (
         ("interpolation", interpolation, ("sharp", "linear")),
         ("refine", refine, ("auto",)),
     ):
-        if given not in by_rays:
+        if given not in allowed:
             raise InputError(
                 f"{name}={given!r} is for pictures made by footprints; this one is made by rays ({reason}): "
                 "leave it out"

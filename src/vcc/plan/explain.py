@@ -139,9 +139,12 @@ def _sampling(plan: Plan) -> str:
 
 
 def _cost(plan: Plan, light_field: LightField, seconds: float | None) -> str:
-    views = len(np.unique(plan.view_rows)) * len(np.unique(plan.view_columns))
+    times = (1, 1) if plan.views_between is None else plan.views_between.times
+    views = len(np.unique(plan.view_rows // times[0])) * len(np.unique(plan.view_columns // times[1]))
     view_bytes = np.prod(light_field.shape[2:]) * to_dtype(light_field.values).itemsize
+    between = [] if plan.views_between is None else [f"  {plan.taps_used} views in between made from {views}"]
     lines = [
+        *between,
         f"  {plan.taps_used} view taps, {plan.samples_touched * (light_field.channels or 1) / 1e6:.0f} million "
         "sample values",
         f"  {min(views, plan.taps_used) * view_bytes / 1e6:.0f} MB of the light field read",
@@ -166,12 +169,14 @@ def _warnings(plan: Plan) -> str:
 
 def expected_memory(plan: Plan, light_field: LightField) -> int:
     """Bytes that a run of the plan takes beside the light field and the picture, estimated."""
+    from vcc.engines.depth_views import IN_MEMORY
     from vcc.engines.numba_cpu import memory
 
     channels = light_field.channels or 1
     # One column of views is blurred at a time: in double precision, and kept in single.
     blurred = 0 if plan.view_blur is None else 4 * channels * light_field.shape[0] * math.prod(plan.samples)
-    return memory(plan, channels) + int(blurred)
+    between = 0 if plan.views_between is None else IN_MEMORY
+    return memory(plan, channels) + int(blurred + between)
 
 
 def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) -> float | None:
@@ -187,7 +192,8 @@ def expected_seconds(plan: Plan, light_field: LightField, engine: Any = None) ->
         return 0.0
     used = np.count_nonzero(plan.weights, axis=0)
     # Enough of them that their own time stands out from the clock's noise.
-    share = max(1 / 16, min(1.0, 1e8 / (plan.samples_touched * (light_field.channels or 1))))
+    enough = 1e8 if plan.views_between is None else 1e7  # views in between take ten times as long
+    share = max(1 / 16, min(1.0, enough / (plan.samples_touched * (light_field.channels or 1))))
     columns = np.sort(np.argsort(-used)[: math.ceil(len(used) * share)])
     piece = plan.columns(columns)
     # What a run costs whatever it adds up.

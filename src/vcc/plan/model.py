@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.plan.depth_rule import ViewsBetween
 from vcc.plan.footprint import Division
 
 Array = NDArray[np.float64]
@@ -86,6 +87,7 @@ class Plan:
             columns and rows to give back what interpolation took from sharpness (`vcc.plan.sharpening`), or None.
         sharpen_samples: an odd number of weights by which samples are filtered along both axes where they are
             divided (``refine``), or None.
+        views_between: how views in between are made before all else, or None; taps count what is there after that.
         swap_pixel_axes: whether rows and columns of pixels change places before all else.
         samples: (rows, columns) of pixels of a view, after that change.
         missing_rays: share of the rays asked for that the light field lacks.
@@ -120,6 +122,7 @@ class Plan:
     view_blur: Array | None = None
     sharpen: tuple[Array, Array] | None = None
     sharpen_samples: Array | None = None
+    views_between: ViewsBetween | None = None
 
     def division(self, samples: int) -> Division:
         """How ``samples`` samples along an axis are divided into ``refine`` finer ones each."""

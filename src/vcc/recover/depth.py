@@ -16,14 +16,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.disparity import DisparityMaps
 from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.memory import check_memory
 from vcc.sampled import to_numpy
+
+if TYPE_CHECKING:
+    from vcc.store import StoredLightField
 
 Array = NDArray[np.float32]
 
@@ -37,6 +42,8 @@ _SOFTNESSES = 9  # fractions of a pixel in sixteenths, up to a half
 _SMOOTHING = (3 / 16, 10 / 16, 3 / 16)
 _ALIASED = np.float32(1e3)  # larger than the energy of any derivative
 _LARGEST_RANGE = 64  # pixels per view either way; more is a range in other units
+_FINEST_STEP = 0.06  # of a sweep, pixels per view
+_MOST_STEPS = 160  # of a sweep for what lies between views
 _MARGIN = 0.3  # pixels per view by which a measured range is widened: it leaves out the outermost 2 %
 
 
@@ -121,7 +128,7 @@ def disparity_error(
 
 
 def depth_by_structure_tensor(
-    light_field: LightField,
+    light_field: LightField | StoredLightField,
     disparity_range: tuple[float, float] | None = None,
     *,
     inner_scale: float = 0.5,
@@ -179,10 +186,10 @@ def depth_by_structure_tensor(
 
 
 def depth_by_plane_sweep(
-    light_field: LightField,
+    light_field: LightField | StoredLightField,
     disparity_range: tuple[float, float] | None = None,
     *,
-    step: float = 0.06,
+    step: float = _FINEST_STEP,
     window: int = 11,
     memory_limit: int | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -246,6 +253,42 @@ def depth_by_plane_sweep(
     return _depth_map(geometry, found.astype(np.float32), _clarity(costs, best, lowest, tried))
 
 
+def disparity_maps(
+    light_field: LightField | StoredLightField,
+    *,
+    memory_limit: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> DisparityMaps:
+    """The disparities by which cameras look between views: those of the middle view, by `depth_by_plane_sweep`.
+
+    A light field calls this when ``between_views="depth"`` first asks for its disparities, and keeps the result.
+
+    Args:
+        light_field: in memory, or on disk: then its middle row and column of views are read.
+        memory_limit: see `depth_by_plane_sweep`.
+        progress: see there.
+
+    Raises:
+        InputError: as there; the way out is to give the disparities with the light field.
+    """
+    from vcc import __version__
+
+    try:
+        low, high = _range(light_field, None)
+        # Neighbouring views are half a view from what is looked at in between: a parabola through steps of this
+        # size finds disparities to a hundredth or two of a pixel, which is half of that on the sensor.
+        step = max(_FINEST_STEP, (high - low) / _MOST_STEPS)
+        found = depth_by_plane_sweep(light_field, step=step, memory_limit=memory_limit, progress=progress)
+    except InputError as error:
+        raise InputError(
+            f"disparities between views cannot be found: {error}. Or give them: vcc.LightField(…, disparity=maps)"
+        ) from error
+    source = (
+        f"found for the middle view by vcc.recover.depth_by_plane_sweep, steps of {step:.2g}, vcc {__version__}"
+    )
+    return DisparityMaps(found.disparity[None], (found.view,), source)
+
+
 @dataclass(frozen=True)
 class _Geometry:
     """What disparities mean: how they go over between u and v, and into metres."""
@@ -255,7 +298,7 @@ class _Geometry:
     view: tuple[int, int]
 
     @classmethod
-    def of(cls, light_field: LightField, fewest: int) -> _Geometry:
+    def of(cls, light_field: LightField | StoredLightField, fewest: int) -> _Geometry:
         rows, columns = light_field.shape[:2]
         if max(rows, columns) < fewest:
             raise InputError(
@@ -303,17 +346,20 @@ class _Geometry:
             return np.where(one == 0, np.inf, z / np.where(one == 0, 1, one)).astype(np.float32)
 
 
-def _crosses(light_field: LightField, geometry: _Geometry) -> list[tuple[Array, str]]:
+def _crosses(light_field: LightField | StoredLightField, geometry: _Geometry) -> list[tuple[Array, str]]:
     """The middle row of views, along u, and the middle column, along v: (views, channels, t, s), square roots.
 
     The square root is how photon noise becomes even, and shadows count as highlights do.
     """
     row, column = geometry.view
     found = []
-    for values, along in ((light_field.values[row], "u"), (light_field.values[:, column], "v")):
-        if len(values) < 2:
+    # By slices, so that of a light field on disk no more is read.
+    for place, along in (((row, slice(None)), "u"), ((slice(None), column), "v")):
+        if light_field.shape[1 if along == "u" else 0] < 2:
             continue
-        views = to_numpy(values).astype(np.float32)
+        part = tuple(n if isinstance(n, slice) else slice(n, n + 1) for n in place)
+        views = to_numpy(light_field[part].values).astype(np.float32)
+        views = views.reshape(-1, *views.shape[2:])
         views = views[..., None] if views.ndim == 3 else views
         found.append((np.ascontiguousarray(np.moveaxis(views, 3, 1)), along))
     bright = max(float(np.percentile(views, 99)) for views, _ in found)
@@ -325,7 +371,7 @@ def _crosses(light_field: LightField, geometry: _Geometry) -> list[tuple[Array, 
     return found
 
 
-def _range(light_field: LightField, given: tuple[float, float] | None) -> tuple[float, float]:
+def _range(light_field: LightField | StoredLightField, given: tuple[float, float] | None) -> tuple[float, float]:
     if given is None:
         measured = light_field.measured_disparity_range()
         if measured is None:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.disparity import Disparities, DisparityMaps
+from vcc.errors import InputError, ResultWarning
 from vcc.formats.transfer import decode
 from vcc.light_field import SAMPLES_IN_WORDS, DisparityRange, LightField, Sample, describe_geometry
 from vcc.sampled import Index
@@ -120,8 +121,11 @@ class StoredLightField:
     attributes: Attributes
     array: Any
     _disparity: DisparityRange | None = field(default=None, repr=False)
+    _maps: Disparities | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
+        if self._maps is None:
+            object.__setattr__(self, "_maps", Disparities(find=self._kept_or_found))
         if self._disparity is None:
             object.__setattr__(self, "_disparity", DisparityRange(self._measured))
 
@@ -172,6 +176,12 @@ class StoredLightField:
         return self.attributes.sample
 
     @property
+    def disparity(self) -> Disparities:
+        """Maps of its pixels' disparities: kept in the store, or found when first asked for and then kept."""
+        assert self._maps is not None
+        return self._maps
+
+    @property
     def provenance(self) -> dict[str, Any]:
         """Where the light field comes from."""
         return self.attributes.provenance
@@ -210,6 +220,7 @@ class StoredLightField:
             self.frame,
             self.disparity_range,
             self.sample,
+            disparity=self._maps,
             _shared_disparity=self._disparity,
             _checked=True,
         )
@@ -356,6 +367,27 @@ class StoredLightField:
 
     def _read(self, outline: LightField, progress: Progress | None = None) -> LightField:
         return replace(outline, values=outline.values.read(progress), _checked=True)
+
+    def _kept_or_found(self, progress: Progress | None) -> DisparityMaps:
+        import warnings
+
+        from vcc.recover.depth import disparity_maps
+        from vcc.store.disparity_maps import keep_maps, read_maps
+
+        kept = read_maps(self.path, self.shape)
+        if kept is not None:
+            return kept
+        found = disparity_maps(self, progress=progress)
+        try:
+            keep_maps(self.path, found)
+        except OSError as error:
+            warnings.warn(
+                f"the disparities found for {self.path} could not be kept there ({error.strerror or error}): they "
+                "are found again the next time",
+                ResultWarning,
+                stacklevel=2,
+            )
+        return found
 
     def _measured(self) -> tuple[float, float] | None:
         from vcc.parallax import disparity_range

@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vcc.affine import Affine
+from vcc.disparity import DisparityMaps
 from vcc.errors import InputError
 from vcc.light_field import LightField, Sample
 from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
 from vcc.store.compression import Compression, Lossless, Lossy, layout
+from vcc.store.disparity_maps import keep_maps
 from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata
 
 if TYPE_CHECKING:
@@ -280,6 +282,7 @@ def save_store(
     from vcc.sampled import to_numpy
 
     values = to_numpy(light_field.values)
+    known = light_field.disparity.maps() if light_field.disparity.known else None
     return write_views(
         Path(path).expanduser(),
         light_field.frame,
@@ -288,6 +291,7 @@ def save_store(
         lambda j, i: values[j, i],
         overwrite=overwrite,
         progress=progress,
+        disparity=known,
         provenance={"written_by": f"vcc {__version__}"} if provenance is None else provenance,
         transfer=transfer,
         channel_names=channel_names,
@@ -307,6 +311,7 @@ def write_views(
     *,
     overwrite: bool,
     progress: Progress | None,
+    disparity: DisparityMaps | None = None,
     **stated: Any,
 ) -> StoredLightField:
     """Write a whole store under a temporary name and rename it.
@@ -319,6 +324,7 @@ def write_views(
         view: gives the samples of view (row, column).
         overwrite: see `save_store`.
         progress: see there.
+        disparity: maps to be kept beside the samples, where known.
         stated: further arguments of `create_store`.
 
     Raises:
@@ -335,12 +341,21 @@ def write_views(
                 if progress is not None:
                     progress(done, total)
             writer.finish()
+            if disparity is not None:
+                _keep(part, disparity)
         _put_in_place(part, folder)
     except InputError as error:
         raise InputError(str(error).replace(str(part), str(folder))) from error.__cause__
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return open_store(folder)
+
+
+def _keep(part: Path, disparity: DisparityMaps) -> None:
+    try:
+        keep_maps(part, disparity)
+    except OSError as error:
+        raise InputError(f"the disparities could not be written to {part}: {error.strerror or error}") from error
 
 
 def _check(folder: Path, shape: tuple[int, ...], kind: np.dtype[Any], transfer: str, packing: Compression) -> None:

@@ -1,0 +1,267 @@
+"""The compiled loop that looks at a scene from between its views: rays marched through disparity maps.
+
+What is at pixel (k, l) of a view and has the disparity d is at (k + d·a, l + e(d)·b) of the view that is a columns
+and b rows of views before it. So a pixel of a picture in between is found in a view by going along that line, from
+the nearest disparity to the farthest, until the view's own map of disparities is met: the first surface met hides
+all others. Where the line passes from a far thing behind a near one, the view does not show what is there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+_compiled = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract", "nsz"})
+
+TILE = 16
+"""Pixels a side of the squares whose ranges of disparities bound the marches."""
+MET = 0.1
+"""Of a pixel per view: a map is met where it and the march differ by less."""
+TIE = 1e-6
+"""Of a pixel: what differs by less is half way between two."""
+SAME_SURFACE = 2
+"""Tears by which pixels two apart may differ and still show one surface."""
+HALVINGS = 6
+"""Of a step of at most a pixel, to find which two pixels a tear lies between."""
+
+
+@_compiled
+def _surface(nearness, x, y, tear):  # type: ignore[no-untyped-def]
+    """A map between its pixels: linear, but the nearest pixel's where it tears; ends go on."""
+    rows, columns = nearness.shape
+    x = min(max(x, 0.0), columns - 1.0)
+    y = min(max(y, 0.0), rows - 1.0)
+    c = min(int(x), max(columns - 2, 0))
+    r = min(int(y), max(rows - 2, 0))
+    d = min(c + 1, columns - 1)
+    q = min(r + 1, rows - 1)
+    p00, p01, p10, p11 = nearness[r, c], nearness[r, d], nearness[q, c], nearness[q, d]
+    fx, fy = x - c, y - r
+    if max(max(p00, p01), max(p10, p11)) - min(min(p00, p01), min(p10, p11)) > tear:
+        # Half way between two pixels the nearer surface, so that mirrored maps are met alike.
+        upper = p00 if fx < 0.5 - TIE else (p01 if fx > 0.5 + TIE else max(p00, p01))
+        lower = p10 if fx < 0.5 - TIE else (p11 if fx > 0.5 + TIE else max(p10, p11))
+        return upper if fy < 0.5 - TIE else (lower if fy > 0.5 + TIE else max(upper, lower))
+    return (p00 * (1 - fx) + p01 * fx) * (1 - fy) + (p10 * (1 - fx) + p11 * fx) * fy
+
+
+@_compiled
+def _taps(f):  # type: ignore[no-untyped-def]
+    """Weights of samples −1, 0, 1 and 2 for the place f between 0 and 1 (Keys 1981, a = −½), float32."""
+    half, one, two = np.float32(0.5), np.float32(1), np.float32(2)
+    f2 = f * f
+    f3 = f2 * f
+    return (
+        half * (two * f2 - f3 - f),
+        half * (np.float32(3) * f3 - np.float32(5) * f2) + one,
+        half * (np.float32(4) * f2 - np.float32(3) * f3 + f),
+        half * (f3 - f2),
+    )
+
+
+@_compiled
+def _add_colour(view, x, y, weight, out):  # type: ignore[no-untyped-def]
+    """Add what a view shows at a place between its pixels, cubic; ends go on."""
+    rows, columns, channels = view.shape
+    x = min(max(x, 0.0), columns - 1.0)
+    y = min(max(y, 0.0), rows - 1.0)
+    c, r = int(x), int(y)
+    across, down = _taps(np.float32(x - c)), _taps(np.float32(y - r))
+    if channels == 3 and 1 <= c < columns - 2 and 1 <= r < rows - 2:
+        red = green = blue = np.float32(0)
+        for n in range(4):
+            for m in range(4):
+                share = down[n] * across[m]
+                red += share * np.float32(view[r + n - 1, c + m - 1, 0])
+                green += share * np.float32(view[r + n - 1, c + m - 1, 1])
+                blue += share * np.float32(view[r + n - 1, c + m - 1, 2])
+        out[0] += weight * red
+        out[1] += weight * green
+        out[2] += weight * blue
+        return
+    for channel in range(channels):
+        total = 0.0
+        for n in range(4):
+            row = min(max(r + n - 1, 0), rows - 1)
+            for m in range(4):
+                total += down[n] * across[m] * view[row, min(max(c + m - 1, 0), columns - 1), channel]
+        out[channel] += weight * total
+
+
+@_compiled
+def _add_colour_beside_tear(view, nearness, x, y, here, tear, weight, out):  # type: ignore[no-untyped-def]
+    """`_add_colour` where other surfaces may be close: of the pixels around only those of this surface count."""
+    rows, columns, channels = view.shape
+    x = min(max(x, 0.0), columns - 1.0)
+    y = min(max(y, 0.0), rows - 1.0)
+    c, r = int(x), int(y)
+    across, down = _taps(np.float32(x - c)), _taps(np.float32(y - r))
+    # The closest pixel of this surface stands for those of others.
+    own_row, own_column, closest = int(y + 0.5), int(x + 0.5), np.inf
+    for row in range(max(r - 1, 0), min(r + 3, rows)):
+        for column in range(max(c - 1, 0), min(c + 3, columns)):
+            away = (x - column) ** 2 + (y - row) ** 2
+            if away < closest and abs(nearness[row, column] - here) <= SAME_SURFACE * tear:
+                own_row, own_column, closest = row, column, away
+    for n in range(4):
+        row = min(max(r + n - 1, 0), rows - 1)
+        for m in range(4):
+            column = min(max(c + m - 1, 0), columns - 1)
+            share = weight * down[n] * across[m]
+            if nearness[row, column] - here > SAME_SURFACE * tear:
+                row_taken, column_taken = own_row, own_column
+            else:
+                row_taken, column_taken = row, column
+            for channel in range(channels):
+                out[channel] += share * view[row_taken, column_taken, channel]
+
+
+@_compiled
+def _beyond(nearness, k, l, w, way, tear):  # type: ignore[no-untyped-def]
+    """How much nearer than w a map is where a march that has come to w is."""
+    x, y = _place(k, l, w, way)
+    return _surface(nearness, x, y, tear) - w
+
+
+@_compiled
+def _place(k, l, w, way):  # type: ignore[no-untyped-def]
+    """Where what is seen at (k, l) and has the nearness w is in a view; ``way`` as of `look_from_between`."""
+    columns_before, rows_before, sign, n0, n1, m0, m1 = way
+    d = sign * w
+    return k + d * columns_before, l + (n0 + n1 * d) / (m0 + m1 * d) * rows_before
+
+
+@_compiled
+def _march(nearness, k, l, low, high, reach, way, tear):  # type: ignore[no-untyped-def]
+    """(whether a surface is met, how far the march came, the nearness of what is there, and beyond a tear).
+
+    At a tear no surface is met: the march stops on its far side, short of its near side.
+    """
+    if high - low < tear:
+        # One smooth surface is met once, and going where it would be if it were even leads there.
+        w = 0.5 * (high + low)
+        w += _beyond(nearness, k, l, w, way, tear)
+        w += _beyond(nearness, k, l, w, way, tear)
+        return True, w, w, w
+    f0 = _beyond(nearness, k, l, high, way, tear)
+    if f0 >= 0:
+        return True, high, high, high
+    steps = max(1, math.ceil((high - low) * reach))
+    w0, w1, f1 = high, high, f0
+    for n in range(steps):
+        w1 = high + (low - high) * (n + 1) / steps
+        f1 = _beyond(nearness, k, l, w1, way, tear)
+        if f1 >= 0:
+            break
+        if n < steps - 1:
+            w0, f0 = w1, f1
+    if f1 < 0:
+        return True, w1, w1, w1  # by rounding: nothing is farther
+    # Between the two the map is met: soon where it is smooth, at a tear never.
+    for n in range(2 + HALVINGS):
+        w = w0 + (w1 - w0) * (f0 / (f0 - f1) if n < 2 else 0.5)
+        f = _beyond(nearness, k, l, w, way, tear)
+        if abs(f) < MET:
+            return True, w + f, w + f, w + f
+        if f > 0:
+            w1, f1 = w, f
+        else:
+            w0, f0 = w, f
+    return False, w0, w0 + f0, w1 + f1
+
+
+@_compiled
+def look_from_between(  # type: ignore[no-untyped-def]
+    view, nearness, bounds, way, reach, tear, weight, torn_only, first, out, seen, far, near
+):
+    """Rows of the picture from a place between views, as one view shows them.
+
+    view: (t, s, channels). nearness: (t, s), sign · disparity, larger is nearer. bounds: (tiles, tiles, 2), the
+    lowest and highest nearness that marches from the pixels of a tile may meet, see `march_bounds`.
+    way: (columns, rows) that the view lies before the place, sign, and the four numbers by which disparities along
+    u are those along v, see `vcc.plan.depth_rule.Parallax`.
+    reach: pixels of the view, at most, that a march goes for each pixel per view of disparity.
+    tear: steps of nearness from pixel to pixel that are borders. weight: of what is added.
+    torn_only: only pixels of ``seen`` below 0 are looked for, and only what fits their far side, else all.
+    first: row of the picture of the first row of out. out: (rows, s, channels), is added to.
+    seen: (rows, s), 1 where the view shows what is there, else −1; with ``torn_only`` the weights of what is found
+    are taken from −1. far, near: (rows, s), the nearness met, or of tears that of both sides.
+    """
+    rows, columns = nearness.shape
+    for row in range(out.shape[0]):
+        l = first + row
+        for k in range(columns):
+            if torn_only and seen[row, k] > 0:
+                continue
+            low, high = bounds[l // TILE, k // TILE, 0], bounds[l // TILE, k // TILE, 1]
+            met, w, here, beyond = _march(nearness, k, l, low, high, reach, way, tear)
+            x, y = _place(k, l, w, way)
+            shown = met and -0.5 <= x <= columns - 0.5 and -0.5 <= y <= rows - 0.5
+            if not torn_only:
+                far[row, k], near[row, k] = here, beyond
+                seen[row, k] = 1 if shown else -1
+                if high - low < tear:
+                    _add_colour(view, x, y, np.float32(1), out[row, k])
+                else:
+                    _add_colour_beside_tear(view, nearness, x, y, here, tear, np.float32(1), out[row, k])
+            # Of what other views show, that which lies on the far side of the tear.
+            elif shown and abs(here - far[row, k]) <= abs(here - near[row, k]):
+                if seen[row, k] == -1:
+                    out[row, k, :] = 0
+                seen[row, k] -= weight
+                _add_colour_beside_tear(view, nearness, x, y, here, tear, np.float32(weight), out[row, k])
+
+
+@_compiled
+def tile_ranges(nearness):  # type: ignore[no-untyped-def]
+    """(tiles down, tiles across, 2): the lowest and highest nearness in each tile and one pixel around it."""
+    rows, columns = nearness.shape
+    down, across = -(-rows // TILE), -(-columns // TILE)
+    ranges = np.empty((down, across, 2), dtype=np.float32)
+    for r in range(down):
+        for c in range(across):
+            part = nearness[
+                max(r * TILE - 1, 0) : min((r + 1) * TILE + 1, rows),
+                max(c * TILE - 1, 0) : min((c + 1) * TILE + 1, columns),
+            ]
+            ranges[r, c, 0] = part.min()
+            ranges[r, c, 1] = part.max()
+    return ranges
+
+
+@_compiled
+def march_bounds(ranges, way):  # type: ignore[no-untyped-def]
+    """The lowest and highest nearness that marches from the pixels of each tile may meet; shape of ``ranges``."""
+    down, across, _ = ranges.shape
+    bounds = np.empty_like(ranges)
+    lowest, highest = ranges[:, :, 0].min(), ranges[:, :, 1].max()
+    for r in range(down):
+        for c in range(across):
+            low, high = lowest, highest
+            for _ in range(2):  # what they may meet bounds how far they go
+                (xa, ya), (xb, yb) = _place(0, 0, low, way), _place(0, 0, high, way)
+                x0, x1, y0, y1 = min(xa, xb), max(xa, xb), min(ya, yb), max(ya, yb)
+                first_c = min(max(math.floor(c + x0 / TILE), 0), across - 1)
+                last_c = min(max(math.floor(c + 1 + x1 / TILE), 0), across - 1)
+                first_r = min(max(math.floor(r + y0 / TILE), 0), down - 1)
+                last_r = min(max(math.floor(r + 1 + y1 / TILE), 0), down - 1)
+                part = ranges[first_r : last_r + 1, first_c : last_c + 1]
+                low, high = part[:, :, 0].min(), part[:, :, 1].max()
+            bounds[r, c, 0], bounds[r, c, 1] = low, high
+    return bounds
+
+
+@_compiled
+def share_out(out, seen):  # type: ignore[no-untyped-def]
+    """Divide what several views were added to by their weights; returns how many pixels no view shows."""
+    unseen = 0
+    for row in range(out.shape[0]):
+        for k in range(out.shape[1]):
+            if seen[row, k] == -1:
+                unseen += 1
+            elif seen[row, k] < 0:
+                for channel in range(out.shape[2]):
+                    out[row, k, channel] /= -1 - seen[row, k]
+    return unseen

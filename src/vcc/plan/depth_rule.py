@@ -1,0 +1,154 @@
+"""How to fill the gaps between views by depth: as many views in between as the sensor can tell apart.
+
+A view stands for a cell of the aperture. Where the pictures of a point that neighbouring views throw on the sensor
+lie more than a pixel apart, each cell is divided, and what the scene looks like from the middle of each part is
+made of the views and their disparities (`vcc.engines.depth_views`). The denser light field is then like any other.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.affine import Affine
+from vcc.disparity import DisparityMaps
+from vcc.errors import InputError
+from vcc.light_field import LightField
+from vcc.plan.view_gaps import ViewGaps
+
+if TYPE_CHECKING:
+    from vcc.camera import Camera
+
+Array = NDArray[np.float64]
+
+MOST_TIMES = 16
+"""Into how many parts a view's cell is divided at most, each way: the cost grows with the square."""
+
+
+@dataclass(frozen=True)
+class Parallax:
+    """What a disparity along u means along v, and which of two is nearer.
+
+    Args:
+        sign: sign · disparity is larger for what is nearer: −1 where the frame mirrors views against pixels.
+        along_v: (n₀, n₁, m₀, m₁); what has the disparity d along u has (n₀ + n₁·d) / (m₀ + m₁·d) along v.
+    """
+
+    sign: float
+    along_v: tuple[float, float, float, float]
+
+    @classmethod
+    def of(cls, frame: Affine) -> Parallax:
+        """As a light field's frame says.
+
+        A point at 1/Z sends rays with s − u/Z constant, so that d = (∂s/∂i − ∂u/∂i/Z) / (∂s/∂k − ∂u/∂k/Z);
+        likewise along v. Solved for the homogeneous Z, which is finite at infinity.
+
+        Raises:
+            InputError: a frame that turns view axes against those of pixels.
+        """
+        linear = frame.linear
+        scale = np.abs(linear).max(axis=1)
+        across, within = [0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]
+        if (np.abs(linear[across, within]) > 1e-9 * scale[across]).any():
+            raise InputError(
+                "between_views='depth' needs a light field whose view axes are along those of its pixels; this "
+                "frame turns or mixes them. Resample it first (vcc.LightField.resampled), or pass "
+                "between_views='auto'"
+            )
+        (ui, uk), (si, sk) = linear[0, [0, 2]], linear[2, [0, 2]]
+        (vj, vl), (tj, tl) = linear[1, [1, 3]], linear[3, [1, 3]]
+        # Z : 1 = (∂u/∂i − d·∂u/∂k) : (∂s/∂i − d·∂s/∂k)
+        coefficients = np.array([tj * ui - vj * si, vj * sk - tj * uk, tl * ui - vl * si, vl * sk - tl * uk])
+        coefficients /= np.abs(coefficients[2:]).max()
+        n0, n1, m0, m1 = map(float, coefficients)
+        return cls(float(np.sign(uk * si - ui * sk)), (n0, n1, m0, m1))
+
+    def down(self, disparities: Array) -> Array:
+        """Disparities along v of those along u."""
+        n0, n1, m0, m1 = self.along_v
+        return np.asarray((n0 + n1 * disparities) / (m0 + m1 * disparities))
+
+
+@dataclass(frozen=True, eq=False)
+class ViewsBetween:
+    """A denser light field, as a plan has it: pure numbers.
+
+    Args:
+        times: into how many parts (down, across) the cell of each view is divided.
+        maps: disparities of the light field that there is.
+        parallax: what they mean.
+        full_scale: the stored value that stands for radiance 1; denser samples are radiance, float32.
+    """
+
+    times: tuple[int, int]
+    maps: DisparityMaps
+    parallax: Parallax
+    full_scale: float
+
+    def shape(self, given: tuple[int, ...]) -> tuple[int, ...]:
+        """The shape of the denser light field's samples."""
+        return (given[0] * self.times[0], given[1] * self.times[1], *given[2:])
+
+
+def denser(camera: Camera, light_field: LightField) -> tuple[LightField, ViewsBetween | None, str]:
+    """The light field with views in between, without samples; how they are made; and why, in words.
+
+    None where views are as dense as the sensor can tell apart.
+
+    Args:
+        camera: whose sensor is asked; what bends rays otherwise than affinely is passed over.
+        light_field: whose disparities are found now if they are not known.
+
+    Raises:
+        InputError: a frame that turns view axes against those of pixels, or disparities that cannot be found.
+    """
+    rows, columns = light_field.whole_views
+    if rows <= 1 and columns <= 1:
+        return light_field, None, "a single view: nothing between views"
+    parallax = Parallax.of(light_field.frame)
+    maps = light_field.disparity.maps()
+    low, high = maps.extent
+    pixels_from_metres = camera.sensor.frame.inverse()
+    on_sensor = pixels_from_metres.linear @ camera.rays_at(camera.sensor.z).linear[:2]
+    views = (math.ceil(rows), math.ceil(columns))
+    gaps = ViewGaps(light_field.frame, on_sensor, views)
+    disparities = np.linspace(low, high, 33)
+    per_index = on_sensor @ light_field.frame.linear
+    motion = np.zeros((33, 2, 2))
+    motion[:, 0, 0], motion[:, 1, 1] = disparities, parallax.down(disparities)
+    apart = np.linalg.norm(per_index[:, :2] - per_index[:, 2:] @ motion, axis=1)  # (n, axis of the views)
+    across, down = apart.max(axis=0)
+    wanted = [
+        1 if there < 2 else max(1, math.ceil(gap / gaps.limit - 1e-6))
+        for there, gap in zip(views, (down, across), strict=True)
+    ]
+    times = (min(wanted[0], MOST_TIMES), min(wanted[1], MOST_TIMES))
+    spread = f"neighbouring views' pictures lie up to {max(down, across):.2g} pixels apart on the sensor"
+    source = f"disparities from {low:.2g} to {high:.2g} pixels per view, {maps.source}"
+    if times == (1, 1):
+        return light_field, None, f"{spread}, less than it can tell apart: nothing between views ({source})"
+    j, i = times
+    whole = light_field.shape
+    shape = (whole[0] * j, whole[1] * i, *whole[2:])
+    finer = Affine.from_parts(np.diag([1 / i, 1 / j, 1, 1]), [0.5 / i - 0.5, 0.5 / j - 0.5, 0, 0])
+    outline = replace(
+        light_field,
+        values=np.broadcast_to(np.float32(0), shape),
+        frame=light_field.frame @ finer,
+        disparity_range=(min(low / i, high / i), max(low / i, high / i)),
+        disparity=None,
+        _shared_disparity=None,
+        _disparity_factor=1.0,
+        _whole_views=(rows * j, columns * i),
+    )
+    reason = f"{spread}: {j}×{i} views are made for each one, looking along each pixel's own parallax ({source})"
+    if max(wanted) > MOST_TIMES:
+        left = max(down / j, across / i)
+        reason += f"; {max(wanted)} would be needed, and {left:.2g} pixels stay between their pictures"
+    between = ViewsBetween(times, maps, parallax, light_field.full_scale)
+    return outline, between, reason

@@ -1,0 +1,248 @@
+"""Views in between, made from neighbouring ones and their disparities.
+
+The oracles are closed-form planes, seen from in between; linearity; and symmetry: a transposed or mirrored light
+field has transposed or mirrored views in between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vcc
+from vcc.disparity import DisparityMaps
+from vcc.engines.depth_views import DenserViews, InMemory
+from vcc.plan.depth_rule import Parallax, ViewsBetween
+from vcc.store import open_store, save_store
+from vcc.units import mm
+
+SPACING, SLOPE, FOCUS = 1 * mm, 1e-3, 1.0
+FRAME = vcc.LightField.from_views(np.zeros((3, 3, 4, 4), np.float32), SPACING, SLOPE, FOCUS).frame
+LENS = vcc.Lens(focal_length=50 * mm, diameter=2.6 * mm)
+FAR_OUT_OF_FOCUS = vcc.Camera([LENS], vcc.Sensor(z=50 * mm, shape=(20, 24), pitch=0.05 * mm))
+
+
+def wave(column, row, view_column, view_row, disparity):
+    """A plane's texture, of periods from 7 pixels, as seen at pixels of a view."""
+    x, y = column + disparity * view_column, row + disparity * view_row
+    return 0.5 + 0.2 * np.cos(0.6 * x + 0.4 * y) + 0.2 * np.sin(0.2 * x - 0.9 * y)
+
+
+def plane(disparity, times=1, views=(3, 3), pixels=(40, 48)):
+    """Samples of (views·times)² views of one plane, over the same aperture as the first ``views``."""
+    v, u = ((np.arange(n * times) + 0.5) / times - 0.5 - (n - 1) / 2 for n in views)
+    grid = np.ix_(v, u, np.arange(pixels[0]), np.arange(pixels[1]))
+    return wave(grid[3], grid[2], grid[1], grid[0], disparity).astype(np.float32)
+
+
+def between(times, disparity, frame=FRAME, source="given", full_scale=1.0):
+    shape = np.shape(disparity)
+    maps = DisparityMaps(
+        np.asarray(disparity, np.float32).reshape(-1, *shape[2:]),
+        tuple((float(j), float(i)) for j, i in np.ndindex(*shape[:2])),
+        source,
+    )
+    return ViewsBetween(times, maps, Parallax.of(frame), full_scale)
+
+
+def made(values, rule):
+    """All views in between, (v, u, t, s)."""
+    views = DenserViews(InMemory(values), rule)
+    rows, columns = rule.shape(values.shape)[:2]
+    pictures = [[views.linear_view(j, i, 0, values.shape[2]) for i in range(columns)] for j in range(rows)]
+    return np.array(pictures), views
+
+
+@pytest.mark.parametrize("disparity", [0.0, 0.7, -1.6, 3.0])
+def test_a_plane_is_seen_from_between_as_its_formula_says(disparity):
+    values = plane(disparity)
+    pictures, views = made(values, between((3, 3), np.full(values.shape, disparity)))
+    # What Keys' cubic misses of a wave of ω radians a pixel is ω³/(24·√3)·¾ at most (its cubic term); of these,
+    # amplitude 0.2 and 0.92: 0.2 · 0.015 = 0.003. Pixels near the ends of pictures look outside.
+    error = np.abs(pictures - plane(disparity, 3))[:, :, 4:-4, 4:-4]
+    assert error.max() < (0.006 if disparity % 3 else 1e-5)
+    # Beyond the outermost views, at most a third of a view away, an end of the pictures is seen by none.
+    assert views.unseen <= views.made * abs(disparity) / 3 * (1 / 40 + 1 / 48)
+
+
+def two_planes(times=1):
+    """A nearer square at disparity 2 before a plane at −1, its border between pixels; and disparities."""
+    near, far = plane(2.0, times), plane(-1.0, times)
+    v = (np.arange(3 * times) + 0.5) / times - 1.5
+    grid = np.ix_(v, v, np.arange(40), np.arange(48))
+    x, y = grid[3] + 2.0 * grid[1], grid[2] + 2.0 * grid[0]
+    inside = (np.abs(x - 22.3) < 8.1) & (np.abs(y - 19.4) < 7.2)
+    return np.where(inside, near, far), np.where(inside, np.float32(2), np.float32(-1)), inside
+
+
+def test_near_things_hide_what_is_behind_and_show_it_beside():
+    values, disparity, _ = two_planes()
+    pictures, views = made(values, between((4, 4), disparity))
+    expected, _, inside = two_planes(4)
+    error = np.abs(pictures - expected)
+    # Borders of point samples are known to a pixel, and cubic interpolation reaches two.
+    sides = sum(np.roll(inside, (a, b), (2, 3)).astype(int) for a in range(-2, 3) for b in range(-2, 3))
+    clear = np.zeros_like(inside)
+    clear[:, :, 4:-4, 4:-4] = True
+    clear &= (sides == 0) | (sides == 25)
+    wrong = error[clear] > 0.02
+    # Strips that the nearest view does not show are shown by others, but for those at the ends of the grid of
+    # views, which have none beyond: these are counted, and borders go on there.
+    assert 0 < views.unseen < 0.01 * views.made
+    assert wrong.sum() <= views.unseen
+    # Keys' cubic, as above.
+    assert np.sqrt(np.mean(error[clear][~wrong] ** 2)) < 0.003
+
+
+@pytest.mark.parametrize("turn", ["transposed", "upside down", "left to right", "turned over"])
+def test_it_commutes_with_transposing_and_mirroring(turn):
+    values, disparity, _ = two_planes()
+    frame = FRAME
+    pictures, _ = made(values, between((2, 3), disparity))
+    times = (2, 3)
+    if turn == "transposed":
+        change, times = (lambda a: np.ascontiguousarray(a.transpose(1, 0, 3, 2))), (3, 2)
+    else:
+        axes = {"upside down": (0, 2), "left to right": (1, 3), "turned over": (0, 1, 2, 3)}[turn]
+        change = lambda a: np.ascontiguousarray(np.flip(a, axes))  # noqa: E731
+    turned, _ = made(change(values), between(times, change(disparity), frame))
+    # Both sides of a tear are as far from its middle only to rounding: a few pixels may fall to the other side.
+    apart = np.abs(turned - change(pictures))
+    assert (apart > 1e-5).mean() < 1e-3
+
+
+def test_a_light_field_mirrored_against_its_pixels_has_nearness_the_other_way():
+    values, disparity, _ = two_planes()
+    pictures, _ = made(values, between((2, 2), disparity))
+    mirrored = FRAME @ vcc.Affine.scaling(-1, -1, 1, 1)
+    turned, _ = made(values[::-1, ::-1], between((2, 2), -disparity[::-1, ::-1], mirrored))
+    np.testing.assert_allclose(turned[::-1, ::-1], pictures, atol=1e-5)
+
+
+def test_it_is_linear_in_the_samples():
+    values, disparity, _ = two_planes()
+    other = np.random.default_rng(0).random(values.shape).astype(np.float32)
+    rule = between((2, 2), disparity)
+    one, two = made(values, rule)[0], made(other, rule)[0]
+    np.testing.assert_allclose(made(values + 3 * other, rule)[0], one + 3 * two, atol=3e-6)
+
+
+def test_integers_stand_for_shares_of_full_scale():
+    values, disparity, _ = two_planes()
+    codes = np.round(values * 255).astype(np.uint8)
+    pictures, _ = made(codes, between((2, 2), disparity, full_scale=255.0))
+    expected, _ = made(codes.astype(np.float32) / 255, between((2, 2), disparity))
+    np.testing.assert_allclose(pictures, expected, atol=1e-6)
+
+
+# --- in cameras ---
+
+
+def field(channels=3, **given) -> vcc.LightField:
+    values, disparity, _ = two_planes()
+    values = np.repeat(values[..., None], channels, axis=-1) if channels else values
+    return vcc.LightField.from_views(values, SPACING, SLOPE, FOCUS, **{"disparity": disparity, **given})
+
+
+@pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")  # the sensor sees beyond the views' pictures
+@pytest.mark.parametrize("engine", ["numba", "reference", "array_api"])
+def test_the_picture_is_that_of_the_denser_light_field(engine):
+    lf = field()
+    plan = FAR_OUT_OF_FOCUS.compile(lf, between_views="depth")
+    assert plan.views_between is not None
+    times = plan.views_between.times
+    pictures, _ = made(lf.values, plan.views_between)
+    denser = vcc.LightField.from_views(pictures, (SPACING / times[0], SPACING / times[1]), SLOPE, FOCUS)
+    expected = FAR_OUT_OF_FOCUS.capture(denser, between_views="none").values
+    image = FAR_OUT_OF_FOCUS.capture(lf, between_views="depth", engine=engine).values
+    np.testing.assert_allclose(image, expected, atol=1e-5 * expected.max())
+
+
+@pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+def test_a_light_field_on_disk_keeps_its_disparities(tmp_path):
+    lf = field()
+    expected = FAR_OUT_OF_FOCUS.capture(lf, between_views="depth").values
+    save_store(lf, tmp_path / "a.zarr")
+    stored = open_store(tmp_path / "a.zarr")
+    assert stored.disparity.maps().source == "given for each view"
+    image = FAR_OUT_OF_FOCUS.capture(stored, between_views="depth", memory_limit=2**22).values
+    np.testing.assert_allclose(image, expected, atol=1e-5 * expected.max())
+    words = " ".join(str(FAR_OUT_OF_FOCUS.explain(stored, between_views="depth")).split())
+    assert "views are made for each one" in words
+    assert "given for each view" in words
+
+
+@pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+def test_disparities_are_found_once_and_kept_in_the_store(tmp_path, monkeypatch):
+    from vcc.recover import depth
+
+    lf = field(disparity=None, disparity_range=(-1.3, 2.3))
+    save_store(lf, tmp_path / "a.zarr")
+    stored, steps = open_store(tmp_path / "a.zarr"), []
+    first = FAR_OUT_OF_FOCUS.capture(stored, between_views="depth", progress=lambda *n: steps.append(n))
+    assert steps
+    assert "depth_by_plane_sweep" in stored.disparity.maps().source
+
+    def never(*_, **__):
+        raise AssertionError("found again")
+
+    monkeypatch.setattr(depth, "depth_by_plane_sweep", never)
+    again = FAR_OUT_OF_FOCUS.capture(open_store(tmp_path / "a.zarr"), between_views="depth")
+    np.testing.assert_array_equal(again.values, first.values)
+    np.testing.assert_allclose(
+        FAR_OUT_OF_FOCUS.capture(open_store(tmp_path / "a.zarr")[1:, :, :20], between_views="none").values,
+        FAR_OUT_OF_FOCUS.capture(lf[1:, :, :20], between_views="none").values,
+    )
+    (tmp_path / "a.zarr" / "disparity" / "zarr.json").write_text("{}")
+    with pytest.raises(vcc.InputError, match="Delete this folder, and they are found again"):
+        FAR_OUT_OF_FOCUS.capture(open_store(tmp_path / "a.zarr"), between_views="depth")
+
+
+def test_pieces_have_the_disparities_of_the_whole():
+    lf = field()
+    every_second = lf[::2, ::2]
+    maps = every_second.disparity.maps()
+    assert maps.extent == (-2.0, 4.0)
+    # Of the given maps, those of views (0, 0), (0, 2) … are (0, 0), (0, 1) … now.
+    place = maps.views.index((1.0, 0.0))
+    np.testing.assert_array_equal(maps.values[place], 2 * two_planes()[1][2, 0])
+    part = lf[:, :, 3:5, 0:2]  # shows the far plane alone
+    assert part.disparity.maps().extent == (-1.0, 2.0)
+    assert np.ptp(part.disparity.maps().values) == 0
+
+
+@pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+def test_a_map_of_the_middle_view_serves_all():
+    lf = field()
+    one = replace(lf, disparity=two_planes()[1][1, 1])
+    one_picture = FAR_OUT_OF_FOCUS.capture(one, between_views="depth").values
+    all_pictures = FAR_OUT_OF_FOCUS.capture(lf, between_views="depth").values
+    # The map of another view follows: a far plane that the middle view does not see goes on as what is beside it.
+    np.testing.assert_allclose(one_picture, all_pictures, atol=1e-5 * all_pictures.max())
+
+
+def test_what_cannot_be_is_refused():
+    torch = pytest.importorskip("torch")
+    lf = field()
+    depth = {"between_views": "depth"}
+    with pytest.raises(vcc.InputError, match=r"takes NumPy arrays, not torch.Tensor"):
+        FAR_OUT_OF_FOCUS.capture(lf.replaced(torch.tensor(lf.values)), **depth)
+    with pytest.raises(vcc.InputError, match="made by rays"):
+        FAR_OUT_OF_FOCUS.capture(lf, method="rays", **depth)
+    with pytest.raises(vcc.InputError, match="scene_distance is for"):
+        FAR_OUT_OF_FOCUS.capture(lf, scene_distance=1.0, **depth)
+    with pytest.raises(vcc.InputError, match=r"disparity has the shape \(3, 3\)"):
+        field(disparity=np.zeros((3, 3)))
+    with pytest.raises(vcc.InputError, match="finite"):
+        field(disparity=np.full((40, 48), np.nan))
+    c, s = np.cos(0.4), np.sin(0.4)
+    slopes_turned = np.eye(4)
+    slopes_turned[2:, 2:] = [[c, -s], [s, c]]
+    turned = replace(lf, frame=vcc.Affine.from_parts(slopes_turned, np.zeros(4)) @ lf.frame)
+    with pytest.raises(vcc.InputError, match="turns or mixes"):
+        FAR_OUT_OF_FOCUS.capture(turned, **depth)
+    even = vcc.LightField.from_views(np.ones((3, 3, 20, 20), np.float32), SPACING, SLOPE, FOCUS)
+    with pytest.raises(vcc.InputError, match="disparity=maps"):
+        FAR_OUT_OF_FOCUS.capture(even, **depth)
