@@ -59,7 +59,11 @@ def compile_rays(
         raise InputError(f"between_views is 'auto' or 'none', not {between_views!r}")
     samples = _checked_samples(samples)
     seed = checked_seed(seed)
-    path = Path(camera, light_field)
+    motion, followed = _motion(light_field, scene_distance)
+    if between_views == "none":
+        motion = np.zeros((2, 2))
+        followed = "each view stands for its cell of the aperture; views are not interpolated, as asked"
+    path = Path(camera, light_field, motion)
     aimed, asked = path.aimed()
     notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {aimed.aim.words}"]
     made, index_from_ray, scatters = _steps(path, aimed, notes)
@@ -67,12 +71,7 @@ def compile_rays(
     vertical, horizontal = camera.sensor.pitches
     high, wide = camera.sensor.sensitive_pitches
     first = camera.sensor.frame(np.zeros((1, 2)))[0]
-    motion, followed = _motion(light_field, scene_distance)
-    if between_views == "auto":
-        notes.append(followed)
-    else:
-        motion = np.zeros((2, 2))
-        notes.append("each view stands for its cell of the aperture; views are not interpolated, as asked")
+    notes.append(followed)
     nv, nu, nt, ns = light_field.shape[:4]
     plan = RayPlan(
         sensor_shape=(rows, columns),
