@@ -243,6 +243,26 @@ def test_lenslets_without_a_main_lens_are_looked_through_one_by_one():
     assert not image.values[:, outside].any()
 
 
+@pytest.mark.parametrize("elements", [[], [vcc.Biprism(0.05, 0.4, z=1 * mm)], [vcc.Pyramid(3, -0.05, z=0.5 * mm)]])
+@pytest.mark.parametrize("motion", [(0.0, 0.0), (0.9, 1.1), (-2.1, -1.9)])
+def test_all_light_arrives_where_views_are_aimed_at_by_their_pictures(elements, motion):
+    """All that a light field holds falls on a sensor that is large enough, blurred borders too: Σ samples·volume.
+
+    Linear interpolation in all four dimensions, whatever way views move, makes a partition of unity.
+    """
+    values = np.random.default_rng(1).random((5, 4, 6, 7)).astype(np.float32)
+    lf = vcc.LightField.from_views(values, 1 * mm, 0.03, disparity_range=motion)
+    camera = vcc.Camera(elements, vcc.Sensor(2 * mm, (9, 8), 0.8 * mm))
+    image = captured(camera, lf, method="rays", samples=8192)
+    plan = camera.compile(lf, method="rays")
+    assert isinstance(plan, RayPlan)
+    assert plan.aim.words == "the views' pictures"
+    light = image.values.sum(dtype=np.float64) * (0.8 * mm) ** 2
+    noise = 3 * 2 * image.sampling_error * math.sqrt(image.values.size) * (0.8 * mm) ** 2
+    assert noise < 0.01 * light
+    assert light == pytest.approx(values.sum(dtype=np.float64) * (1 * mm * 0.03) ** 2, abs=noise)
+
+
 BESIDE = vcc.Camera(
     [vcc.Prism((0.5, 0.0), z=1 * mm), vcc.Mask(Circle(8 * mm), z=1 * mm)], vcc.Sensor(0.1, (8, 9), 0.5 * mm)
 )

@@ -109,9 +109,16 @@ class _Slack:
 
 
 class Path:
-    """A camera from the sensor back to the light field, and what bounds its rays."""
+    """A camera from the sensor back to the light field, and what bounds its rays.
 
-    def __init__(self, camera: Camera, light_field: LightField, samples: int) -> None:
+    Args:
+        camera: whose elements rays meet.
+        light_field: that they end in.
+        motion: 2×2, along which they are interpolated between views (`RayPlan.motion`).
+        samples: rays a pixel.
+    """
+
+    def __init__(self, camera: Camera, light_field: LightField, motion: Array, samples: int) -> None:
         self.camera, self.samples = camera, samples
         self.legs: list[Leg] = []
         here, undone = Affine.identity(), camera.approach_to_sensor.inverse()
@@ -127,6 +134,9 @@ class Path:
         self.index_from_sensor = self.index_from_entrance @ undone @ here
         nv, nu, nt, ns = light_field.shape[:4]
         self.size = np.array([nu, nv, ns, nt], dtype=np.float64)
+        # Half of what finds light along each index. Half a cell beyond the border of a view linear interpolation
+        # has faded to nothing, and the views on both sides of a ray are looked at up to one view's motion away.
+        self.finds = self.size / 2 + np.concatenate([np.zeros(2), 0.5 + np.abs(motion).sum(axis=1)])
         self.stop_at_views = any(self._tells_views_apart(n) for n in range(len(self.legs)))
 
     def _tells_views_apart(self, n: int) -> bool:
@@ -267,7 +277,7 @@ class Path:
                 Strip(
                     from_sensor=self.index_from_sensor.linear[axis],
                     middle=float((self.size[axis] - 1) / 2 - self.index_from_sensor.offset[axis]),
-                    half=float(self.size[axis] / 2 + loose[axis]),
+                    half=float(self.finds[axis] + loose[axis]),
                     number=len(self.legs),
                     disc=False,
                     words=words,
@@ -350,7 +360,7 @@ class Path:
                 yield way, slice(0, 2), (low + high) / 2, half, disc, self.legs[m].stage.element.label
         way = self.index_from_entrance @ self.last @ way
         loose = np.abs(self.index_from_entrance.linear @ slack[-1]).sum(axis=1) - self.slack_through(n, way)
-        middle, half = (self.size - 1) / 2, self.size / 2 + loose
+        middle, half = (self.size - 1) / 2, self.finds + loose
         if everything or not self.stop_at_views:
             yield way, slice(0, 2), middle[:2], half[:2], False, GRID_OF_VIEWS
         if everything:

@@ -64,7 +64,11 @@ def compile_rays(
         raise InputError(f"interpolation by rays is 'sharp' or 'linear', not {interpolation!r}")
     samples = _checked_samples(samples)
     seed = checked_seed(seed)
-    path = Path(camera, light_field, samples)
+    motion, followed = _motion(light_field, scene_distance)
+    if between_views == "none":
+        motion = np.zeros((2, 2))
+        followed = "each view stands for its cell of the aperture; views are not interpolated, as asked"
+    path = Path(camera, light_field, motion, samples)
     aimed, asked = path.aimed()
     notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {aimed.aim.words}"]
     made, index_from_ray, scatters = _steps(path, aimed, notes)
@@ -72,12 +76,7 @@ def compile_rays(
     vertical, horizontal = camera.sensor.pitches
     high, wide = camera.sensor.sensitive_pitches
     first = camera.sensor.frame(np.zeros((1, 2)))[0]
-    motion, followed = _motion(light_field, scene_distance)
-    if between_views == "auto":
-        notes.append(followed)
-    else:
-        motion = np.zeros((2, 2))
-        notes.append("each view stands for its cell of the aperture; views are not interpolated, as asked")
+    notes.append(followed)
     if isinstance(aimed.aim, CellWindows):
         samples >>= aimed.aim.halvings
     if interpolation == "sharp":
