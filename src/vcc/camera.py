@@ -290,8 +290,8 @@ class Camera:
                 interpolation goes; None takes the range of distances that the light field states or shows.
             refine: footprints: ``"auto"`` divides cells and samples where a mask is finer than they are, at a
                 cost that `explain` states; a number divides samples by it each way, and 1 divides nothing.
-            samples: rays a pixel (through an array of lenses: for each lenslet that the pixel sees), rounded up
-                to a power of two; None takes 64.
+            samples: rays a pixel, rounded up to a power of two (behind a main lens and lenslets: for each lenslet
+                that the pixel sees); None takes 64.
             tolerance: double the samples until the estimated sampling error of the picture, root mean square, is
                 at most this share of its mean; None does not.
             seed: of the rays' choice of points. The same seed gives the same picture, on any number of threads.

@@ -416,7 +416,7 @@ def test_a_quarter_of_each_pixel_is_the_mean_over_the_smaller_square():
     sensor = replace(PICTURE, shape=(14, 14), pitch=3.4 * D * SLOPE, fill_factor=0.25)
     image = rays(elements, sensor=sensor, samples=8192)
     bench = Bench(thins, D, sensor.shape, sensor.pitch, (0.0, DIAMETER / 2, DIAMETER / 2), side=0.5)
-    truth, noise = bench.measured(SCENE, 64)
+    truth, noise = bench.measured(SCENE, 80)
     reached = compare(image, truth, noise)
     # Cells of 0.2 mm, seen by pixels of 0.18 mm: the whole pixel's mean is another picture.
     whole = rays(elements, sensor=replace(sensor, fill_factor=1.0), samples=2048)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from vcc.patterns import Circle, CosineSum
 from vcc.plan import steps
 from vcc.plan.ray_compiler import compile_rays
 from vcc.plan.rays import TABLE, CellWindows, RayPlan, Window, hashed
+from vcc.plan.steps import Bundle
 from vcc.units import mm, um
 
 D = 1 / (1 / 50e-3 - 1)
@@ -39,12 +40,33 @@ def rays_of(plan: RayPlan):
 def test_any_aligned_block_of_points_is_even():
     # A (0, 2)-sequence in base 2: of 64 successive points from a multiple of 64, each of the 64 boxes of 8×8,
     # 1×64, 2×32 … holds one (Sobol' 1967; the first two dimensions).
-    points = plan_of(LENS, vcc.Lens(focal_length=1.0, z=1 * mm)).points[:, :2].astype(float) + 0.5
+    points = plan_of(LENS, vcc.Lens(focal_length=1.0, z=1 * mm)).points[:, :2].astype(float)
     for first in (0, 64 * 17, TABLE - 64):
         block = points[first : first + 64]
         for across in (1, 2, 4, 8, 16, 32, 64):
             boxes = np.floor(block * [across, 64 // across]).astype(int)
             assert len(np.unique(boxes, axis=0)) == 64
+
+
+def test_what_each_pixel_makes_of_its_block_is_as_even():
+    # Free flight to a square stop: places in the pixel and in the stop can be read off the rays.
+    stop = vcc.Mask(np.ones((1, 1)), width=4 * mm)
+    sensor = vcc.Sensor(D, (7, 8), D * 2e-3)
+    plan = plan_of(vcc.Lens(focal_length=50 * mm), stop, sensor=sensor)
+    index, share = rays_of(plan)
+    rays = field().frame(index[:, 0])
+    there = rays[..., :2] / (4 * mm) + 0.5
+    assert (share > 0).all()
+    # Behind the lens, s' = s − u/f, and x = u + D·s'.
+    x = rays[..., 0] + D * (rays[..., 2] - rays[..., 0] / (50 * mm))
+    in_pixel = x / sensor.pitch
+    in_pixel = in_pixel - np.round(in_pixel.mean(axis=1, keepdims=True) * 2) / 2 + 0.5
+    for pixel in range(len(there)):
+        for places in (there[pixel, :, 0], there[pixel, :, 1], in_pixel[pixel]):
+            # One ray in each 64th, nowhere two: not so if points were shifted around and came back.
+            assert len(np.unique(np.floor(places * 64))) == 64
+    # Pixels differ, all the same.
+    assert len(np.unique(np.round(there[:, 0], 9), axis=0)) == len(there)
 
 
 def test_neighbouring_pixels_take_unrelated_blocks():
@@ -108,6 +130,54 @@ def test_lenslets_are_aimed_at_where_their_light_comes_from():
     # the array as a whole, of (3 mm)² of its area, one in thirty would.
     seen = share[(share > 0).any(axis=2)]
     assert (seen > 0).mean() > 0.5
+
+
+ARRAYS = {
+    "square": {"focal_length": 4 * mm},
+    "turned, with gaps": {"focal_length": 4 * mm, "rotation": 0.4, "fill_factor": 0.7},
+    "hexagonal": {"focal_length": (4 * mm, 5 * mm), "layout": "hexagonal", "rotation": 0.1},
+    "discs": {"focal_length": 4 * mm, "layout": "hexagonal", "circular": True, "fill_factor": 0.5},
+}
+
+
+@pytest.mark.parametrize("array", ARRAYS)
+def test_no_ray_through_a_cell_is_lost_and_their_weights_are_its_solid_angle(array):
+    sensor = vcc.Sensor(D + 4 * mm, (6, 7), 0.05 * mm, decentre=(0.11 * mm, -0.04 * mm))
+    elements = LENS, vcc.LensArray(pitch=0.5 * mm, z=D, **ARRAYS[array])
+    plan = plan_of(*elements, sensor=sensor, samples=256)
+    assert isinstance(plan.aim, CellWindows)
+    bending = tuple(step for step in plan.steps if isinstance(step, steps.Move | steps.CellsUnbend))
+    aimed = replace(plan, steps=bending)
+    before, after = rays_of(aimed)[1], rays_of(plan)[1]
+    # Rays aimed at the very rim may fall beside it by rounding.
+    assert np.abs(before - after).max() <= 1e-9 * before.sum(axis=(1, 2)).max()
+    # Oracle: places on the array and in all pixels at random, through the same steps: which reach the lens. Of n a
+    # share p does, known to √(p/n) of p, four times that.
+    random = np.random.default_rng(1)
+    reach, n = 1.6 * mm, 2**18
+    x, y = (
+        middle + random.uniform(-0.5, 0.5, n) * count * sensor.pitch
+        for middle, count in zip(sensor.decentre, sensor.shape[::-1], strict=True)
+    )
+    a, b = x + random.uniform(-reach, reach, n), y + random.uniform(-reach, reach, n)
+    rays = Bundle(x, y, (x - a) / (4 * mm), (y - b) / (4 * mm), np.ones(n), np.zeros((n, 4)))
+    for step in plan.steps:
+        step(rays)
+    share = rays.share.mean()
+    expected = share * (2 * reach / (4 * mm)) ** 2
+    assert after.sum(axis=(1, 2)).mean() == pytest.approx(expected, rel=4 / np.sqrt(share * n))
+
+
+def test_a_pixel_shares_its_rays_among_the_cells_that_it_sees():
+    prisms = vcc.PrismArray(np.random.default_rng(2).uniform(-0.01, 0.01, (6, 6, 2)), 1 * mm, z=3 * mm)
+    plan = plan_of(LENS, prisms, samples=256)
+    assert isinstance(plan.aim, CellWindows)
+    _, share = rays_of(plan)
+    traced = (share > 0).sum() / len(share)
+    assert 128 <= traced <= 362  # 256 to a factor of √2, and cells that a rim cuts
+    assert plan.samples == 256 >> plan.aim.halvings >= 2
+    # A few rays are no good to many cells.
+    assert isinstance(plan_of(LENS, prisms, samples=16).aim, Window)
 
 
 @pytest.mark.parametrize(("samples", "given"), [(2, 2), (3, 4), (64, 64), (100, 128), (65536, 65536)])

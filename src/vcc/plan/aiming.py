@@ -240,7 +240,8 @@ class Path:
         if self.solid_angle(cells) < WORTH_NARROWING * best.solid_angle:
             return cells
         halvings = round(math.log2(max(self._cells_seen(cells), 1.0)))
-        return replace(cells, halvings=halvings) if 2 ** (halvings + 1) <= self.samples else best
+        lost = self.solid_angle(cells) > best.solid_angle / WORTH_NARROWING
+        return best if lost or 2 ** (halvings + 1) > self.samples else replace(cells, halvings=halvings)
 
     def strips(self, slack: list[Array], everything: bool) -> list[Strip]:
         """Everything that rays from the sensor must pass and that bounds them.
@@ -256,14 +257,12 @@ class Path:
             low, high = leg.stop
             loose = np.abs(slack[n][:2]).sum(axis=1)
             half = (high - low) / 2
-            disc = _is_disc(leg)
-            if disc:  # rays stray in any direction: a round hole widened is still round
-                loose = np.full(2, np.linalg.norm(loose))
+            half, disc = _widened(leg, loose)
             strips += [
                 Strip(
                     from_sensor=leg.from_sensor.linear[axis],
                     middle=float((low + high)[axis] / 2 - leg.from_sensor.offset[axis]),
-                    half=float(half[axis] + loose[axis]),
+                    half=float(half[axis]),
                     number=n,
                     disc=disc,
                     words=leg.stage.element.label,
@@ -355,8 +354,7 @@ class Path:
             low, high = self.legs[m].stop
             if np.isfinite(high - low).all():
                 loose = np.abs(slack[m][:2]).sum(axis=1) - self.slack_through(n, way)[:2]
-                disc = _is_disc(self.legs[m])
-                half = (high - low) / 2 + (np.linalg.norm(loose) if disc else loose)
+                half, disc = _widened(self.legs[m], loose)
                 yield way, slice(0, 2), (low + high) / 2, half, disc, self.legs[m].stage.element.label
         way = self.index_from_entrance @ self.last @ way
         loose = np.abs(self.index_from_entrance.linear @ slack[-1]).sum(axis=1) - self.slack_through(n, way)
@@ -462,11 +460,18 @@ def _stops(stages: tuple[Stage, ...]) -> list[tuple[Array, Array]]:
     return stops
 
 
-def _is_disc(leg: Leg) -> bool:
-    """Whether what passes in a leg's plane is bounded by a round hole alone."""
-    pattern = leg.stage.faces.pattern
-    low, high = leg.stop
-    return isinstance(pattern, Circle) and np.allclose((high - low) / 2, pattern.diameter / 2, rtol=1e-12, atol=0)
+def _widened(leg: Leg, loose: Array) -> tuple[Array, bool]:
+    """Half the size (x, y) of what passes in a leg's plane, widened by how rays stray, and whether it is a disc.
+
+    A round hole widened is round where that is smaller than the rectangle around it: rays stray in any direction.
+    """
+    pattern, (low, high) = leg.stage.faces.pattern, leg.stop
+    half = np.asarray((high - low) / 2)
+    if isinstance(pattern, Circle) and np.allclose(half, pattern.diameter / 2, rtol=1e-12, atol=0):
+        radius = half + np.linalg.norm(loose)
+        if np.pi * np.prod(radius) < 4 * np.prod(half + loose):
+            return radius, True
+    return half + loose, False
 
 
 def _opening(pattern: Pattern | None, lattice: Lattice) -> CellApertures:
@@ -520,12 +525,14 @@ def _cell_windows(
     axes = np.arange(2)
     here, there = leg.from_sensor, way.linear[part]
     from_sensor, from_slope, offset = here.linear[axes, axes], here.linear[axes, axes + 2], here.offset[:2]
-    # p = A·a + B·(slope before the array), the slope behind it being (a − A₁x − o₁)/B₁
+    # p = A·a + B·(slope before the array). Behind it, a ray from x with slope σ has one that is linear in x and σ,
+    # so in x and a: optics may stand between the array and the sensor.
     a, b = there[axes, axes], there[axes, axes + 2]
     if (np.abs(from_slope) < 1e-12).any():
         return None
-    beyond = a + b / from_slope
-    if (np.abs(beyond) < 1e-9 * (np.abs(a) + np.abs(b / from_slope))).any() or not beyond.all():
+    per_place = here.linear[axes + 2, axes + 2] / from_slope
+    beyond, beyond_from_sensor = a + b * per_place, b * (here.linear[axes + 2, axes] - per_place * from_sensor)
+    if (np.abs(beyond) < 1e-9 * (np.abs(a) + np.abs(b * per_place))).any() or not beyond.all():
         return None
     lattice = replace(
         bending.lattice,
@@ -541,9 +548,9 @@ def _cell_windows(
     cell_half = np.minimum(np.array(lattice.reach) * (1 if opening.circular else opening.scale), radius)
     gain = np.abs(beyond)
     # |p(centre)| ≤ half + |gain of the cell|·cell + |prism|, in cells
-    power_gain = np.abs(a + b / from_slope + bending.powers.reshape(-1, 1) * b).max(axis=0)
+    power_gain = np.abs(beyond + bending.powers.reshape(-1, 1) * b).max(axis=0)
     prism = np.abs(b) * np.abs(bending.slopes).reshape(-1, 2).max(axis=0)
-    across_pixel = np.abs(b / from_slope * from_sensor) * pixel / 2
+    across_pixel = np.abs(beyond_from_sensor) * pixel / 2
     distance = (half + power_gain * cell_half + prism + across_pixel) / gain
     sideways = turned @ distance  # along the lattice's own axes
     # The place looked from is up to half a cell off the centre of the nearest one; hexagonal cells are 4/3 of a
@@ -563,9 +570,9 @@ def _cell_windows(
         powers=bending.powers,
         slopes=bending.slopes,
         beyond=beyond,
-        beyond_from_sensor=-b / from_slope * from_sensor,
+        beyond_from_sensor=beyond_from_sensor,
         beyond_from_slope=b,
-        beyond_offset=way.offset[part] - b / from_slope * offset,
+        beyond_offset=way.offset[part] + b * (here.offset[2:4] - per_place * offset),
         middle=middle,
         half=half,
         disc=disc,
