@@ -210,6 +210,7 @@ def add_divided_column(  # type: ignore[no-untyped-def]
     """
     fine_first_row, fine_row_shares, fine_first_column, fine_column_shares = fine
     sums, turned = _room(stop - start, pitch, column_shares.shape[1], channels)
+    sums[:] = 0
     source = np.zeros(sample_pitch + fine_column_shares.shape[1] * channels, np.float32)
     rows = np.zeros((0, pitch), np.float32)
     here = np.zeros(weights.size, np.int64)
@@ -238,8 +239,8 @@ def add_divided_column(  # type: ignore[no-untyped-def]
 
 @_inlined
 def _room(rows, pitch, width, channels):  # type: ignore[no-untyped-def]
-    """Sums of a band's rows, and eight of them turned, with zeros beyond the last sample."""
-    sums = np.zeros(((rows + EIGHT - 1) // EIGHT * EIGHT, pitch), np.float32)
+    """Sums of a band's rows, to be set to zero, and eight of them turned, with zeros beyond the last sample."""
+    sums = np.empty(((rows + EIGHT - 1) // EIGHT * EIGHT, pitch), np.float32)
     return sums, np.zeros(((pitch + width * channels) * EIGHT), np.float32)
 
 
@@ -255,11 +256,22 @@ def _divided_row(  # type: ignore[no-untyped-def]
             for x in range(pitch):
                 source[x] += row_shares[t] * np.float32(line[x])
     for k in range(first_column.size):
-        for c in range(channels):
-            total = np.float32(0)
+        at = np.uint64(first_column[k] * channels)
+        if channels == 3:
+            red, green, blue = np.float32(0), np.float32(0), np.float32(0)
             for t in range(column_shares.shape[1]):
-                total += column_shares[k, t] * source[np.uint64((first_column[k] + t) * channels + c)]
-            fine[k * channels + c] = total
+                share = column_shares[k, t]
+                red += share * source[at]
+                green += share * source[at + np.uint64(1)]
+                blue += share * source[at + np.uint64(2)]
+                at += np.uint64(3)
+            fine[3 * k], fine[3 * k + 1], fine[3 * k + 2] = red, green, blue
+        else:
+            for c in range(channels):
+                total = np.float32(0)
+                for t in range(column_shares.shape[1]):
+                    total += column_shares[k, t] * source[at + np.uint64(t * channels + c)]
+                fine[k * channels + c] = total
 
 
 @_compiled
