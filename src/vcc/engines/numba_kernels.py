@@ -38,8 +38,8 @@ def sum_rows(  # type: ignore[no-untyped-def]
 
     samples: flat; row l of tap b is samples[begin[b] + l · pitch : … + pitch]. used: the taps that are added;
     weights: (taps,); first: (taps, rows), shares: (taps, rows, width), the rows of samples that a raster row
-    gathers. reach: the most rows of samples that four raster rows gather. masks: see `_masks_at`, or None. repeat: 3
-    where a weight of a mask counts for three channels, else 1.
+    gathers. reach: the most rows of samples that four raster rows gather. masks: see `_masks_at`, or None. repeat:
+    3 where a weight of a mask counts for three channels, else 1.
 
     Four raster rows are summed at a time, so that each sample is converted and weighed once for all of them. The
     raster is walked along so that samples are read in the order in which they lie in memory (a real image runs
