@@ -215,7 +215,7 @@ class _ByColumns:
         return raster
 
     def add(
-        self, block: _Block, pitch: int, masks: tuple[Any, ...], tiles: NDArray[np.float32], start: int
+        self, block: _Block, pitch: int, masks: tuple[Any, ...] | None, tiles: NDArray[np.float32], start: int
     ) -> None:
         """Add one block's samples to the band of raster rows that begins at ``start``."""
         stop = min(start + _band(4 * pitch), self.plan.raster_shape[0])
@@ -235,13 +235,15 @@ class _ByColumns:
                 self.shared, *across, self.channels, start, stop, tiles,
             )  # fmt: skip
 
-    def mask_columns(self, a: int, pitch: int) -> tuple[Any, ...]:
+    def mask_columns(self, a: int, pitch: int) -> tuple[Any, ...] | None:
         """The masks' lines that taps of column ``a`` look up, at the columns of their samples; see the kernels.
 
         Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: each group of taps
         that agree gets the lines that it needs.
         """
         plan, fine = self.plan, self.fine
+        if not plan.masks:
+            return None
         used = np.flatnonzero(self.weights[:, a])
         begin = np.zeros((len(plan.masks), len(plan.view_rows)), dtype=np.int64)
         row = np.zeros(begin.shape)
@@ -266,7 +268,7 @@ class _ByColumns:
                 ]
                 total += high - low
         line = pitch // self.shared
-        if plan.masks and self.lines.shape[0] < total:
+        if self.lines.shape[0] < total:
             self.lines = np.zeros((total, line), dtype=np.float32)  # and zero beyond the samples' last column
 
         def sample(piece: tuple[NDArray[np.float32], NDArray[np.float64], int]) -> None:

@@ -38,8 +38,8 @@ def sum_rows(  # type: ignore[no-untyped-def]
 
     samples: flat; row l of tap b is samples[begin[b] + l · pitch : … + pitch]. used: the taps that are added;
     weights: (taps,); first: (taps, rows), shares: (taps, rows, width), the rows of samples that a raster row
-    gathers. reach: the most rows of samples that four raster rows gather. masks: see `_masks_at`. repeat: 3 where
-    a weight of a mask counts for three channels, else 1.
+    gathers. reach: the most rows of samples that four raster rows gather. masks: see `_masks_at`, or None. repeat:
+    3 where a weight of a mask counts for three channels, else 1.
 
     Four raster rows are summed at a time, so that each sample is converted and weighed once for all of them. The
     raster is walked along so that samples are read in the order in which they lie in memory (a real image runs
@@ -47,8 +47,9 @@ def sum_rows(  # type: ignore[no-untyped-def]
     processor foresees by itself. advance: rows of samples that the next four raster rows need anew; jump: from
     here to the samples of the next column of views.
     """
-    mask_lines, _, _, _, mask_row_step = masks
-    count, width = mask_row_step.size, shares.shape[2]
+    width, count = shares.shape[2], 0
+    if masks is not None:  # told apart when compiled: without masks there is less to compile
+        count = masks[4].size
     group = min(VIEWS, used.size)
     room = group * reach
     order, places, ranges = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
@@ -58,7 +59,7 @@ def sum_rows(  # type: ignore[no-untyped-def]
     ends, highest, lowest = np.empty(10, np.int64), np.empty(reach, np.int64), np.empty(reach, np.int64)
     next_rows, first_rows = np.empty(group * max(advance, reach), np.int64), np.empty(group * reach, np.int64)
     per_line = 64 // samples.itemsize
-    run = RUN if count == 0 or repeat == 1 else RUN_OF_THREES
+    run = RUN if masks is None or repeat == 1 else RUN_OF_THREES
     tiles = (stop - start + ROWS - 1) // ROWS
     for begin_group in range(0, used.size, group):
         views = used[begin_group : begin_group + group]
@@ -75,8 +76,9 @@ def sum_rows(  # type: ignore[no-untyped-def]
                     # Ranges are numbered 00 01 02 03 11 12 13 22 23 33; −1: nothing is added.
                     low = lowest[q]
                     ranges[entry] = -1 if low < 0 else low * ROWS - low * (low + 1) // 2 + highest[q]
-                    if count > 0 and not _masks_at(masks, b, l, entry, mask_places, mask_shares):
-                        ranges[entry] = -1
+                    if masks is not None:  # noqa: SIM102  (by itself, so that it can be told apart when compiled)
+                        if not _masks_at(masks, b, l, entry, mask_places, mask_shares):
+                            ranges[entry] = -1
                 entries += rows
                 for l in range(top + rows, top + rows + advance):
                     next_rows[next_count] = begin[b] + l * pitch
@@ -92,17 +94,17 @@ def sum_rows(  # type: ignore[no-untyped-def]
                     for n in range(following_count):
                         fetch(samples, following[n] + near)
                 here = min(x, pitch - run)
-                if count == 0:
+                if masks is None:
                     add_rows(samples, order, places, share, ends, here, x - here, sums, y - start)
                 elif repeat == 3:
                     add_masked_rows_of_threes(
                         samples, order, places, share, ends, here, x - here, sums, y - start,
-                        mask_lines, mask_places, mask_shares,
+                        masks[0], mask_places, mask_shares,
                     )  # fmt: skip
                 else:
                     add_masked_rows(
                         samples, order, places, share, ends, here, x - here, sums, y - start,
-                        mask_lines, mask_places, mask_shares,
+                        masks[0], mask_places, mask_shares,
                     )  # fmt: skip
 
 
@@ -210,6 +212,7 @@ def add_divided_column(  # type: ignore[no-untyped-def]
     """
     fine_first_row, fine_row_shares, fine_first_column, fine_column_shares = fine
     sums, turned = _room(stop - start, pitch, column_shares.shape[1], channels)
+    sums[:] = 0
     source = np.zeros(sample_pitch + fine_column_shares.shape[1] * channels, np.float32)
     rows = np.zeros((0, pitch), np.float32)
     here = np.zeros(weights.size, np.int64)
@@ -238,8 +241,8 @@ def add_divided_column(  # type: ignore[no-untyped-def]
 
 @_inlined
 def _room(rows, pitch, width, channels):  # type: ignore[no-untyped-def]
-    """Sums of a band's rows, and eight of them turned, with zeros beyond the last sample."""
-    sums = np.zeros(((rows + EIGHT - 1) // EIGHT * EIGHT, pitch), np.float32)
+    """Sums of a band's rows, to be set to zero, and eight of them turned, with zeros beyond the last sample."""
+    sums = np.empty(((rows + EIGHT - 1) // EIGHT * EIGHT, pitch), np.float32)
     return sums, np.zeros(((pitch + width * channels) * EIGHT), np.float32)
 
 
@@ -255,11 +258,22 @@ def _divided_row(  # type: ignore[no-untyped-def]
             for x in range(pitch):
                 source[x] += row_shares[t] * np.float32(line[x])
     for k in range(first_column.size):
-        for c in range(channels):
-            total = np.float32(0)
+        at = np.uint64(first_column[k] * channels)
+        if channels == 3:
+            red, green, blue = np.float32(0), np.float32(0), np.float32(0)
             for t in range(column_shares.shape[1]):
-                total += column_shares[k, t] * source[np.uint64((first_column[k] + t) * channels + c)]
-            fine[k * channels + c] = total
+                share = column_shares[k, t]
+                red += share * source[at]
+                green += share * source[at + np.uint64(1)]
+                blue += share * source[at + np.uint64(2)]
+                at += np.uint64(3)
+            fine[3 * k], fine[3 * k + 1], fine[3 * k + 2] = red, green, blue
+        else:
+            for c in range(channels):
+                total = np.float32(0)
+                for t in range(column_shares.shape[1]):
+                    total += column_shares[k, t] * source[at + np.uint64(t * channels + c)]
+                fine[k * channels + c] = total
 
 
 @_compiled
