@@ -88,8 +88,8 @@ def test_near_things_hide_what_is_behind_and_show_it_beside():
     clear[:, :, 4:-4, 4:-4] = True
     clear &= (sides == 0) | (sides == 25)
     wrong = error[clear] > 0.02
-    # Strips that the nearest view does not show are shown by others, but for those at the ends of the grid of views,
-    # which have none beyond: these are counted, and borders go on there.
+    # Strips that the nearest view does not show are shown by others, but for those at the ends of the grid of
+    # views, which have none beyond: these are counted, and borders go on there.
     assert 0 < views.unseen < 0.01 * views.made
     assert wrong.sum() <= views.unseen
     # Keys' cubic, as above.
@@ -219,7 +219,7 @@ def test_a_map_of_the_middle_view_serves_all():
     one = replace(lf, disparity=two_planes()[1][1, 1])
     one_picture = FAR_OUT_OF_FOCUS.capture(one, between_views="depth").values
     all_pictures = FAR_OUT_OF_FOCUS.capture(lf, between_views="depth").values
-    # The map of another view follows: a far plane that the middle view does not see goes on as what it sees beside.
+    # The maps of other views follow: what the middle view does not see of the far plane goes on as beside.
     np.testing.assert_allclose(one_picture, all_pictures, atol=1e-5 * all_pictures.max())
 
 
