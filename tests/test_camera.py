@@ -107,7 +107,7 @@ def test_sensors_that_cannot_be_are_refused(arguments, message):
     ("options", "message"),
     [
         ({"interpolation": "bicubic"}, "interpolation is one of 'nearest', 'linear', 'cubic', not 'bicubic'"),
-        ({"between_views": "always"}, "between_views is 'auto' or 'none', not 'always'"),
+        ({"between_views": "always"}, "between_views is 'auto', 'none' or 'depth', not 'always'"),
         ({"refine": 0}, "refine is 'auto' or a whole number from 1 to 8, not 0"),
         ({"refine": 2.5}, "refine .* not 2.5"),
         ({"refine": "fine"}, "refine .* not 'fine'"),

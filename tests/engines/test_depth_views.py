@@ -219,7 +219,7 @@ def test_a_map_of_the_middle_view_serves_all():
     one = replace(lf, disparity=two_planes()[1][1, 1])
     one_picture = FAR_OUT_OF_FOCUS.capture(one, between_views="depth").values
     all_pictures = FAR_OUT_OF_FOCUS.capture(lf, between_views="depth").values
-    # The map of another view follows: a far plane that the middle view does not see goes on as what is beside it.
+    # The maps of other views follow: what the middle view does not see of the far plane goes on as beside.
     np.testing.assert_allclose(one_picture, all_pictures, atol=1e-5 * all_pictures.max())
 
 
