@@ -374,12 +374,15 @@ def _divide_views(
     if divide > 1:
         return _CellDivision(divide, True)
 
+    if len(path_planes) < 2:
+        return _CellDivision(1, False)
+
     def correlated(parts: int) -> float:
         lost = sorted(
             detail_lost(plane, np.zeros(2), np.abs(plane.view_step(between.motion)).sum(axis=1) / parts)
             for plane in path_planes
         )
-        return math.sqrt(lost[-1] * lost[-2]) if len(lost) > 1 else 0.0
+        return math.sqrt(lost[-1] * lost[-2])
 
     left = correlated(1)
     while left > CORRELATED and divide < LARGEST_CHOSEN_REFINEMENT:
