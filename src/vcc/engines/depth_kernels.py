@@ -15,7 +15,7 @@ import numpy as np
 
 _compiled = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract", "nsz"})
 
-TILE = 16
+TILE = 8
 """Pixels a side of the squares whose ranges of disparities bound the marches."""
 MET = 0.1
 """Of a pixel per view: a map is met where it and the march differ by less."""
@@ -92,28 +92,34 @@ def _add_colour(view, x, y, weight, out):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _add_colour_beside_tear(view, nearness, x, y, here, tear, weight, out):  # type: ignore[no-untyped-def]
-    """`_add_colour` where other surfaces may be close: of the pixels around only those of this surface count."""
+    """`_add_colour` where nearer surfaces may be close: their pixels do not count."""
     rows, columns, channels = view.shape
     x = min(max(x, 0.0), columns - 1.0)
     y = min(max(y, 0.0), rows - 1.0)
     c, r = int(x), int(y)
+    nearer = here + SAME_SURFACE * tear
+    alone = True
+    for row in range(max(r - 1, 0), min(r + 3, rows)):
+        for column in range(max(c - 1, 0), min(c + 3, columns)):
+            alone = alone and nearness[row, column] <= nearer
+    if alone:
+        _add_colour(view, x, y, weight, out)
+        return
     across, down = _taps(np.float32(x - c)), _taps(np.float32(y - r))
-    # The closest pixel of this surface stands for those of others.
+    # The closest pixel that is not nearer stands for those that are.
     own_row, own_column, closest = int(y + 0.5), int(x + 0.5), np.inf
     for row in range(max(r - 1, 0), min(r + 3, rows)):
         for column in range(max(c - 1, 0), min(c + 3, columns)):
             away = (x - column) ** 2 + (y - row) ** 2
-            if away < closest and abs(nearness[row, column] - here) <= SAME_SURFACE * tear:
+            if away < closest and nearness[row, column] <= nearer:
                 own_row, own_column, closest = row, column, away
     for n in range(4):
         row = min(max(r + n - 1, 0), rows - 1)
         for m in range(4):
             column = min(max(c + m - 1, 0), columns - 1)
             share = weight * down[n] * across[m]
-            if nearness[row, column] - here > SAME_SURFACE * tear:
-                row_taken, column_taken = own_row, own_column
-            else:
-                row_taken, column_taken = row, column
+            hidden = nearness[row, column] > nearer
+            row_taken, column_taken = (own_row, own_column) if hidden else (row, column)
             for channel in range(channels):
                 out[channel] += share * view[row_taken, column_taken, channel]
 

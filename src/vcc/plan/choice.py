@@ -54,7 +54,6 @@ def compile_best(
             made,
             method=method,
             interpolation=interpolation,
-            between_views="none",
             refine=refine,
             samples=samples,
         )

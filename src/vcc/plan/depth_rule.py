@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-6
+"""Gaps are to be less than what the sensor tells apart, by so much of it: what is left is summed plainly."""
 MOST_TIMES = 16
 """Into how many parts a view's cell is divided at most, each way: the cost grows with the square."""
 
@@ -124,7 +126,7 @@ def denser(camera: Camera, light_field: LightField) -> tuple[LightField, ViewsBe
     apart = np.linalg.norm(per_index[:, :2] - per_index[:, 2:] @ motion, axis=1)  # (n, axis of the views)
     across, down = apart.max(axis=0)
     wanted = [
-        1 if there < 2 else max(1, math.ceil(gap / gaps.limit - 1e-6))
+        1 if there < 2 else max(1, math.ceil(gap / gaps.limit + ROUNDING))
         for there, gap in zip(views, (down, across), strict=True)
     ]
     times = (min(wanted[0], MOST_TIMES), min(wanted[1], MOST_TIMES))
