@@ -372,11 +372,13 @@ def filter_rows(  # type: ignore[no-untyped-def]
 
 @_inlined
 def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
-    """Φ of `vcc.plan.footprint`; interpolation 1 is linear, 2 cubic."""
+    """Φ of `vcc.plan.footprint`; interpolation 1 is linear, 2 cubic, 3 a spline."""
     r = abs(a)
     if interpolation == 1:
         r = min(r, 1.0)
         half = r - r * r / 2
+    elif interpolation == 3:
+        half = r * (2.0 / 3.0) - r**3 / 3 + r**4 / 8 if r < 1 else 0.5 - (2 - min(r, 2.0)) ** 4 / 24
     elif r < 1:
         half = r - r**3 * (5.0 / 6.0) + r**4 * (3.0 / 8.0)
     else:

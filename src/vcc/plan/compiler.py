@@ -19,7 +19,7 @@ from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.patterns import Open
 from vcc.plan.diffuser_rules import diffusers_as_blurs
-from vcc.plan.footprint import REACH, SMALLEST_STEP
+from vcc.plan.footprint import SMALLEST_STEP
 from vcc.plan.model import MaskLookup, Plan
 from vcc.plan.parallax_rule import BetweenViews, choose_between_views
 from vcc.plan.planes import (
@@ -40,8 +40,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-INTERPOLATIONS = ("sharp", *REACH)
+INTERPOLATIONS = ("sharp", "nearest", "linear", "cubic")
 """Ways to interpolate within a view; ``"sharp"`` is linear with what that costs given back."""
+FINER_PIXELS = 1.25
+"""Pixels from sample to sample from which on they see how samples are interpolated between."""
 LARGEST_SHEARED_FILTER = 6
 """Weights on each side of the middle of a filter for a sheared pixel grid."""
 CORRELATED = 0.02
@@ -125,7 +127,7 @@ def compile_plan(
     plan = Plan(
         sensor_shape=sensor.shape,
         guard=guard,
-        interpolation="linear" if sharp else interpolation,
+        interpolation=_sharp_footprint(step, fine) if sharp else interpolation,
         scale=volume / (sensor.pitches[0] * sensor.pitches[1]),
         view_rows=rows[used_rows],
         view_columns=columns[used_columns],
@@ -166,7 +168,8 @@ def _sharpened(plan: Plan, sample: str) -> Plan:
     (xk, xl), (yk, yl) = step
     if not (xl or yk):
         columns, rows = (_aligned_share(plan, axis) if plan.refine == 1 else 0.0 for axis in (0, 1))
-        filters = along_axis(losses, yl, rows), along_axis(losses, xk, columns)
+        spline = plan.interpolation == "spline"
+        filters = along_axis(losses, yl, rows, spline), along_axis(losses, xk, columns, spline)
         reach = max(len(weights) for weights in filters) // 2
         return _guarded(replace(plan, sharpen=filters, sharpen_samples=within), reach)
     # Light is spread along the samples' columns on the sensor, and across at fixed rows of pixels; a pixel's mean
@@ -183,6 +186,12 @@ def _sharpened(plan: Plan, sample: str) -> Plan:
 
         kernel = np.asarray(convolve(plan.blur, kernel))
     return _guarded(replace(plan, blur=kernel, sharpen_samples=within), half)
+
+
+def _sharp_footprint(step: Array, fine: int) -> str:
+    """The footprint that is sharpened: a tent, which is quick; a spline where pixels would see a tent's bends."""
+    parted = not (step[0, 1] or step[1, 0])
+    return "spline" if fine == 1 and parted and max(abs(step[0, 0]), abs(step[1, 1])) > FINER_PIXELS else "linear"
 
 
 def _guarded(plan: Plan, pixels: int) -> Plan:

@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-REACH = {"nearest": 0.5, "linear": 1.0, "cubic": 2.0}
-"""Half the width of each interpolation's footprint, in samples."""
+REACH = {"nearest": 0.5, "linear": 1.0, "cubic": 2.0, "spline": 2.0}
+"""Half the width of each interpolation's footprint, in samples. ``"spline"`` is a cubic B-spline: it does not
+interpolate by itself, but with the filter of the picture that undoes it on the samples (`vcc.plan.sharpening`)."""
 
 SMALLEST_STEP = 1e-7
 """Plans keep steps from sample to sample at this or above, in pixels: a view that falls into a point falls into
@@ -39,13 +40,19 @@ def cumulative(interpolation: str, a: Any, xp: Any = np) -> Any:
     """Φ(a), the integral of the footprint from −∞ to a, for arrays of any library.
 
     Args:
-        interpolation: ``"linear"`` (a tent) or ``"cubic"`` (Catmull-Rom, Keys 1981 with a = −½).
+        interpolation: ``"linear"`` (a tent), ``"cubic"`` (Catmull-Rom, Keys 1981 with a = −½) or ``"spline"`` (a
+            cubic B-spline).
         a: positions in samples from the footprint's middle.
         xp: the array namespace of ``a``.
     """
     r = xp.clip(xp.abs(a), 0.0, REACH[interpolation])
     if interpolation == "linear":
         half = r - r * r / 2
+    elif interpolation == "spline":
+        inner = xp.clip(r, 0.0, 1.0)
+        # ∫₀ʳ ⅔ − x² + x³/2, and from 1 on what is left of a half, ∫ (2 − x)³/6
+        near = inner * (2.0 / 3.0) - inner**3 / 3 + inner**4 / 8
+        half = xp.where(r < 1, near, 0.5 - (2 - r) ** 4 / 24)
     else:
         inner = xp.clip(r, 0.0, 1.0)
         outer = xp.clip(r, 1.0, 2.0)
@@ -66,6 +73,9 @@ def weight(interpolation: str, distance: Any, xp: Any = np) -> Any:
         return xp.astype((distance >= -0.5) & (distance < 0.5), xp.float64)
     if interpolation == "linear":
         return xp.clip(1 - r, 0.0, 1.0)
+    if interpolation == "spline":
+        inner = xp.clip(r, 0.0, 1.0)
+        return xp.where(r < 1, 2.0 / 3.0 - inner**2 + inner**3 / 2, xp.clip(2 - r, 0.0, 1.0) ** 3 / 6)
     near = (1.5 * r - 2.5) * r * r + 1
     far = ((-0.5 * r + 2.5) * r - 4) * r + 2
     return xp.where(r < 1, near, xp.where(r < 2, far, xp.zeros_like(r)))

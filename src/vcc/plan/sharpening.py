@@ -64,7 +64,7 @@ def symmetric(wanted: Callable[[Array], Array], half: int) -> Array:
     return np.concatenate([side[::-1], [1 - 2 * side.sum()], side])
 
 
-def along_axis(losses: float, step: float, aligned: float = 0.0) -> Array:
+def along_axis(losses: float, step: float, aligned: float = 0.0, spline: bool = False) -> Array:
     """The filter of a finished picture along one axis.
 
     Args:
@@ -72,6 +72,7 @@ def along_axis(losses: float, step: float, aligned: float = 0.0) -> Array:
         step: pixels from one sample to the next, of any sign.
         aligned: the share of the light whose samples lie in the middle of pixels of their own size. There the
             spectrum's repetitions add up: interpolation takes [1, 6, 1]/8 of neighbours, and that is undone.
+        spline: whether footprints are cubic B-splines, of which samples see [1, 4, 1]/6, rather than tents.
 
     Returns:
         An odd number of weights of sum 1; a single one where nothing is lost.
@@ -79,6 +80,12 @@ def along_axis(losses: float, step: float, aligned: float = 0.0) -> Array:
     size = abs(step)
     if size < 1e-3 or losses < 1e-9:
         return np.ones(1)
+    if spline:
+
+        def undone(frequency: Array) -> Array:
+            return 3 / (2 + np.cos(2 * np.pi * size * frequency)) * gain(losses - TENT, size * frequency)
+
+        return symmetric(undone, math.ceil(2 * size - 1e-9) + 3)
     if aligned > WORTH_ALIGNING:
 
         def wanted(frequency: Array) -> Array:
