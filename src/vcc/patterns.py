@@ -25,8 +25,12 @@ Array = NDArray[np.float64]
 
 RASTER_PER_CELL = 16
 """Raster points across a rectangle for patterns without a closed form: edges are right to 1/16² of it."""
+FEWEST_PER_CELL = 4
+"""Raster points across a rectangle with which to make do where there are many rectangles side by side."""
 RASTER_LIMIT = 4096
-"""Largest raster, points a side: 128 MiB of float64 while a plan is being made."""
+"""Largest square raster, points a side: 128 MiB of float64 while a plan is being made."""
+LONGEST_RASTER = 4 * RASTER_LIMIT
+"""Points along the longer side of a raster that is no square."""
 
 
 class Pattern(abc.ABC):
@@ -58,7 +62,7 @@ class Pattern(abc.ABC):
             width: of every rectangle, metres.
             height: of every rectangle, metres.
         """
-        found = mean_by_raster(lambda a, b, _: self(a, b), self.size, x, y, width, height)
+        found = mean_by_raster(lambda a, b, _: self(a, b), self.size, x, y, width, height, FEWEST_PER_CELL)
         return (
             self._mean_of_points(np.asarray(x, float), np.asarray(y, float), width, height)
             if found is None
@@ -78,7 +82,7 @@ def mean_by_raster(
     y: ArrayLike,
     width: float,
     height: float,
-    fewest: int = RASTER_PER_CELL,
+    fewest: int,
 ) -> Array | None:
     """Means over rectangles by way of a raster, whose points lie the same whichever rectangles are asked for.
 
@@ -92,7 +96,7 @@ def mean_by_raster(
         fewest: points across a rectangle with which to make do where `RASTER_PER_CELL` would be too many.
 
     Returns:
-        The means; None where even the fewest points across each rectangle are more than `RASTER_LIMIT`.
+        The means; None where even the fewest points across each rectangle are too many.
     """
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     places: list[Array] = []
@@ -107,13 +111,15 @@ def mean_by_raster(
         while across > fewest and length > 0 and extent / length * across > RASTER_LIMIT:
             across //= 2
         step = length / across
-        if step <= 0 or (high - low) / step > RASTER_LIMIT:
+        if step <= 0 or (high - low) / step > LONGEST_RASTER:
             return None
         first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
         places.append(np.asarray((np.arange(first, last) + 0.5) * step, dtype=np.float64))
         points.append((first * step, last * step))
         steps.append(step)
     rows, columns = places[1].size, places[0].size
+    if rows * columns > RASTER_LIMIT**2:
+        return None
     found = np.asarray(values(places[0][None, :], places[1][:, None], (steps[0], steps[1])), dtype=np.float64)
     (left, right), (top, bottom) = points
     middle = (left + right) / 2, (top + bottom) / 2

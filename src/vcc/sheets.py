@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.errors import InputError
 from vcc.patterns import (
+    FEWEST_PER_CELL,
     Bounded,
     Cells,
     Circle,
@@ -28,9 +29,6 @@ from vcc.patterns import (
 )
 
 Array = NDArray[np.float64]
-
-FEWEST_PER_CELL = 4
-"""Raster points across a rectangle below which each rectangle is looked at by itself."""
 
 
 @dataclass(frozen=True, eq=False)

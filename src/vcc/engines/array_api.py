@@ -52,16 +52,24 @@ class _Run:
             progress(total, total)
         assert raster is not None  # a plan has at least one column of taps
         raster = raster * plan.scale
+        around = 0 if plan.sensor_detail is None else 1  # pixels that are needed beyond the sensor
         if plan.guard:
             finished = None
+            high, wide = (pixels + 2 * around for pixels in plan.sensor_shape)
             for down, across in finishing_terms(plan):
-                rows = self.constant(band_matrix(down, plan.sensor_shape[0], plan.guard))
-                columns = self.constant(band_matrix(across, plan.sensor_shape[1], plan.guard))
+                rows = self.constant(band_matrix(down, high, plan.guard - around))
+                columns = self.constant(band_matrix(across, wide, plan.guard - around))
                 part = self.rows_mixed(columns, xp.permute_dims(self.rows_mixed(rows, raster), (1, 0, 2)))
                 finished = part if finished is None else finished + part
             raster = xp.permute_dims(finished, (1, 0, 2))
+        neighbours, (high, wide) = raster, plan.sensor_shape
+        raster = raster[around : around + high, around : around + wide, :]
         if plan.sensor_transmission is not None:
             raster = raster * self.constant(plan.sensor_transmission)[:, :, None]
+        if plan.sensor_detail is not None:
+            for dy, dx in np.ndindex(3, 3):
+                share = self.constant(plan.sensor_detail[dy, dx])[:, :, None]
+                raster = raster + share * neighbours[dy : dy + high, dx : dx + wide, :]
         raster = xp.astype(raster, xp.float32)
         return raster if self.values.ndim == 5 else raster[:, :, 0]
 

@@ -70,7 +70,7 @@ def _finished(
     """The picture (rows, columns, channels) from the raster (rows, columns × channels)."""
     rows, columns = plan.sensor_shape
     ((down, across),) = finishing_terms(plan) if plan.blur is None else [(np.ones(LONG), np.ones(LONG))]
-    if max(len(down), len(across)) >= LONG:
+    if max(len(down), len(across)) >= LONG or plan.sensor_detail is not None:
         return finish(plan, raster.reshape(*plan.raster_shape, channels))
     if down.tolist() == across.tolist() == [1.0] and not plan.guard and plan.sensor_transmission is None:
         return raster.reshape(rows, columns, channels)

@@ -102,8 +102,17 @@ def finish(plan: Plan, raster: NDArray[Any]) -> NDArray[np.float32]:
         raster = without_rounding(wide)
     if plan.sharpen is not None:
         raster = blurred(blurred(raster, plan.sharpen[0], 0), plan.sharpen[1], 1)
-    if plan.guard:
-        raster = raster[plan.guard : -plan.guard, plan.guard : -plan.guard]
+    picture = _part(plan, raster, 0, 0)
     if plan.sensor_transmission is not None:
-        raster = raster * plan.sensor_transmission[..., None]
-    return np.asarray(raster, dtype=np.float32)
+        picture = picture * plan.sensor_transmission[..., None]
+    if plan.sensor_detail is not None:
+        for dy, dx in np.ndindex(3, 3):
+            picture = picture + plan.sensor_detail[dy, dx, :, :, None] * _part(plan, raster, dy - 1, dx - 1)
+    return np.asarray(picture, dtype=np.float32)
+
+
+def _part(plan: Plan, raster: NDArray[Any], down: int, across: int) -> NDArray[Any]:
+    """The sensor's part of the raster, or what lies so many pixels further."""
+    rows, columns = plan.sensor_shape
+    top, left = plan.guard + down, plan.guard + across
+    return raster[top : top + rows, left : left + columns]

@@ -76,6 +76,8 @@ class Plan:
         step: 2×2, pixels per index step: [[x/k, x/l], [y/k, y/l]], |y/l| the larger of its row.
         masks: masks in mid-path.
         sensor_transmission: mean transmission of what lies against the sensor, (rows, columns), or None.
+        sensor_detail: what its variation within pixels adds, from the light of each pixel's 3×3 neighbours, (3, 3,
+            rows, columns): [dy, dx] is the share of the pixel dy − 1 rows down and dx − 1 columns on; or None.
         refine: how many finer samples replace one, along each pixel axis.
         smear: (vertical, horizontal) half width in pixels of the tent that fills the gap between the
             pictures of neighbouring views; 0 for none.
@@ -122,6 +124,7 @@ class Plan:
     view_blur: Array | None = None
     sharpen: tuple[Array, Array] | None = None
     sharpen_samples: Array | None = None
+    sensor_detail: Array | None = None
     views_between: ViewsBetween | None = None
 
     def division(self, samples: int) -> Division:

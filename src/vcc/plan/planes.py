@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.affine import Affine
-from vcc.patterns import Pattern
+from vcc.patterns import Cells, Pattern
 from vcc.plan.model import MaskLookup
 from vcc.plan.sharpening import TENT, gain, symmetric
 from vcc.sheets import in_one_plane
@@ -266,13 +266,28 @@ def detail_lost(plane: Plane, known: Array, added: Array) -> float:
     counts = np.maximum(np.ceil(size / fine).astype(int), 8)
     x = ((np.arange(counts[0]) + 0.5) / counts[0] - 0.5) * size[0]
     y = ((np.arange(counts[1]) + 0.5) / counts[1] - 0.5) * size[1]
-    mean = plane.pattern.mean
-    whole = mean(x[None, :], y[:, None], *(size / counts)).var()
+    # Averaged once as finely as it is looked at, and these means averaged further.
+    values = np.broadcast_to(plane.pattern.mean(x[None, :], y[:, None], *(size / counts)), counts[::-1])
+    whole = values.var()
     if whole < 1e-12:
         return 0.0
-    before = mean(x[None, :], y[:, None], *np.maximum(known, size / counts)).var()
-    after = mean(x[None, :], y[:, None], *np.maximum(np.hypot(known, added), size / counts)).var()
-    return float((before - after) / whole)
+    means = Cells(np.clip(values, 0.0, 1.0), float(size[0]), float(size[1]))
+    # A pattern without bounds goes on beyond what is looked at: only what lies within is compared.
+    across, down = (
+        slice(None) if np.isfinite(bound) else slice(reach, max(count - reach, reach + 1))
+        for bound, count, reach in zip(
+            plane.pattern.size,
+            counts,
+            np.ceil(np.hypot(known, added) / 2 / (size / counts)).astype(int),
+            strict=True,
+        )
+    )
+
+    def variance(box: Array) -> float:
+        wide, high = np.maximum(box, size / counts)
+        return float(means.mean(x[None, across], y[down, None], float(wide), float(high)).var())
+
+    return (variance(known) - variance(np.hypot(known, added))) / float(whole)
 
 
 def _texture_spacing(footprint: Array, extent: Array) -> Array:
