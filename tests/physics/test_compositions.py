@@ -151,11 +151,13 @@ def test_what_absorbs_nothing_behind_a_diffuser_changes_nothing(clear):
 
 @pytest.mark.parametrize("sample", ["mean", "point"])
 def test_one_view_on_pixels_of_its_own_size_gives_itself_back_to_60_dB(sample):
-    # A picture whose spectrum falls as those of nature do (1/f), seen through one view; the sensor's pixels are
-    # its own. Of points the sensor records means over pixels, which is what they are compared with.
+    # A picture whose spectrum falls as those of nature do (1/f), seen by a lens whose blur has a standard
+    # deviation of half a pixel; the sensor's pixels are the view's own. Of points the sensor records means over
+    # pixels, which is what they are compared with. Four published views give 62 to 70 dB.
     size = 96
     frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(size), np.fft.fftfreq(size)))
     spectrum = np.exp(2j * np.pi * np.random.default_rng(0).random((size, size))) / np.maximum(frequency, 1 / size)
+    spectrum *= np.exp(-((2 * np.pi * frequency * 0.5) ** 2) / 2)
     means = np.sinc(np.fft.fftfreq(size))[:, None] * np.sinc(np.fft.fftfreq(size))[None, :]
     pictures = [np.fft.ifft2(spectrum * factor).real for factor in (1.0, means)]
     low, span = pictures[0].min(), np.ptp(pictures[0])

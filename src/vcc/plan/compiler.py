@@ -173,9 +173,8 @@ def _sharpened(plan: Plan, sample: str) -> Plan:
     step = plan.step / plan.refine
     (xk, xl), (yk, yl) = step
     if not (xl or yk):
-        columns, rows = (_aligned_share(plan, axis) if plan.refine == 1 else 0.0 for axis in (0, 1))
         spline = plan.interpolation == "spline"
-        filters = along_axis(losses, yl, rows, spline), along_axis(losses, xk, columns, spline)
+        filters = along_axis(losses, yl, spline), along_axis(losses, xk, spline)
         reach = max(len(weights) for weights in filters) // 2
         return _guarded(replace(plan, sharpen=filters, sharpen_samples=within), reach)
     # Light is spread along the samples' columns on the sensor, and across at fixed rows of pixels; a pixel's mean
@@ -203,22 +202,6 @@ def _sharp_footprint(step: Array, fine: int) -> str:
 def _guarded(plan: Plan, pixels: int) -> Plan:
     """The plan with so many more pixels around the picture, for filters that look beyond its border."""
     return replace(plan, guard=plan.guard + pixels, x=plan.x + pixels, y=plan.y + pixels)
-
-
-def _aligned_share(plan: Plan, axis: int) -> float:
-    """How much of the light comes from samples in the middle of pixels of their own size; see `along_axis`.
-
-    Args:
-        plan: with rows and columns that part.
-        axis: 0 for the sensor's columns, 1 for its rows.
-    """
-    step, samples = plan.step[axis, axis], plan.samples[1 - axis]
-    if abs(abs(step) - 1) * samples > 0.25:  # they drift against the pixels
-        return 0.0
-    place = (plan.x, plan.y)[axis] + step * ((samples - 1) // 2)
-    total = plan.weights.sum()
-    phase = (plan.weights * np.cos(2 * np.pi * place)).sum() / total if total > 0 else 0.0
-    return max(float(phase), 0.0)
 
 
 def why_not_footprints(camera: Camera, light_field: LightField) -> str | None:

@@ -25,10 +25,6 @@ TENT = 2
 """Powers of sinc that linear interpolation costs."""
 MEAN = 1
 """Powers of sinc that a mean over a cell has cost."""
-ALIGNED = 3
-"""Weights on each side of a filter for pictures whose samples lie on the pixels."""
-WORTH_ALIGNING = 0.1
-"""Share of aligned light from which on a filter heeds it."""
 FREQUENCIES = 96
 """Frequencies at which a filter is fitted, from 0 to half a cycle a pixel."""
 DETAIL = 0.05
@@ -64,14 +60,12 @@ def symmetric(wanted: Callable[[Array], Array], half: int) -> Array:
     return np.concatenate([side[::-1], [1 - 2 * side.sum()], side])
 
 
-def along_axis(losses: float, step: float, aligned: float = 0.0, spline: bool = False) -> Array:
+def along_axis(losses: float, step: float, spline: bool = False) -> Array:
     """The filter of a finished picture along one axis.
 
     Args:
         losses: powers of sinc that its samples have lost.
         step: pixels from one sample to the next, of any sign.
-        aligned: the share of the light whose samples lie in the middle of pixels of their own size. There the
-            spectrum's repetitions add up: interpolation takes [1, 6, 1]/8 of neighbours, and that is undone.
         spline: whether footprints are cubic B-splines, of which samples see [1, 4, 1]/6, rather than tents.
 
     Returns:
@@ -86,15 +80,6 @@ def along_axis(losses: float, step: float, aligned: float = 0.0, spline: bool = 
             return 3 / (2 + np.cos(2 * np.pi * size * frequency)) * gain(losses - TENT, size * frequency)
 
         return symmetric(undone, math.ceil(2 * size - 1e-9) + 3)
-    if aligned > WORTH_ALIGNING:
-
-        def wanted(frequency: Array) -> Array:
-            together = 1 - np.sin(np.pi * frequency) ** 2 / 2
-            if losses < TENT + MEAN:  # points: the mean over a pixel is not the point in its middle
-                together = together / np.sinc(frequency)
-            return np.asarray(1 / ((1 - aligned) / gain(losses, size * frequency) + aligned * together))
-
-        return symmetric(wanted, ALIGNED)
     if size > 1:  # weights that lie between pixels take some more of them
         return symmetric(lambda frequency: gain(losses, size * frequency), math.ceil(2 * size - 1e-9) + 2)
     # The series in s of a step of one pixel, which x² = size²·(s + s²/3 + …) makes of that in x.
