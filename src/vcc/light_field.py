@@ -410,20 +410,11 @@ class LightField:
         views = known(self.values[rows, columns, ...])
         if views is None:
             return None
-        # Along both axes, so that a light field turned by 90° shows the same scene, each told along u.
-        across = disparity_range(views, "u") if views.shape[1] > 1 else None
-        down = disparity_range(views, "v") if views.shape[0] > 1 else None
-        found = [*(across or ()), *(told for shown in down or () if (told := self._along_u(shown)) is not None)]
-        return (min(found), max(found)) if found else None
-
-    def _along_u(self, disparity: float) -> float | None:
-        """The disparity along u of what shows ``disparity`` along v, pixels per view; None where u shows none."""
-        position, slope = self.frame.linear[1], self.frame.linear[3]
-        numerator, denominator = slope[1] - disparity * slope[3], position[1] - disparity * position[3]
-        place, angle = self.frame.linear[0], self.frame.linear[2]
-        # 1/Z = numerator / denominator; as `disparity_of`, without the quotient, which may be infinite
-        moved = angle[2] * denominator - place[2] * numerator
-        return None if moved == 0 else float((angle[0] * denominator - place[0] * numerator) / moved)
+        return told_along_u(
+            self.frame,
+            disparity_range(views, "u") if views.shape[1] > 1 else None,
+            disparity_range(views, "v") if views.shape[0] > 1 else None,
+        )
 
     def _find_disparities(self, progress: Callable[[int, int], None] | None) -> DisparityMaps:
         from vcc.recover.depth import disparity_maps  # late: light fields come before what looks at them
@@ -434,6 +425,28 @@ class LightField:
         sizes = "×".join(map(str, self.shape))
         samples = f"{to_dtype(self.values)} {SAMPLES_IN_WORDS[self.sample]}"
         return f"LightField({sizes} {samples}, {describe_geometry(self)})"
+
+
+def told_along_u(
+    frame: Affine, across: tuple[float, float] | None, down: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """(lowest, highest) disparity along u of what views show along both axes: turned by 90°, the same scene.
+
+    Args:
+        frame: of the light field.
+        across: what is shown along u, pixels per view, or None.
+        down: what is shown along v, or None.
+    """
+    position, slope = frame.linear[1], frame.linear[3]
+    place, angle = frame.linear[0], frame.linear[2]
+    found = list(across or ())
+    for disparity in down or ():
+        numerator, denominator = slope[1] - disparity * slope[3], position[1] - disparity * position[3]
+        # 1/Z = numerator / denominator; as `LightField.disparity_of`, without the quotient, which may be infinite
+        moved = angle[2] * denominator - place[2] * numerator
+        if moved != 0:
+            found.append(float((angle[0] * denominator - place[0] * numerator) / moved))
+    return (min(found), max(found)) if found else None
 
 
 def describe_geometry(light_field: LightField) -> str:

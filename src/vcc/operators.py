@@ -58,7 +58,10 @@ def masked_at(
     for j, i in np.ndindex(nv, nu):
         weight: Any = 1.0 / light_field.full_scale
         for table in tables:
-            weight = weight * (table[j, i] if isinstance(table, np.ndarray) else table.weights(j, i, k, l))
+            # A texture that makes up for being looked up linearly may pass 0 beside an edge; light does not.
+            weight = weight * (
+                table[j, i] if isinstance(table, np.ndarray) else np.maximum(table.weights(j, i, k, l), 0.0)
+            )
         if values.ndim == 5 and np.ndim(weight):
             weight = weight[..., None]
         result[j, i] = values[j, i] * weight

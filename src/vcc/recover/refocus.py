@@ -134,6 +134,9 @@ def refocused(
     with warnings.catch_warnings():
         # "rays are missing; the picture is darker there": it is not, once divided by the coverage.
         warnings.filterwarnings("ignore", message=".*of the rays that this camera asks for.*")
+        warnings.filterwarnings(
+            "ignore", message="the picture is 0 everywhere.*"
+        )  # told below, or in its own words
         taken = camera.capture(light_field, **options, memory_limit=memory_limit, progress=progress)
         covered = _coverage(camera, outline, options)
     most = float(covered.max())

@@ -17,7 +17,14 @@ from vcc.affine import Affine
 from vcc.disparity import Disparities, DisparityMaps
 from vcc.errors import InputError, ResultWarning
 from vcc.formats.transfer import decode
-from vcc.light_field import SAMPLES_IN_WORDS, DisparityRange, LightField, Sample, describe_geometry
+from vcc.light_field import (
+    SAMPLES_IN_WORDS,
+    DisparityRange,
+    LightField,
+    Sample,
+    describe_geometry,
+    told_along_u,
+)
 from vcc.sampled import Index
 from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
 
@@ -390,17 +397,23 @@ class StoredLightField:
         return found
 
     def _measured(self) -> tuple[float, float] | None:
-        from vcc.parallax import disparity_range
+        from vcc.parallax import Axis, disparity_range
 
-        nv, nu, nt = self.shape[:3]
-        middle = [slice(n // 2, n // 2 + 1) for n in (nv, nu)]
-        along = 1 if nu > 1 else 0
-        n = self.shape[along]
-        middle[along] = slice(max(n // 2 - MEASURED_REACH, 0), n // 2 + MEASURED_REACH + 1)
-        views = min(n, 2 * MEASURED_REACH + 1)
-        rows = min(nt, max(MEASURED_BYTES * nt // (views * self.view_bytes), 64))
-        first = (nt - rows) // 2
-        return disparity_range(self.outline[middle[0], middle[1], first : first + rows].values.read())
+        nt = self.shape[2]
+        shown: list[tuple[float, float] | None] = [None, None]
+        axes: tuple[tuple[int, Axis], ...] = ((1, "u"), (0, "v"))
+        for along, axis in axes:
+            n = self.shape[along]
+            if n == 1:
+                continue
+            middle = [slice(views // 2, views // 2 + 1) for views in self.shape[:2]]
+            middle[along] = slice(max(n // 2 - MEASURED_REACH, 0), n // 2 + MEASURED_REACH + 1)
+            views = min(n, 2 * MEASURED_REACH + 1)
+            rows = min(nt, max(MEASURED_BYTES * nt // (views * self.view_bytes), 64))
+            first = (nt - rows) // 2
+            values = self.outline[middle[0], middle[1], first : first + rows].values.read()
+            shown[1 - along] = disparity_range(values, axis)
+        return told_along_u(self.frame, *shown)
 
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))
