@@ -32,7 +32,7 @@ PICTURES = [
     ("example-1-focused-far", "lens, focused far"),
     ("example-2-cosine", "cosine mask before the sensor"),
     ("example-2-coded", "coded mask half-way"),
-    ("check-cubic", "pinhole at the lens"),
+    ("check-sharp", "pinhole at the lens"),
 ]
 
 

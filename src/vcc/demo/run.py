@@ -29,7 +29,7 @@ from vcc.sources.textures import Uniform
 if TYPE_CHECKING:
     from rich.console import Console
 
-INTERPOLATIONS = ("nearest", "linear", "cubic")
+INTERPOLATIONS = ("nearest", "linear", "cubic", "sharp")
 PAPER_SHAPE = (20, 20, 500, 500)
 
 
@@ -194,7 +194,7 @@ class _Taken:
 
 
 def _take(
-    work: _Work, bench: Bench, camera: Camera, name: str, exposure: float, interpolation: str = "linear"
+    work: _Work, bench: Bench, camera: Camera, name: str, exposure: float, interpolation: str = "sharp"
 ) -> _Taken:
     """Capture twice, timed, and write the picture."""
     seconds = []
