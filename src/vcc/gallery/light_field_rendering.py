@@ -25,8 +25,6 @@ STEP = 20 * mm
 """How far before and behind the plane of the views new pictures are taken."""
 INNER = 0.1
 """Share of a picture at each side that comparisons leave out: there the views end."""
-POINT = 1e-3
-"""Fill factor of the pinhole cameras' pixels: samples are means over a pixel already, a second mean would blur."""
 POINTS = 4
 """Points across a pixel at which the closed form is evaluated, each way."""
 
@@ -143,13 +141,12 @@ def _pinhole_picture(
         (like.shape[2], like.shape[3]),
         (pitches[0] * distance, pitches[1] * distance),
         decentre=(hole[0] + distance * middle[0], hole[1] + distance * middle[1]),
-        fill_factor=POINT,
     )
     camera = Camera([Mask(Circle(diameter), z=z, decentre=hole, name="pinhole")], sensor)
     with warnings.catch_warnings():
         # At its border the picture looks past the views; comparisons leave the border out.
         warnings.simplefilter("ignore", ResultWarning)
-        image = camera.capture(given, method="rays", samples=16).to_numpy()
+        image = camera.capture(given, method="rays", samples=64).to_numpy()
     values = image.astype(np.float64) * distance**2 / (math.pi / 4 * diameter**2)
     # As it lands, slopes grow with rows and columns; the views' own rows and columns may run against them.
     values = values[:: 1 if linear[3, 3] > 0 else -1, :: 1 if linear[2, 2] > 0 else -1]
@@ -164,7 +161,7 @@ def _from_elsewhere(
     nv, nu, nt, ns = light_field.shape[:4]
     u, v, s, t = (float(x) for x in light_field.frame([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2]))
     pictures, numbers = [], []
-    why = "samples interpolated linearly in all four dimensions"
+    why = "samples interpolated in all four dimensions, what that takes from sharpness given back"
     for done, (name, title, way) in enumerate(
         (("before", "From before the cameras", -STEP), ("behind", "From behind the cameras", STEP))
     ):
