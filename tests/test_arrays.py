@@ -17,8 +17,12 @@ LAYOUTS = ("square", "hexagonal")
 
 
 def bent(element: vcc.Element, x, y) -> np.ndarray:
-    """(Δs, Δt) at places from the element's middle, (..., 2)."""
-    return np.stack(element.faces().bending(x, y), axis=-1)
+    """(Δs, Δt) at places from the element's middle, (..., 2); a prism or lens array can be a single prism."""
+    faces = element.faces()
+    if faces.affine is not None:  # (x, y, 0, 0, 1) goes to (x, y, Δs, Δt, 1)
+        place = np.stack([x, y, np.zeros_like(x), np.zeros_like(x), np.ones_like(x)], axis=-1)
+        return (place @ faces.affine.matrix.T)[..., 2:4]
+    return np.stack(faces.bending(x, y), axis=-1)
 
 
 # --- lens arrays ---
@@ -122,6 +126,8 @@ def test_each_prism_stands_at_its_place(layout, rotation, shape, focal_length):
     pitch = 2 * mm
     array = vcc.PrismArray(slopes, pitch, layout, focal_length, rotation)
     assert array.shape == shape
+    if shape == (1, 1) and focal_length is None:  # a single prism in a frame
+        assert array.faces().affine == vcc.Affine.prism(tuple(slopes[0, 0]))
     # By hand: the cells' centres from the first one, then the middle of the box around all cells put at 0.
     height = pitch if layout == "square" else pitch * math.sqrt(3) / 2
     shift = 0.0 if layout == "square" else pitch / 2
@@ -196,8 +202,9 @@ def test_rims_and_deflections_of_nothing():
     assert vcc.Biprism(0.0).faces().pattern is None
     assert vcc.Biprism(0.02, diameter=5 * mm).faces().pattern == Circle(5 * mm)
     assert vcc.Pyramid(4, 0.02, diameter=5 * mm).faces().pattern == Circle(5 * mm)
-    np.testing.assert_array_equal(bent(vcc.Biprism(0.0), 0.3, 0.2), (0, 0))
-    np.testing.assert_array_equal(bent(vcc.Pyramid(3, 0.0), 0.3, 0.2), (0, 0))
+    for nothing in (vcc.Biprism(0.0), vcc.Pyramid(3, 0.0), vcc.PrismArray(np.zeros((1, 1, 2)), 2 * mm)):
+        assert nothing.faces().deflection is None
+    assert vcc.Pyramid(3, 0.0, diameter=5 * mm).faces() == vcc.Faces(transmission=Circle(5 * mm))
 
 
 # --- files, bad input ---
