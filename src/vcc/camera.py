@@ -279,8 +279,9 @@ class Camera:
             method: ``"footprints"`` spreads each sample of the light field over the sensor, exactly, where the
                 optics fold into one matrix; ``"rays"`` traces rays back from the sensor through anything;
                 ``"auto"`` takes footprints where they can be had.
-            interpolation: footprints, within a view: ``"nearest"`` (the paper's, for comparison), ``"linear"``
-                or ``"cubic"`` (Catmull-Rom: sharper, may undershoot at hard edges). Rays are linear.
+            interpolation: within a view: ``"sharp"``, linear with what that takes from sharpness given back (rings
+                by some per cent beside hard edges, and may go below 0 there), or ``"linear"``; by footprints also
+                ``"nearest"`` (the paper's, for comparison) or ``"cubic"`` (Catmull-Rom).
             between_views: ``"auto"`` interpolates between views along the scene's parallax (footprints: only
                 where neighbouring views differ by more than about a pixel on the sensor); ``"depth"`` (footprints)
                 makes as many views in between as the sensor can tell apart, up to 16×16 for each one, from the

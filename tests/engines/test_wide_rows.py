@@ -2,8 +2,9 @@
 
 The oracle is the plan's sum written out by its tables of shares, as products of matrices in double precision; the
 sums differ by rounding in single precision, 6e-8 of each of some hundred terms that are alike in size: 1e-6. Their
-errors are of either sign, hence 6e-8·√100 of the largest; a filter of the picture adds those of neighbouring pixels,
-by the root of the sum of its squared weights: 1.8 to 2.3 along each axis where pixels are finer than samples.
+errors are of either sign, hence 6e-8·√100 of the largest; a filter of the picture adds those of neighbouring
+pixels, by the root of the sum of its squared weights: 2.1 or 2.2 along each axis where samples are larger than
+pixels.
 """
 
 from __future__ import annotations

@@ -420,9 +420,14 @@ def _stands(case: Case, z: float) -> bool:
 
 
 def halves(case: Case) -> Iterator[Check]:
-    """Two lenses of half the power, two prisms of half the deflection, √T twice, in one plane, are one of all."""
+    """Two lenses of half the power, two prisms of half the deflection, √T twice, in one plane, are one of all.
+
+    A root that is a function is averaged on a raster, where the pattern itself may be in closed form: it is held
+    against the pattern as a function.
+    """
     picture = default(case)
     for element in case.camera.elements:
+        whole = picture
         if isinstance(element, vcc.Lens):
             half = replace(element, focal_length=2 * element.focal_length)
             law = "half lenses"
@@ -431,9 +436,12 @@ def halves(case: Case) -> Iterator[Check]:
             law = "half prisms"
         elif isinstance(element, vcc.Mask):
             half, law = replace(element, pattern=_root(element.pattern)), "roots of masks"
+            if isinstance(half.pattern, patterns.FunctionPattern):
+                plain = replace(element, pattern=element.pattern.__call__)
+                whole = _with(case, plain, without=element)
         else:
             continue
-        yield equal(case, law, picture, _with(case, half, half, without=element), note=element.label)
+        yield equal(case, law, whole, _with(case, half, half, without=element), note=element.label)
 
 
 def _root(pattern: Any) -> Any:

@@ -121,9 +121,9 @@ def test_sharpness_peaks_where_the_thin_lens_equation_says(distance, interpolati
     assert curvature == pytest.approx(np.mean(place**2), rel=1e-3)
     # At the peak: the spot, 2.5² samples², the pixel, 1/12, and the tent of linear footprints, 1/6, which the
     # filter of sharp ones gives back whole: it is right to sixth order, a variance is of second. The rest is
-    # float32, 6e-8 of the 400 pixels² in which the spot's pixels lie.
+    # float32, 1e-6 of variances of 8.5 samples² at most.
     sharpest = (constant - linear**2 / 4 / curvature) / slope**2
-    assert sharpest == pytest.approx(2.5**2 + 1 / 12 + footprint, abs=2e-5)
+    assert sharpest == pytest.approx(2.5**2 + 1 / 12 + footprint, abs=1e-5)
 
 
 @pytest.mark.parametrize("distance", [0.4 * m, 1 * m, 5 * m])
