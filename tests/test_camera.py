@@ -106,7 +106,7 @@ def test_sensors_that_cannot_be_are_refused(arguments, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"interpolation": "bicubic"}, "interpolation is one of 'sharp', 'nearest', 'linear', 'cubic', not 'bicubic'"),
+        ({"interpolation": "bicubic"}, "interpolation is one of 'sharp', 'nearest', .* not 'bicubic'"),
         ({"between_views": "always"}, "between_views is 'auto', 'none' or 'depth', not 'always'"),
         ({"refine": 0}, "refine is 'auto' or a whole number from 1 to 8, not 0"),
         ({"refine": 2.5}, "refine .* not 2.5"),

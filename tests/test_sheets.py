@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vcc.patterns import Bounded, Cells, Circle, CosineSum, Open, as_pattern
+from vcc.patterns import Bounded, Cells, Circle, CosineSum, Open, Polygon, as_pattern
 from vcc.sheets import Product, Shifted, Tiles, in_one_plane
 from vcc.units import mm
 
@@ -65,6 +65,13 @@ def test_a_hole_over_cells_is_right_to_the_rasters_points():
     both = Product((Circle(6 * mm), Cells(CHECKERS, 8 * mm)))
     found = both.mean(*GRID, 0.7 * mm, 0.5 * mm)
     assert np.abs(found - by_points(both, *GRID, 0.7 * mm, 0.5 * mm)).max() < 16 * 0.25 / 256 + 1 / 200
+
+
+@pytest.mark.parametrize("middle", [(0.0, 0.0), (0.4 * mm, -0.3 * mm)])
+@pytest.mark.parametrize("hole", [Circle(6 * mm), Polygon(5, 6 * mm, 0.2)])
+def test_a_hole_twice_is_the_hole(hole, middle):
+    once, twice = in_one_plane([(hole, middle)]), in_one_plane([(hole, middle)] * 2)
+    np.testing.assert_array_equal(twice.mean(*GRID, 0.7 * mm, 0.5 * mm), once.mean(*GRID, 0.7 * mm, 0.5 * mm))
 
 
 def test_a_function_twice_is_its_square():

@@ -229,11 +229,15 @@ class Product(Pattern):
     def _factors(self) -> tuple[Pattern, ...]:
         """The patterns, all that are made of rectangles multiplied to one, and what is clear left out."""
         # What is open or opaque is the same twice: two equal rims in one plane are one.
-        once: list[Pattern] = []
+        simple: list[Pattern] = []
+        holes: list[tuple[Pattern, tuple[float, float]]] = []
         for part in _parts(self.patterns, (0.0, 0.0)):
-            if not (isinstance(part, Circle | Polygon) and part in once):
-                once.append(part)
-        simple = once
+            hole = (part.pattern, part.middle) if isinstance(part, Shifted) else (part, (0.0, 0.0))
+            if not isinstance(hole[0], Circle | Polygon):
+                simple.append(part)
+            elif hole not in holes:
+                holes.append(hole)
+                simple.append(part)
         tiles = [one for one in simple if isinstance(one, Tiles)]
         rest = tuple(one for one in simple if not isinstance(one, Tiles))
         return (reduce(Tiles.times, tiles), *rest) if tiles else rest
