@@ -270,8 +270,8 @@ def test_light_below_zero_is_dark_and_said_to_be():
         got = vcc.expose_image(vcc.Image(values, on.frame), on, 1e-2)
     assert got.values[0, 0] == 64
     # What sharp interpolation undershoots beside a hard edge is not worth a word (warnings are errors here): a
-    # step of 1 filtered by [0.019, −0.202, 1.366, −0.202, 0.019], after the tent and the mean that it undoes, goes down
-    # to −0.09 at most, one in the light field's own border to −0.13.
+    # step of 1 filtered by [0.019, −0.202, 1.366, −0.202, 0.019], after the tent and the mean that it undoes, goes
+    # down to −0.09 at most, one in the light field's own border to −0.13.
     values[0, 0] = -0.13
     assert vcc.expose_image(vcc.Image(values, on.frame), on, 1e-2).values[0, 0] == 64
 
