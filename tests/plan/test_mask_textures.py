@@ -15,11 +15,11 @@ from vcc.units import mm, um
 
 @pytest.mark.parametrize("points", [24, 40, 100])
 def test_the_error_of_a_cosine_between_points(points):
-    """Half-way between points, p a period, ½·cos(θ) is low by (1 − cos(π/p))/2·|cos θ|; the largest value is 1."""
+    """Of p points a period, ½·cos θ has the curvature (1 − cos(2π/p))·cos θ; of a curvature c, c/12 − c·a(1 − a)/2
+    is left a of the way between two points, c/√720 root mean square. The largest value is 1."""
     texture = 0.5 + 0.5 * np.cos(2 * np.pi * np.arange(20 * points + 1) / points)
-    expected = (1 - math.cos(math.pi / points)) / 2 / math.sqrt(2)
+    expected = (1 - math.cos(2 * math.pi / points)) / math.sqrt(2) / math.sqrt(720)
     found = texture_error(np.repeat(texture[None], 9, axis=0).astype(np.float32))
-    # A fourth of the error at twice the spacing: right but for (π/p)²/4 of it, 0.4 % of 24 points.
     assert found == pytest.approx(expected, rel=0.01)
     assert texture_error(np.repeat(texture[:, None], 9, axis=1).astype(np.float32)) == pytest.approx(found)
 
@@ -29,10 +29,10 @@ def test_flat_and_dark_textures_have_none():
     assert texture_error(np.zeros((1, 1), np.float32)) == 0
 
 
-@pytest.mark.parametrize(("period", "told"), [(16 * um, True), (400 * um, False)])
+@pytest.mark.parametrize(("period", "told"), [(12 * um, True), (400 * um, False)])
 def test_a_mask_too_fine_for_its_texture_is_told(period, told):
-    """1500 pixels a view ask for 9000 texture points along s, of which 2048 are made: a cosine of five samples has
-    seven points, which are a tenth low half-way; one of 130 samples has all it needs."""
+    """1500 pixels of 3 µm in 3235 texture points: a cosine of 12 µm has 8.8 of them, whose curvature of 0.24 leaves
+    0.64 % root mean square; one of 130 samples has all it needs."""
     light_field = vcc.LightField.from_views(
         np.ones((2, 2, 4, 1500), np.uint8), 0.1 * mm, 0.06 / 1000, math.inf, disparity_range=(0.0, 0.0)
     )
@@ -42,4 +42,5 @@ def test_a_mask_too_fine_for_its_texture_is_told(period, told):
     assert bool(notes) is told
     if told:
         assert "fine" in notes[0]
-        assert 0.01 < float(notes[0].split(": ")[1].split("%")[0]) / 100 < 0.1
+        said = float(notes[0].split(": ")[1].split("%")[0]) / 100
+        assert said == pytest.approx((1 - math.cos(2 * math.pi / 8.8)) / math.sqrt(2 * 720), rel=0.15)

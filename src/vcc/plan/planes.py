@@ -229,9 +229,11 @@ def _filtered(means: NDArray[np.float32], filters: list[Array]) -> NDArray[np.fl
 
 
 def texture_error(texture: NDArray[np.float32]) -> float:
-    """By how much linear interpolation between points of a texture errs half-way, root mean square.
+    """By how much what is looked up between points of a texture errs, root mean square over all places.
 
-    Estimated where the truth is known: every second point from its neighbours errs four times as much.
+    Textures make up for what linear interpolation takes, on average over places: of a curvature c, in points, what
+    is looked up a of the way between two points errs by c/12 − c·a(1 − a)/2, whose root mean square is c/√720. The
+    curvature is taken where the truth is known, at every second point between its neighbours.
 
     Args:
         texture: (rows, columns).
@@ -246,9 +248,9 @@ def texture_error(texture: NDArray[np.float32]) -> float:
     for along in (texture, texture.T):
         inner = along[:, : 1 + (along.shape[1] - 1) // 2 * 2]
         if inner.shape[1] >= 3:
-            off = inner[:, 1:-1:2] - (inner[:, :-2:2] + inner[:, 2::2]) / 2
+            off = inner[:, 1:-1:2] - (inner[:, :-2:2] + inner[:, 2::2]) / 2  # half of the curvature
             squares += float(np.mean(np.square(off, dtype=np.float64)))
-    return math.sqrt(squares) / 4 / largest
+    return math.sqrt(squares) * 2 / math.sqrt(720) / largest
 
 
 def _cleaned_lookup(step: Array, samples: tuple[int, int]) -> Array:
