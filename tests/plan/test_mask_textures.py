@@ -31,8 +31,8 @@ def test_flat_and_dark_textures_have_none():
 
 @pytest.mark.parametrize(("period", "told"), [(12 * um, True), (400 * um, False)])
 def test_a_mask_too_fine_for_its_texture_is_told(period, told):
-    """1500 pixels of 3 µm in 3235 texture points: a cosine of 12 µm has 8.8 of them, whose curvature of 0.24 leaves
-    0.64 % root mean square; one of 130 samples has all it needs."""
+    """1500 pixels of 3 µm in 3235 texture points: a cosine of 12 µm has 8.8 of them, whose curvature of 0.24
+    leaves 0.64 % root mean square; one of 130 samples has all it needs."""
     light_field = vcc.LightField.from_views(
         np.ones((2, 2, 4, 1500), np.uint8), 0.1 * mm, 0.06 / 1000, math.inf, disparity_range=(0.0, 0.0)
     )
