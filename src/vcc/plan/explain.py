@@ -125,7 +125,7 @@ def _sampling(plan: Plan) -> str:
     lines = [
         f"  a step from sample to sample is {step:.3g} pixel{'' if f'{step:.3g}' == '1' else 's'} on the sensor; "
         f"{relation}",
-        f"  interpolation within a view: {plan.interpolation}"
+        f"  interpolation within a view: {_interpolation(plan)}"
         + ("" if plan.separable else "; the frame shears the pixel grid, which takes the slower general path"),
     ]
     for kernel, what in ((plan.view_blur, "each view, in samples"), (plan.blur, "the picture, in pixels")):
@@ -136,6 +136,15 @@ def _sampling(plan: Plan) -> str:
             f"  gaps between views closed by a tent of {plan.smear[0]:.3g} × {plan.smear[1]:.3g} pixels half width"
         )
     return "Sampling\n" + "\n".join(lines)
+
+
+def _interpolation(plan: Plan) -> str:
+    """How values between samples are found, and what that takes given back, in words."""
+    by = {"spline": "cubic splines"}.get(plan.interpolation, plan.interpolation)
+    if plan.sharpen is None:
+        return by
+    size = "×".join(str(len(weights)) for weights in plan.sharpen)
+    return f"{by}, sharp: what that takes is given back by a filter of {size} weights"
 
 
 def _cost(plan: Plan, light_field: LightField, seconds: float | None) -> str:
