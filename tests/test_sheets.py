@@ -63,8 +63,9 @@ def test_a_hole_over_cells_is_right_to_the_rasters_points():
     # 16×16 points a rectangle: where rim and edge cross one point, a quarter of it at most is wrong. At
     # worst the rim runs along an edge, as it does here at (±3 mm, 0): then 16 of the 256 are.
     both = Product((Circle(6 * mm), Cells(CHECKERS, 8 * mm)))
-    found = both.mean(*GRID, 0.7 * mm, 0.5 * mm)
-    assert np.abs(found - by_points(both, *GRID, 0.7 * mm, 0.5 * mm)).max() < 16 * 0.25 / 256 + 1 / 200
+    places = GRID[0][:, ::3], GRID[1][::3]
+    found = both.mean(*places, 0.7 * mm, 0.5 * mm)
+    assert np.abs(found - by_points(both, *places, 0.7 * mm, 0.5 * mm)).max() < 16 * 0.25 / 256 + 1 / 200
 
 
 @pytest.mark.parametrize("middle", [(0.0, 0.0), (0.4 * mm, -0.3 * mm)])
