@@ -207,7 +207,7 @@ class Product(Pattern):
         Exact where all patterns are cells or clear sheets, or but one are clear. Else on a raster of 16 points
         across a rectangle (4 at least): each point holds the product of the patterns' means around it.
         """
-        factors = self._factors
+        factors = self.factors
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if not factors:
             return np.ones(np.broadcast_shapes(x.shape, y.shape))
@@ -226,7 +226,7 @@ class Product(Pattern):
         return found
 
     @cached_property
-    def _factors(self) -> tuple[Pattern, ...]:
+    def factors(self) -> tuple[Pattern, ...]:
         """The patterns, all that are made of rectangles multiplied to one, and what is clear left out."""
         # What is open or opaque is the same twice: two equal rims in one plane are one.
         simple: list[Pattern] = []
@@ -302,4 +302,7 @@ def in_one_plane(patterns: list[tuple[Pattern, tuple[float, float]]]) -> Pattern
         patterns: each with the place (x, y) of its middle, metres.
     """
     placed = tuple(Shifted(pattern, middle) if any(middle) else pattern for pattern, middle in patterns)
-    return placed[0] if len(placed) == 1 else Product(placed)
+    if len(placed) == 1:
+        return placed[0]
+    product = Product(placed)
+    return product.factors[0] if len(product.factors) == 1 else product

@@ -52,10 +52,9 @@ class Plane:
             patterns: each with the place of its middle, metres.
             label: what they are called.
         """
-        if len(patterns) == 1:
-            ((pattern, decentre),) = patterns
-        else:
-            pattern, decentre = in_one_plane(patterns), (0.0, 0.0)
+        # About their common middle where they have one, as each of them would be by itself.
+        decentre = patterns[0][1] if len({middle for _, middle in patterns}) == 1 else (0.0, 0.0)
+        pattern = in_one_plane([(one, (x - decentre[0], y - decentre[1])) for one, (x, y) in patterns])
         return cls(pattern, label, decentre, place[:, :4], place[:, 4] - np.array(decentre))
 
     @classmethod
