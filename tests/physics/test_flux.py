@@ -119,7 +119,7 @@ RADIANCE = 0.7
 
 
 def uniform_field(views: int = 20) -> vcc.LightField:
-    samples = np.full((views, views, 48, 48), RADIANCE)  # none of whose borders a filter of the picture meets
+    samples = np.full((views, views, 60, 60), RADIANCE)  # none of whose borders a filter of the picture meets
     return vcc.LightField.from_views(samples, 1 * mm, 2e-3, 2.0, disparity_range=(-0.1, 0.1))
 
 
