@@ -50,11 +50,16 @@ def test_larger_samples_are_filtered_at_their_own_distance(step):
 
 @pytest.mark.parametrize("step", [1.3, 2.0, 4.0])
 def test_splines_interpolate(step):
-    """Samples seen through a cubic B-spline are [1, 4, 1]/6 of themselves, which the filter undoes."""
+    """Samples seen through a cubic B-spline are [1, 4, 1]/6 of themselves, which the filter undoes.
+
+    Its inverse falls by 0.268 a sample; cut after two and a half of them, 0.268^2.5 · 2 = 7 % are left at worst.
+    """
     weights = along_axis(TENT, step, spline=True)
     inside = FREQUENCIES[FREQUENCIES < 0.4]
     seen = (4 + 2 * np.cos(2 * np.pi * step * inside)) / 6
-    np.testing.assert_allclose(gain_of(weights, inside) * seen, 1, atol=0.03)
+    np.testing.assert_allclose(gain_of(weights, inside) * seen, 1, atol=0.075)
+    low = step * inside < 0.2  # cycles a sample, where pictures have most of what they hold
+    np.testing.assert_allclose((gain_of(weights, inside) * seen)[low], 1, atol=0.05)
 
 
 def test_nothing_lost_is_nothing_done():
