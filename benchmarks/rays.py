@@ -28,7 +28,7 @@ from scipy.ndimage import map_coordinates
 import vcc
 from vcc import kernels, patterns
 from vcc.engines import record
-from vcc.plan.rays import RayPlan
+from vcc.plan.rays.model import RayPlan
 from vcc.units import mm, um
 
 LENS = vcc.Lens(focal_length=50 * mm, diameter=20 * mm)

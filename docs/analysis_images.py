@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import vcc
 from vcc.analysis import Refocuser, fft4, plot_spectrum, psf, sampling_advice
-from vcc.formats.transfer import encode
+from vcc.files.transfer import encode
 from vcc.kernels import TopHat
 from vcc.patterns import CosineSum
 from vcc.plot import plot_phase_space_stages
@@ -58,7 +58,7 @@ def draw_spectra(path: Path) -> None:
 
 def draw_refocused(path: Path) -> None:
     """The scene of the demo, focused near and far."""
-    from vcc.demo.scene import demo_scene
+    from vcc.showcase.scene import demo_scene
 
     field = demo_scene().light_field(
         (11, 11), (180, 250), spacing=2 * mm, slope_per_pixel=1.6e-3, focus_distance=1.3, dtype=np.float32
@@ -100,7 +100,7 @@ def draw_points(path: Path) -> None:
 
 def draw_phase_space(path: Path) -> None:
     """A row of pixels of the demo's scene on its way through a plenoptic camera of few, large lenslets."""
-    from vcc.demo.scene import demo_scene
+    from vcc.showcase.scene import demo_scene
 
     field = demo_scene().light_field(
         (1, 40), (180, 250), spacing=0.4 * mm, slope_per_pixel=1.2e-3, focus_distance=1.3, dtype=np.float32

@@ -9,13 +9,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import vcc
-from vcc.demo.scene import demo_scene
-from vcc.formats.transfer import from_linear
+from vcc.files.transfer import from_linear
 from vcc.gallery.entry import bench_for
 from vcc.gallery.heterodyne import designed, recorded
 from vcc.recover.heterodyne import decode_heterodyne, heterodyne_calibration
 from vcc.recover.heterodyne_band import band_limited, true_views
 from vcc.recover.plenoptic import decode_plenoptic, find_lenslets
+from vcc.showcase.scene import demo_scene
 from vcc.units import m, mm
 
 HERE = Path(__file__).parent / "images" / "decoding"

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import vcc
-from vcc.formats.transfer import from_linear
+from vcc.files.transfer import from_linear
 from vcc.recover.defocus_depth import defocus_kernels, depth_from_defocus
 from vcc.recover.depth import depth_by_plane_sweep, depth_by_structure_tensor, disparity_error
 from vcc.recover.stereo import depth_by_biprism

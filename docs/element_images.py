@@ -19,12 +19,12 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 import vcc
-from vcc.demo.scene import FAR, MIDDLE, NEAR, Chart, Foliage, demo_scene
-from vcc.formats.pictures import auto_exposure
-from vcc.formats.transfer import encode
+from vcc.files.pictures import auto_exposure
+from vcc.files.transfer import encode
 from vcc.plot import style
 from vcc.plot.tracing import trace
 from vcc.prescriptions.model import Prescription, Surface
+from vcc.showcase.scene import FAR, MIDDLE, NEAR, Chart, Foliage, demo_scene
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Painting
 from vcc.surfaces import Axicon, Cubic, Rough, Zernike

@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 
 import vcc
 from vcc.demo import run_demo
-from vcc.demo.scene import demo_scene
-from vcc.formats.pictures import auto_exposure
-from vcc.formats.transfer import encode
+from vcc.files.pictures import auto_exposure
+from vcc.files.transfer import encode
 from vcc.plot import style
+from vcc.showcase.scene import demo_scene
 from vcc.units import mm
 
 HERE = Path(__file__).parent / "images"

@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from vcc.formats.transfer import encode
+from vcc.files.transfer import encode
 from vcc.sources import CameraArray, DepthMapScene, Lighting, OpenGLRenderer, PlanesScene, TexturedPlane
 from vcc.sources.textures import Painting, Picture, Waves
 from vcc.units import deg, mm

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import vcc
-from vcc.formats.transfer import encode
+from vcc.files.transfer import encode
 from vcc.sources import CameraArray
 from vcc.sources.mitsuba import SCENES, DemoScene, MitsubaRenderer, demo_scene
 from vcc.sources.synthesis import synthesize

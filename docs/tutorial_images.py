@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from vcc.formats.pictures import read_picture
+from vcc.files.pictures import read_picture
 from vcc.plot import style
 
 PAGE = Path(__file__).parent / "tutorial.md"

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.optics.lattice import CellApertures
-from vcc.patterns import Bounded, Circle, Open
-from vcc.units import deg, mm, um
+from vcc.base.units import deg, mm, um
+from vcc.shapes.lattice import CellApertures
+from vcc.shapes.patterns import Bounded, Circle, Open
 
 LAYOUTS = ("square", "hexagonal")
 

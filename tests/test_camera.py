@@ -9,7 +9,7 @@ import pytest
 
 import vcc
 from vcc import Affine
-from vcc.units import mm, um
+from vcc.base.units import mm, um
 
 SENSOR = vcc.Sensor(52 * mm, (8, 10), 50 * um)
 LENS = vcc.Lens(focal_length=50 * mm)

@@ -11,9 +11,9 @@ import torch
 
 import vcc
 from vcc import Affine, LightField
-from vcc.kernels import Gaussian
+from vcc.base.units import mm
 from vcc.light_field import describe_geometry
-from vcc.units import mm
+from vcc.shapes.kernels import Gaussian
 
 FRAME = Affine.scaling(1e-3, 1e-3, -1e-3, -1e-3)
 

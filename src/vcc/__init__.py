@@ -9,12 +9,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from vcc.affine import Affine as Affine
+    from vcc.base.affine import Affine as Affine
+    from vcc.base.errors import InputError as InputError
+    from vcc.base.errors import ResultWarning as ResultWarning
     from vcc.camera import Camera as Camera
-    from vcc.camera_file import load_camera as load_camera
-    from vcc.electronics import Electronics as Electronics
-    from vcc.errors import InputError as InputError
-    from vcc.errors import ResultWarning as ResultWarning
+    from vcc.files.camera_file import load_camera as load_camera
     from vcc.formats import open_light_field as open_light_field
     from vcc.image import Image as Image
     from vcc.light_field import LightField as LightField
@@ -31,26 +30,27 @@ if TYPE_CHECKING:
     from vcc.optics import Prism as Prism
     from vcc.optics import PrismArray as PrismArray
     from vcc.optics import Pyramid as Pyramid
+    from vcc.optics.electronics import Electronics as Electronics
+    from vcc.optics.sensor import Sensor as Sensor
     from vcc.prescriptions import load_lens as load_lens
-    from vcc.recording import Recording as Recording
-    from vcc.recording import expose_image as expose_image
-    from vcc.recording import photon_transfer as photon_transfer
-    from vcc.sensor import Sensor as Sensor
+    from vcc.run.recording import Recording as Recording
+    from vcc.run.recording import expose_image as expose_image
+    from vcc.run.recording import photon_transfer as photon_transfer
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Affine": "vcc.affine",
+    "Affine": "vcc.base.affine",
     "Biprism": "vcc.optics",
     "Camera": "vcc.camera",
     "CodedDiffuser": "vcc.optics",
     "Diffuser": "vcc.optics",
-    "Electronics": "vcc.electronics",
+    "Electronics": "vcc.optics.electronics",
     "Element": "vcc.optics",
     "Faces": "vcc.optics",
     "FirstOrder": "vcc.optics",
     "Image": "vcc.image",
-    "InputError": "vcc.errors",
+    "InputError": "vcc.base.errors",
     "Lens": "vcc.optics",
     "LensArray": "vcc.optics",
     "LightField": "vcc.light_field",
@@ -59,14 +59,14 @@ _HOMES = {
     "Prism": "vcc.optics",
     "PrismArray": "vcc.optics",
     "Pyramid": "vcc.optics",
-    "Recording": "vcc.recording",
-    "ResultWarning": "vcc.errors",
-    "Sensor": "vcc.sensor",
-    "expose_image": "vcc.recording",
-    "load_camera": "vcc.camera_file",
+    "Recording": "vcc.run.recording",
+    "ResultWarning": "vcc.base.errors",
+    "Sensor": "vcc.optics.sensor",
+    "expose_image": "vcc.run.recording",
+    "load_camera": "vcc.files.camera_file",
     "load_lens": "vcc.prescriptions",
     "open_light_field": "vcc.formats",
-    "photon_transfer": "vcc.recording",
+    "photon_transfer": "vcc.run.recording",
 }
 _MODULES = {
     "analysis",

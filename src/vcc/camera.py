@@ -1,88 +1,24 @@
-"""A camera: elements along an axis and a sensor, checked once."""
+"""A camera: an optical train, and the verbs that users call."""
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import cached_property, cmp_to_key
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.light_field import LightField
-from vcc.optics.faces import Element, Faces
-from vcc.patterns import owned
-from vcc.sensor import Sensor
+from vcc.optics.train import Train
 
 if TYPE_CHECKING:
     from os import PathLike
 
+    from vcc.advice.explain import Explanation
     from vcc.engines import EngineName
     from vcc.image import Image
-    from vcc.plan.explain import Explanation
-    from vcc.plan.model import Plan
-    from vcc.plan.rays import RayPlan
-    from vcc.recording import Recording
+    from vcc.plan.footprints.model import Plan
+    from vcc.plan.rays.model import RayPlan
+    from vcc.run.recording import Recording
     from vcc.store import StoredLightField
-
-
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """One thing that light meets on its way through a camera.
-
-    Args:
-        element: what it is, or is a part of.
-        z: where it stands, metres (for an inner part of a thick element, where that element begins).
-        approach: rays from just behind the stage before (at first: from the entrance plane) to just before
-            this one, elements' own affine steps included; None of the lenses and prisms, which are faces.
-        faces: what it does, in coordinates centred on the element.
-    """
-
-    element: Element
-    z: float
-    approach: Affine
-    faces: Faces
-
-    def __post_init__(self) -> None:
-        if self.faces.pattern is not None:
-            named = owned(self.faces.pattern, self.element.label)
-            object.__setattr__(self, "faces", replace(self.faces, transmission=named))
-
-    @property
-    def centred(self) -> Affine | None:
-        """The affine deflection about the element's own middle, on rays of the camera."""
-        return None if self.faces.affine is None else about(self.element.decentre, self.faces.affine)
-
-    def bent(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Any, Any]:
-        """(Δs, Δt) of the deflection that is not affine, at camera places x, y; errors name the element."""
-        bending = self.faces.bending
-        assert bending is not None
-        with self.named():
-            return bending(x - self.element.decentre[0], y - self.element.decentre[1])
-
-    def deflected(self, rays: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rays (..., 4) of the camera just behind the deflection, affine or not; errors name the element."""
-        if self.centred is not None:
-            return np.asarray(self.centred(rays))
-        if self.faces.bending is None:
-            return rays
-        slopes = self.bent(rays[..., 0], rays[..., 1])
-        still = np.zeros_like(slopes[0])
-        return np.asarray(rays + np.stack([still, still, *slopes], axis=-1))
-
-    @contextmanager
-    def named(self) -> Iterator[None]:
-        """Errors raised within name the element."""
-        try:
-            yield
-        except InputError as error:
-            raise InputError(f"{self.element.label}: {error}") from None
 
 
 def _outline(light_field: LightField | StoredLightField) -> LightField:
@@ -93,33 +29,11 @@ def _outline(light_field: LightField | StoredLightField) -> LightField:
     return light_field.outline
 
 
-def touch(one: float, other: float) -> bool:
-    """Whether two places on the axis, metres, are the same but for rounding: to a billionth, or a picometre."""
-    return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-12)
-
-
-def _order(one: Element, other: Element) -> int:
-    """−1 where light meets ``one`` first, 1 where ``other``: by z, and in one plane what is thin first."""
-    difference = one.length - other.length if touch(one.z, other.z) else one.z - other.z
-    return int(np.sign(difference))
-
-
-def _distance(start: float, end: float) -> float:
-    """The way along the axis, metres; 0 where only rounding lies between."""
-    return 0.0 if touch(start, end) else end - start
-
-
-def about(middle: tuple[float, float], ray_map: Affine) -> Affine:
-    """A map of rays given in coordinates centred on ``middle``, on rays of the camera."""
-    x, y = middle
-    return Affine.translation(x, y, 0, 0) @ ray_map @ Affine.translation(-x, -y, 0, 0)
-
-
-@dataclass(frozen=True, init=False)
-class Camera:
+class Camera(Train):
     """Elements along an axis and a sensor behind them.
 
-    A light field given to the camera is taken to lie at the entrance plane, z = 0.
+    A light field given to the camera is taken to lie at the entrance plane, z = 0. Cameras of equal elements and
+    sensors are equal.
 
     Args:
         elements: in any order; kept sorted by z. Elements at the same z commute.
@@ -128,102 +42,6 @@ class Camera:
     Raises:
         InputError: an element before the entrance plane or behind the sensor, two elements of one name.
     """
-
-    elements: tuple[Element, ...]
-    sensor: Sensor
-
-    def __init__(self, elements: Iterable[Element], sensor: Sensor) -> None:
-        listed = tuple(elements)
-        for element in listed:
-            if not isinstance(element, Element):
-                raise InputError(f"a camera's elements are vcc.Element objects, not {type(element).__name__}")
-            if element.z < 0:
-                raise InputError(
-                    f"{element.label} stands before the entrance plane z = 0, where the light field is given: "
-                    "move the whole camera towards +z"
-                )
-            if element.z > sensor.z and not touch(element.z, sensor.z):
-                raise InputError(
-                    f"{element.label} (z = {element.z * 1e3:g} mm) stands behind the sensor "
-                    f"(z = {sensor.z * 1e3:g} mm): light never reaches it"
-                )
-            if element.z + element.length > sensor.z and not touch(element.z + element.length, sensor.z):
-                raise InputError(
-                    f"{element.label} ends at z = {(element.z + element.length) * 1e3:g} mm, behind the sensor "
-                    f"at z = {sensor.z * 1e3:g} mm"
-                )
-        if sensor.z < 0:
-            raise InputError(f"the sensor stands before the entrance plane: z = {sensor.z * 1e3:g} mm")
-        names = [element.name for element in listed if element.name]
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(f'{names.count(name)} elements are named "{name}": names must differ')
-        ordered = tuple(sorted(listed, key=cmp_to_key(_order)))
-        for before, after in itertools.pairwise(ordered):
-            if after.z < before.z + before.length and not touch(after.z, before.z + before.length):
-                raise InputError(
-                    f"{after.label} stands inside {before.label}, which reaches from z = {before.z * 1e3:g} mm to "
-                    f"{(before.z + before.length) * 1e3:g} mm"
-                )
-        object.__setattr__(self, "elements", ordered)
-        object.__setattr__(self, "sensor", sensor)
-
-    @cached_property
-    def _path(self) -> tuple[tuple[Stage, ...], Affine]:
-        stages = []
-        approach, here = Affine.identity(), 0.0
-        for element in self.elements:
-            approach = Affine.propagation(_distance(here, element.z)) @ approach
-            here = element.z
-            for part in element.parts():
-                if isinstance(part, Affine):
-                    approach = about(element.decentre, part) @ approach
-                    continue
-                stages.append(Stage(element, here, approach, part))
-                approach = Affine.identity()
-            here += element.length
-        return tuple(stages), Affine.propagation(_distance(here, self.sensor.z)) @ approach
-
-    @property
-    def stages(self) -> tuple[Stage, ...]:
-        """All that light meets on its way to the sensor, in order."""
-        return self._path[0]
-
-    @property
-    def approach_to_sensor(self) -> Affine:
-        """Rays from just behind the last stage (or from the entrance plane) to the sensor."""
-        return self._path[1]
-
-    def rays_at(self, z: float, *, before: bool = False) -> Affine:
-        """The map of rays from the entrance plane to the plane at z, all affine optics on the way folded.
-
-        What bends rays otherwise (lens arrays, phase plates) and what scatters them is passed over.
-
-        Args:
-            z: place on the axis, metres, 0 or more.
-            before: whether to stop before the elements that stand exactly at z, rather than behind them.
-
-        Raises:
-            InputError: z is before the entrance plane, or inside a thick element.
-        """
-        if z < 0:
-            raise InputError(f"z = {z * 1e3:g} mm lies before the entrance plane of the camera")
-        ray, here = Affine.identity(), 0.0
-        for element in self.elements:
-            here_too = touch(element.z, z)
-            if (here_too and before) or (element.z > z and not here_too):
-                break
-            if z < element.z + element.length and not touch(z, element.z + element.length):
-                raise InputError(
-                    f"z = {z * 1e3:g} mm lies inside {element.label}, which is known by its two ends only"
-                )
-            ray = Affine.propagation(_distance(here, element.z)) @ ray
-            here = element.z + element.length
-            for part in element.parts():
-                step = part if isinstance(part, Affine) else part.affine
-                if step is not None:
-                    ray = about(element.decentre, step) @ ray
-        return Affine.propagation(_distance(here, z)) @ ray
 
     def compile(
         self,
@@ -299,7 +117,7 @@ class Camera:
             engine: ``"numba"`` (default for NumPy arrays), ``"array_api"`` (default for PyTorch, JAX and
                 other arrays: carries gradients) or ``"reference"`` (slow; defines what is correct).
             memory_limit: for a light field on disk, bytes that its pieces, the picture and the engine may take
-                together; None takes `vcc.engines.pieces.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time by
+                together; None takes `vcc.run.pieces.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time by
                 rays, all of which are traced for each piece.
             progress: called with (done, total) as the work advances.
 
@@ -318,10 +136,10 @@ class Camera:
         """
         import warnings
 
+        from vcc.advice.darkness import why_dark
+        from vcc.base.errors import ResultWarning
         from vcc.engines import record
-        from vcc.errors import ResultWarning
         from vcc.image import Image
-        from vcc.plan.darkness import why_dark
 
         if between_views == "depth" and max(light_field.shape[:2]) > 1:
             light_field.disparity.maps(progress)  # found now, so that progress is seen
@@ -340,7 +158,7 @@ class Camera:
         if isinstance(light_field, LightField):
             recorded = record(plan, light_field.values, engine=engine, tolerance=tolerance, progress=progress)
         else:
-            from vcc.engines.pieces import record_pieces
+            from vcc.run.pieces import record_pieces
 
             recorded = record_pieces(
                 plan, light_field, engine=engine, tolerance=tolerance, memory_limit=memory_limit, progress=progress
@@ -398,7 +216,7 @@ class Camera:
         Warns:
             ResultWarning: as `capture` and `vcc.expose_image`.
         """
-        from vcc.recording import expose
+        from vcc.run.recording import expose
 
         return expose(self, light_field, exposure, seed=seed, radiance=radiance, ray_seed=ray_seed, **options)
 
@@ -410,11 +228,11 @@ class Camera:
             options: as in `capture`.
         """
         if not isinstance(light_field, LightField):
-            from vcc.engines.pieces import explain_pieces
+            from vcc.run.pieces import explain_pieces
 
             return explain_pieces(self, light_field, **options)
         options.pop("memory_limit", None)
-        from vcc.plan.explain import explain
+        from vcc.advice.explain import explain
 
         return explain(self, light_field, **options)
 
@@ -432,7 +250,7 @@ class Camera:
             light_field: given at the entrance plane.
             z: the plane, metres behind the entrance plane.
             before: whether to stop before the elements that stand exactly at z.
-            memory_limit: bytes that new samples may take; None takes `vcc.memory.MEMORY_LIMIT`.
+            memory_limit: bytes that new samples may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
                 Without a mask or a diffuser on the way nothing is allocated.
 
         Raises:
@@ -454,7 +272,7 @@ class Camera:
                     f"{stage.element.label} is not affine: behind it the light field has no frame. Choose a z "
                     "before it, or look at the picture (camera.capture)"
                 )
-        from vcc.operators import carried_to
+        from vcc.run.operators import carried_to
 
         return carried_to(self, light_field, z, before, memory_limit)
 
@@ -466,6 +284,6 @@ class Camera:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.camera_file`."""
-        from vcc.camera_file import save_camera
+        from vcc.files.camera_file import save_camera
 
         save_camera(self, path)

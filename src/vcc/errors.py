@@ -1,12 +1,11 @@
-"""What goes wrong, as types: one error for bad input, one warning for a result to be read with care."""
+"""What goes wrong, as types: the public face of `vcc.base.errors`."""
 
+from vcc.base.errors import (
+    InputError,
+    ResultWarning,
+)
 
-class InputError(ValueError):
-    """Something given to the camera, a light field or a file reader is unusable.
-
-    The message names the thing, its value and the way out.
-    """
-
-
-class ResultWarning(UserWarning):
-    """A result was made, but part of what was asked for was not there (rays, orientation, units)."""
+__all__ = [
+    "InputError",
+    "ResultWarning",
+]

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError
-from vcc.sampled import IMAGE_AXES, Index, sliced
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.fields.sampled import IMAGE_AXES, Index, sliced
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -79,18 +79,18 @@ class Image:
 
     def to_numpy(self) -> NDArray[np.float32]:
         """The values as a float32 NumPy array, wherever they are."""
-        from vcc.sampled import to_numpy
+        from vcc.fields.sampled import to_numpy
 
         return to_numpy(self.values).astype(np.float32, copy=False)
 
     def save(self, path: str | PathLike[str], **options: Any) -> Any:
-        """Write the picture; the ending of ``path`` chooses the format. See `vcc.formats.pictures.save_image`."""
-        from vcc.formats.pictures import save_image
+        """Write the picture; the ending of ``path`` chooses the format. See `vcc.files.pictures.save_image`."""
+        from vcc.files.pictures import save_image
 
         return save_image(self, path, **options)
 
     def __repr__(self) -> str:
-        from vcc.units import short
+        from vcc.base.units import short
 
         pitch = short(self.pixel_area**0.5)
         missing = f", {self.missing_rays:.1%} of the rays missing" if self.missing_rays > 0 else ""

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from vcc.affine import Affine
-from vcc.disparity import Disparities, DisparityMaps
-from vcc.errors import InputError
-from vcc.sampled import LIGHT_FIELD_AXES, Index, known, sliced, to_dtype, to_numpy
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.fields.disparity import Disparities, DisparityMaps
+from vcc.fields.sampled import LIGHT_FIELD_AXES, Index, known, sliced, to_dtype, to_numpy
 
 if TYPE_CHECKING:
     from vcc.image import Image
     from vcc.optics import Element, Mask
-    from vcc.sensor import Sensor
+    from vcc.optics.sensor import Sensor
 
 Sample = Literal["mean", "point"]
 """What a sample says of the scene: its mean over the cell of a pixel, or its value in the middle of the cell."""
@@ -66,7 +66,7 @@ class LightField:
         disparity: pixels per view along u of each pixel, (v, u, t, s) for all views or (t, s) for the middle one,
             which is ((rows − 1) // 2, (columns − 1) // 2), where known: what ``between_views="depth"`` of
             `vcc.Camera.capture` goes by. None finds it when it is first asked for. The attribute is a
-            `vcc.disparity.Disparities`.
+            `vcc.fields.disparity.Disparities`.
 
     Raises:
         InputError: not 4-D or 5-D, an empty axis, a dtype that is not unsigned integer or floating point,
@@ -280,12 +280,12 @@ class LightField:
 
         Args:
             mask: its z is not looked at: it lies where the light field is.
-            memory_limit: bytes that the new samples may take; None takes `vcc.memory.MEMORY_LIMIT`.
+            memory_limit: bytes that the new samples may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
         Raises:
             InputError: more memory needed than allowed.
         """
-        from vcc.operators import masked
+        from vcc.run.operators import masked
 
         return masked(self, mask, memory_limit)
 
@@ -301,14 +301,14 @@ class LightField:
         Args:
             diffuser: a `vcc.Diffuser`, a `vcc.CodedDiffuser` or any element that scatters and does not bend. Its z
                 is not looked at: it lies where the light field is. Its rim absorbs.
-            memory_limit: bytes that the new samples may take; None takes `vcc.memory.MEMORY_LIMIT`.
+            memory_limit: bytes that the new samples may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
         Raises:
             InputError: an element that does not scatter or that bends rays, a frame in which places depend on the
                 pixel and not on the view alone (a field that flew some distance), a kernel over more than 8192
                 samples, more memory needed than allowed.
         """
-        from vcc.operators import scattered
+        from vcc.run.operators import scattered
 
         return scattered(self, diffuser, memory_limit)
 
@@ -329,12 +329,12 @@ class LightField:
             frame: 5×5, from the new grid's indices to rays at this plane.
             shape: (v, u, t, s) of the new grid.
             interpolation: ``"nearest"``, ``"linear"`` (4-D) or ``"cubic"`` (4-D cubic spline, cut at zero).
-            memory_limit: bytes that the new samples may take; None takes `vcc.memory.MEMORY_LIMIT`.
+            memory_limit: bytes that the new samples may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
         Raises:
             InputError: more memory needed than allowed, an unknown interpolation or a wrong shape.
         """
-        from vcc.operators import resampled
+        from vcc.run.operators import resampled
 
         return resampled(self, frame, shape, interpolation, memory_limit)
 
@@ -344,7 +344,7 @@ class LightField:
         Args:
             sensor: its z is not looked at: it lies where the light field is.
         """
-        from vcc.operators import projected
+        from vcc.run.operators import projected
 
         return projected(self, sensor)
 
@@ -401,7 +401,7 @@ class LightField:
         )
 
     def _measure_disparity(self) -> tuple[float, float] | None:
-        from vcc.parallax import (
+        from vcc.fields.parallax import (
             disparity_range,
         )  # late: light fields come before what looks at them
 
@@ -455,7 +455,7 @@ def describe_geometry(light_field: LightField) -> str:
     separable = np.allclose(linear[[0, 0, 0, 1, 1, 1], [1, 2, 3, 0, 2, 3]], 0)
     if not separable:
         return "general frame"
-    from vcc.units import short
+    from vcc.base.units import short
 
     # What turns the outermost views by less than a millionth of a pixel is rounding.
     parallel = abs(linear[2, 0]) * light_field.shape[1] < 1e-6 * abs(linear[2, 2])

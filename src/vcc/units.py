@@ -1,147 +1,35 @@
-"""Units as plain factors to SI, so that code reads ``Lens(focal_length=50 * mm)``.
+"""Units as plain factors, ``50 * mm``: the public face of `vcc.base.units`."""
 
-Everything inside this library is in metres, radians and seconds; slopes are dimensionless.
-``parse`` reads a quantity with its unit, as camera files and the command line carry it.
-"""
+from vcc.base.units import (
+    cm,
+    deg,
+    m,
+    mm,
+    mrad,
+    ms,
+    nm,
+    parse,
+    rad,
+    s,
+    short,
+    text,
+    um,
+    us,
+)
 
-from __future__ import annotations
-
-import functools
-import math
-import re
-from typing import Any, Final
-
-from vcc.errors import InputError
-
-m: Final = 1.0
-cm: Final = 1e-2
-mm: Final = 1e-3
-um: Final = 1e-6
-nm: Final = 1e-9
-rad: Final = 1.0
-mrad: Final = 1e-3
-deg: Final = math.pi / 180.0
-s: Final = 1.0
-ms: Final = 1e-3
-us: Final = 1e-6
-
-
-_UNITS: Final[dict[str, dict[str, float]]] = {
-    "length": {"m": m, "cm": cm, "mm": mm, "um": um, "µm": um, "μm": um, "nm": nm},
-    "angle": {"rad": rad, "mrad": mrad, "deg": deg, "°": deg},
-    "time": {"s": s, "ms": ms, "us": us, "µs": us, "μs": us},
-}
-"""The units read without pint: the factors of this module, so that "48 um" is 48 * um exactly."""
-_WRITTEN: Final[dict[str, tuple[str, ...]]] = {
-    "length": ("m", "mm", "um", "nm"),
-    "angle": ("rad", "mrad", "deg"),
-    "time": ("s", "ms", "us"),
-}
-SI_NAMES: Final = {"length": "metre", "angle": "radian", "time": "second"}
-_EXAMPLES: Final = {"length": "50 mm", "angle": "2 deg", "time": "10 ms"}
-_QUANTITY: Final = re.compile(r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*(.*)", re.DOTALL)
-_UNIT_NAME: Final = re.compile(r"[^\W\d]+|°")
-
-
-@functools.cache
-def _registry() -> Any:
-    import pint  # 0.3 s to import: only those who write uncommon units pay for it
-
-    return pint.UnitRegistry()
-
-
-def parse(text: object, dimension: str, what: str) -> float:
-    """The SI value of a quantity written with its unit, such as ``"50 mm"``.
-
-    Units are those of this module and all that pint knows by name (``"2 inch"``, ``"30 arcmin"``).
-
-    Args:
-        text: the quantity, a string with a number and a unit.
-        dimension: ``"length"`` (metres), ``"angle"`` (radians) or ``"time"`` (seconds).
-        what: how to name the quantity in an error, such as ``'focal_length of lens "L1"'``.
-
-    Raises:
-        InputError: not a string, no unit, an unknown unit, or a unit of another dimension.
-    """
-    kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
-    if not isinstance(text, str):
-        raise InputError(f'{what} is {text!r}: {kind} needs a unit, written as text, e.g. "{example}"')
-    match = _QUANTITY.fullmatch(text.strip())
-    if match is None:
-        raise InputError(f'{what} is "{text}", which is not {kind}; write it like "{example}"')
-    number, unit = float(match[1]), match[2]
-    if not unit:
-        raise InputError(f'{what} is "{text}": {kind} needs a unit, e.g. "{example}"')
-    factor = _UNITS[dimension].get(unit)
-    if factor is None:
-        factor = _factor_by_pint(unit, dimension, f'{what} is "{text}"')
-    return number * factor
-
-
-def _factor_by_pint(unit: str, dimension: str, what: str) -> float:
-    """The factor to SI of a unit that this module does not define itself."""
-    kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
-    if not _UNIT_NAME.fullmatch(unit):  # pint would take it for arithmetic
-        raise InputError(f'{what}, and "{unit}" is not a unit of {dimension}; write {kind} like "{example}"')
-    import pint
-
-    try:
-        return float(_registry().Quantity(1.0, unit).to(SI_NAMES[dimension]).magnitude)
-    except pint.UndefinedUnitError:
-        raise InputError(f'{what}, and "{unit}" is not a known unit; write {kind} like "{example}"') from None
-    except pint.PintError:  # another dimension, or a scale with an offset such as degC
-        raise InputError(f'{what}, which is not {kind}; write it like "{example}"') from None
-
-
-def text(value: float, dimension: str = "length", *, exact: bool = False) -> str:
-    """A value in SI, written with the unit in which it reads best, such as ``"50 mm"``.
-
-    Args:
-        value: metres, radians or seconds.
-        dimension: ``"length"``, ``"angle"`` or ``"time"``.
-        exact: whether ``parse(text(value, dimension, exact=True), dimension, "")`` must give the same
-            float back, bit by bit, as files need it; else 15 digits do, which hide rounding.
-    """
-    names = _WRITTEN[dimension]
-    value = float(value)
-    if value == 0 or not math.isfinite(value):
-        return f"{value:g} {names[0]}"
-    best = _best_unit(value, names, dimension)
-    ordered = [best, *(name for name in names if name != best)]
-    if dimension == "angle":  # the shortest is the one that was meant: 45 deg, 0.2 rad
-        ordered.sort(key=lambda name: len(_written(value, name, dimension, 15)))
-    if not exact:
-        return _written(value, ordered[0], dimension, 15)
-    # In SI the factor is 1, and 17 digits always give the float back.
-    candidates = [_written(value, name, dimension, n) for n in (15, 17) for name in ordered]
-    faithful = [each for each in candidates if parse(each, dimension, "it") == value]
-    short = [each for each in faithful if "e" not in each]
-    return faithful[0] if faithful[0] == candidates[0] else min(short or faithful, key=len)
-
-
-def short(value: float, dimension: str = "length", digits: int = 6) -> str:
-    """A value for people to read, rounded to so many digits: ``"59.4562 mm"``, ``"1°"``; see `text`."""
-    value = float(value)
-    if dimension != "angle" or value == 0 or not math.isfinite(value):
-        return text(float(f"{value:.{digits}g}"), dimension)
-    # Rounded in each unit by itself: 1° is no round number of radians, and is not to look like one.
-    names = _WRITTEN[dimension]
-    best = _best_unit(value, names, dimension)
-    ordered = [best, *(name for name in names if name != best)]
-    return min((_written(value, name, dimension, digits).replace(" deg", "°") for name in ordered), key=len)
-
-
-def _best_unit(value: float, names: tuple[str, ...], dimension: str) -> str:
-    """The largest unit in which the number is at least 1."""
-    for name in names:
-        if abs(value) >= _UNITS[dimension][name] * 0.9999999:
-            return name
-    return names[-1]
-
-
-def _written(value: float, unit: str, dimension: str, digits: int) -> str:
-    return f"{value / _UNITS[dimension][unit]:.{digits}g} {unit}"
-
-
-def _article(dimension: str) -> str:
-    return "an" if dimension == "angle" else "a"
+__all__ = [
+    "cm",
+    "deg",
+    "m",
+    "mm",
+    "mrad",
+    "ms",
+    "nm",
+    "parse",
+    "rad",
+    "s",
+    "short",
+    "text",
+    "um",
+    "us",
+]

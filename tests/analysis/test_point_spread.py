@@ -14,10 +14,10 @@ from scipy.special import j1
 
 import vcc
 from vcc.analysis import expected_deblurring_error, mtf, natural_image_power, otf, psf
-from vcc.kernels import Gaussian, TopHat
-from vcc.patterns import Circle
-from vcc.surfaces import Cubic
-from vcc.units import mm, um
+from vcc.base.units import mm, um
+from vcc.shapes.kernels import Gaussian, TopHat
+from vcc.shapes.patterns import Circle
+from vcc.shapes.surfaces import Cubic
 
 F, DIAMETER, PITCH, Z = 50 * mm, 10 * mm, 10 * um, 1.0
 IMAGE = 1 / (1 / F - 1 / Z)

@@ -7,7 +7,7 @@ import pytest
 
 import vcc
 from vcc.analysis import Refocuser
-from vcc.units import mm
+from vcc.base.units import mm
 
 DV, DU, PT, PS = 2 * mm, 2.5 * mm, 2.4e-3, 2e-3
 PIXELS = (58, 65)

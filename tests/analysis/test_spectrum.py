@@ -26,9 +26,9 @@ from vcc.analysis import (
     plot_spectrum,
     samples_of,
 )
-from vcc.kernels import Gaussian, TopHat
-from vcc.patterns import Circle, CosineSum
-from vcc.units import mm
+from vcc.base.units import mm
+from vcc.shapes.kernels import Gaussian, TopHat
+from vcc.shapes.patterns import Circle, CosineSum
 
 SIZES = np.array([20, 18, 21, 19])
 """Along (u, v, s, t)."""

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import vcc
 from vcc.cli import info
 from vcc.cli.commands import app
-from vcc.formats import transfer
+from vcc.files import transfer
 from vcc.formats.writing import save_light_field
 
 

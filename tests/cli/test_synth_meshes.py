@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 import vcc
+from vcc.base.units import deg, mm
 from vcc.cli.commands import app
 from vcc.sources import CameraArray
-from vcc.units import deg, mm
 
 SMALL = ("--views", 2, 3)
 

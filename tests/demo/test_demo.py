@@ -10,15 +10,15 @@ import pytest
 from rich.console import Console
 
 import vcc
+from vcc.base.units import mm
 from vcc.demo import DemoReport, Timing, run_demo
-from vcc.demo.bench import built_in
 from vcc.demo.report import duration, speed_up
-from vcc.demo.scene import demo_scene
-from vcc.demo.truth import true_picture
-from vcc.formats.pictures import read_picture
+from vcc.files.pictures import read_picture
+from vcc.showcase.bench import built_in
+from vcc.showcase.scene import demo_scene
+from vcc.showcase.truth import true_picture
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.units import mm
 
 
 @pytest.fixture(scope="module")
@@ -160,7 +160,7 @@ def test_the_warm_up_runs_every_loop_that_is_timed_later(monkeypatch):
 
     from vcc import engines
     from vcc.demo import run
-    from vcc.demo.bench import built_in
+    from vcc.showcase.bench import built_in
 
     small = built_in(small=True)
     assert small.scene is not None

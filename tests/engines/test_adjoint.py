@@ -13,8 +13,8 @@ import pytest
 import torch
 
 import vcc
-from vcc.patterns import CosineSum
-from vcc.units import mm
+from vcc.base.units import mm
+from vcc.shapes.patterns import CosineSum
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

@@ -14,8 +14,8 @@ import torch
 
 import vcc
 from vcc import Affine
-from vcc.patterns import CosineSum
-from vcc.units import mm
+from vcc.base.units import mm
+from vcc.shapes.patterns import CosineSum
 
 # Cameras here ask for what they like.
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.disparity import DisparityMaps
+from vcc.base.units import mm
 from vcc.engines.depth_views import DenserViews, InMemory
+from vcc.fields.disparity import DisparityMaps
 from vcc.plan.depth_rule import Parallax, ViewsBetween
 from vcc.store import open_store, save_store
-from vcc.units import mm
 
 SPACING, SLOPE, FOCUS = 1 * mm, 1e-3, 1.0
 FRAME = vcc.LightField.from_views(np.zeros((3, 3, 4, 4), np.float32), SPACING, SLOPE, FOCUS).frame

@@ -15,12 +15,12 @@ import pytest
 import torch
 
 import vcc
-from vcc import kernels, patterns, surfaces
+from vcc.base.units import mm
 from vcc.optics import Element, Faces, Lattice
-from vcc.optics.lattice import CellApertures
-from vcc.plan.rays import CellWindows, RayPlan, Window
-from vcc.sheets import Product
-from vcc.units import mm
+from vcc.plan.rays.model import CellWindows, RayPlan, Window
+from vcc.shapes import kernels, patterns, surfaces
+from vcc.shapes.lattice import CellApertures
+from vcc.shapes.sheets import Product
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.advice.explain_rays import expected_memory
+from vcc.base.units import mm
 from vcc.engines.sharpening import kept_as, sharpened
-from vcc.plan.explain_rays import expected_memory
-from vcc.plan.ray_compiler import compile_rays
-from vcc.plan.ray_sharpening import sharpening
+from vcc.plan.rays.compile import compile_rays
+from vcc.plan.rays.sharpening import sharpening
 from vcc.store import save_store
-from vcc.units import mm
 
 FOCUS = 1.0
 D = 1 / (1 / 50e-3 - 1 / FOCUS)
@@ -150,7 +150,8 @@ def test_a_picture_of_an_even_scene_keeps_its_light():
 @pytest.mark.parametrize("kind", ["uint8", "float32"])
 @pytest.mark.parametrize("channels", [(), (3,)])
 def test_pictures_agree_between_engines_and_in_pieces(tmp_path, kind, channels):
-    from vcc.engines import pieces, record
+    from vcc.engines import record
+    from vcc.run import pieces
 
     values = random((4, 5, 14, 16, *channels), kind)
     lf = field(values)

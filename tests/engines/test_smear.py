@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm, um
 from vcc.engines.smear import band_matrix, blurred, tent
-from vcc.units import mm, um
 
 
 @pytest.mark.parametrize("half_width", [1.0, 1.3, 2.0, 7.77, 40.0, 200.5])

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm
 from vcc.engines import run_plan
 from vcc.engines.smear import band_matrix
-from vcc.plan.footprint import shares
-from vcc.plan.model import MaskLookup, Plan
-from vcc.units import mm
+from vcc.plan.footprints.model import MaskLookup, Plan
+from vcc.plan.footprints.shares import shares
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vcc import Affine, LightField
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats import arrays
 
 

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from small_views import moving_texture
 
-from vcc.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning
 from vcc.formats import SparseViews, open_light_field, open_sparse_views, read_geometry, read_ground_truth
 from vcc.light_field import LightField
 

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from small_views import moving_texture
 
-from vcc.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning
 from vcc.formats import open_light_field, read_container, read_geometry, read_ground_truth
 
 h5py = pytest.importorskip("h5py")

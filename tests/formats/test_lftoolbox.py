@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError, ResultWarning
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError, ResultWarning
 from vcc.formats import lftoolbox, open_light_field, read_container, read_geometry
 from vcc.light_field import LightField
 

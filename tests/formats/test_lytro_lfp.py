@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats import lytro_lfp
 from vcc.formats.lytro_lfp import read_lytro, unpack
 

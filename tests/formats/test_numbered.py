@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from small_views import moving_texture, png
 
-from vcc.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning
 from vcc.formats import open_light_field, open_sparse_views, read_geometry
 from vcc.formats.numbered import running_numbers
 

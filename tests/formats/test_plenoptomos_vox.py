@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vcc import LightField
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats import plenoptomos_vox as vox
 
 h5py = pytest.importorskip("h5py", reason="h5py is not installed")

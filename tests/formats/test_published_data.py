@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from vcc import parallax
-from vcc.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning
+from vcc.fields import parallax
 from vcc.formats import open_light_field, open_sparse_views, read_geometry, read_ground_truth
 from vcc.formats.reading import Transfer
 from vcc.light_field import LightField

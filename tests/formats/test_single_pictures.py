@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vcc.errors import InputError, ResultWarning
-from vcc.formats import eslf, open_light_field, read_container, read_ground_truth, transfer
-from vcc.formats.pfm import read_pfm
-from vcc.formats.pictures import read_picture
+from vcc.base.errors import InputError, ResultWarning
+from vcc.files import transfer
+from vcc.files.pfm import read_pfm
+from vcc.files.pictures import read_picture
+from vcc.formats import eslf, open_light_field, read_container, read_ground_truth
 from vcc.light_field import LightField
 
 GIVEN = {"spacing": 1e-3, "slope_per_pixel": 1e-3, "focus_distance": 1.0}

@@ -7,8 +7,9 @@ import pytest
 from scipy import ndimage
 
 from vcc import LightField
-from vcc.errors import InputError
-from vcc.formats import transfer, video
+from vcc.base.errors import InputError
+from vcc.files import transfer
+from vcc.formats import video
 
 av = pytest.importorskip("av", reason="PyAV is not installed")
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vcc.errors import InputError, ResultWarning
-from vcc.formats import open_light_field, read_geometry, transfer
+from vcc.base.errors import InputError, ResultWarning
+from vcc.files import transfer
+from vcc.formats import open_light_field, read_geometry
 from vcc.light_field import LightField
 
 Views = NDArray[np.uint8]

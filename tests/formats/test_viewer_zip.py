@@ -7,7 +7,7 @@ import imagecodecs
 import numpy as np
 import pytest
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats import viewer_zip
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from vcc import Affine, InputError, LightField, ResultWarning, open_light_field
-from vcc.formats import read_geometry, transfer
+from vcc.files import transfer
+from vcc.formats import read_geometry
 from vcc.formats.writing import save_folder, save_light_field
 
 RNG = np.random.default_rng(1)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm
 from vcc.gallery import coded_aperture_depth as coded
 from vcc.gallery import entry
 from vcc.gallery.entry import bench_for
 from vcc.recover import DefocusDepth
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Picture
-from vcc.units import mm
 
 NEAR, FAR = 0.8, 2.0
 SPACING, SLOPE, CONVERGENCE = 20 * mm / 13, 0.36 / 200, 1.2

@@ -10,7 +10,7 @@ import pytest
 
 import vcc
 from vcc.analysis import expected_deblurring_error, natural_image_power
-from vcc.demo.scene import MIDDLE
+from vcc.base.units import mm
 from vcc.gallery import coded_aperture_refocusing as entry
 from vcc.gallery import flat_target
 from vcc.gallery.entry import bench_for
@@ -18,10 +18,10 @@ from vcc.gallery.flat_target import OPENING
 from vcc.gallery.good_apertures import picture_of_the_prior
 from vcc.gallery.published_codes import VEERARAGHAVAN
 from vcc.optics import Mask
-from vcc.patterns import Open
+from vcc.shapes.patterns import Open
+from vcc.showcase.scene import MIDDLE
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.units import mm
 
 MEAN = 0.5
 SCENE = PlanesScene([TexturedPlane(Waves(0.03), 0.8, width=0.16), TexturedPlane(Waves(0.07, seed=1), 2.0)])

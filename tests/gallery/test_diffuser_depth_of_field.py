@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm
 from vcc.gallery import diffuser_depth_of_field as diffuser
 from vcc.gallery import entry, extended_depth
 from vcc.gallery.entry import bench_for
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.units import mm
 
 SCENE = PlanesScene([TexturedPlane(Waves(0.03), 0.8, width=0.16), TexturedPlane(Waves(0.07, seed=1), 2.0)])
 

@@ -10,8 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 import vcc
+from vcc.base.units import mm
 from vcc.cli import commands
-from vcc.formats.pictures import read_picture
+from vcc.files.pictures import read_picture
 from vcc.formats.writing import save_light_field
 from vcc.gallery import ENTRIES, Entry, Finding, Picture, Result, entries, entry, extended_depth, write_entry
 from vcc.gallery import biprism_stereo as biprism
@@ -21,7 +22,6 @@ from vcc.gallery import wavefront_coding as wavefront
 from vcc.gallery.entry import bench_for
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.units import mm
 
 NEAR, FAR = 0.8, 2.0
 SPACING, SLOPE, CONVERGENCE = 20 * mm / 9, 0.4 / 96, 1.2

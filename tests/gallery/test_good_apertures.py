@@ -10,6 +10,7 @@ import pytest
 
 import vcc
 from vcc.analysis import natural_image_power, optimised_aperture
+from vcc.base.units import mm
 from vcc.gallery import flat_target
 from vcc.gallery import good_apertures as entry
 from vcc.gallery.entry import bench_for
@@ -18,7 +19,6 @@ from vcc.gallery.published_codes import LEVIN, VEERARAGHAVAN, ZHOU_NAYAR
 from vcc.optics import Mask
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.units import mm
 
 SCENE = PlanesScene([TexturedPlane(Waves(0.03), 0.8, width=0.16), TexturedPlane(Waves(0.07, seed=1), 2.0)])
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm
 from vcc.gallery import heterodyne
 from vcc.gallery.entry import bench_for
 from vcc.recover.heterodyne import HeterodyneGeometry
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.units import mm
 
 NEAR, FAR, CONVERGENCE = 0.8, 2.0, 1.2
 VIEWS, PIXELS, SLOPE = 10, 96, 0.4 / 96

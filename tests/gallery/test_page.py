@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from scipy.ndimage import gaussian_filter
 
 import vcc
-from vcc.formats.pictures import read_picture
+from vcc.files.pictures import read_picture
 from vcc.gallery import Entry, Finding, Picture, Result, write_entry_markdown
 
 RAMP = np.broadcast_to(np.linspace(0, 1, 96, dtype=np.float32)[None, :, None], (64, 96, 3))

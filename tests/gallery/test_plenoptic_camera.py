@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.demo.bench import Bench
+from vcc.base.units import mm, um
 from vcc.gallery import entry, fringes
 from vcc.gallery import plenoptic as gallery
 from vcc.recover import without_aberration
+from vcc.shapes.surfaces import Tilt, Zernike
+from vcc.showcase.bench import Bench
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.surfaces import Tilt, Zernike
-from vcc.units import mm, um
 
 FOCUS, DISTANCE = 1.2, 0.9
 SLOPE, PIXELS = 0.001, 150

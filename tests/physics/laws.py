@@ -28,7 +28,7 @@ from random_cameras import BENT, Case
 from random_tracer import Bench, decibels
 
 import vcc
-from vcc import kernels, patterns, surfaces
+from vcc.shapes import kernels, patterns, surfaces
 from vcc.store import save_store
 
 Array = NDArray[np.float64]

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from random_tracer import Bench, Plane, Scene
 
 import vcc
-from vcc import kernels, patterns, surfaces
-from vcc.units import m, mm
+from vcc.base.units import m, mm
+from vcc.shapes import kernels, patterns, surfaces
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.patterns import Cells, Circle
-from vcc.plan.rays import RayPlan, Window
-from vcc.units import mm
+from vcc.base.units import mm
+from vcc.plan.rays.model import RayPlan, Window
+from vcc.shapes.patterns import Cells, Circle
 
 
 def ones(views: int, spacing: float, slopes: float, pixels: int = 8) -> vcc.LightField:

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm, um
 from vcc.plot.tracing import trace
-from vcc.units import mm, um
 
 EXACT = 1e-12
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
 import vcc
-from vcc.patterns import CosineSum
-from vcc.units import mm
+from vcc.base.units import mm
+from vcc.shapes.patterns import CosineSum
 
 # A piece holds fewer rays than the camera asks for, and each picture says so.
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")

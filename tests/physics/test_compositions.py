@@ -13,10 +13,10 @@ import pytest
 from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 
 import vcc
-from vcc.affine import Affine
-from vcc.kernels import Gaussian
-from vcc.patterns import Circle, CosineSum, Open
-from vcc.units import m, mm
+from vcc.base.affine import Affine
+from vcc.base.units import m, mm
+from vcc.shapes.kernels import Gaussian
+from vcc.shapes.patterns import Circle, CosineSum, Open
 
 FOCAL_LENGTH, FOCUS = 50 * mm, 1 * m
 DISTANCE = 1 / (1 / FOCAL_LENGTH - 1 / FOCUS)

@@ -35,9 +35,9 @@ from scipy.signal import convolve2d
 from two_planes import TwoPlanes
 
 import vcc
-from vcc.kernels import Gaussian, Samples, TopHat
-from vcc.patterns import Circle, CosineSum
-from vcc.units import m, mm
+from vcc.base.units import m, mm
+from vcc.shapes.kernels import Gaussian, Samples, TopHat
+from vcc.shapes.patterns import Circle, CosineSum
 
 F, FOCUS = 50 * mm, 1 * m
 D = 1 / (1 / F - 1 / FOCUS)

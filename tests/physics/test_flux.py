@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.units import mm
+from vcc.base.units import mm
 
 # A sensor that catches everything is wider than the views' pictures, and the camera says so.
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")

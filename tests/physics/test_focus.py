@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.units import m, mm, mrad
+from vcc.base.units import m, mm, mrad
 
 FOCAL_LENGTH = 50 * mm
 

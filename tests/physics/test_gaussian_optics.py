@@ -9,9 +9,9 @@ import pytest
 
 import vcc
 from vcc import FirstOrder
-from vcc.patterns import Circle
+from vcc.base.units import mm, um
 from vcc.prescriptions import Prescription, Surface
-from vcc.units import mm, um
+from vcc.shapes.patterns import Circle
 
 # A lens of our own: (radius, gap behind, index behind, diameter) in millimetres; radius None is the stop.
 LENS = (

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import vcc
 from vcc import Affine, Image, LightField
-from vcc.units import m, mm
+from vcc.base.units import m, mm
 
 SHAPE = (5, 7, 11, 13)  # v, u, t, s
 

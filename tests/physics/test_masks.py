@@ -15,8 +15,8 @@ import pytest
 from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, square_stop, views
 
 import vcc
-from vcc.patterns import Circle, CosineSum
-from vcc.units import m, mm, um
+from vcc.base.units import m, mm, um
+from vcc.shapes.patterns import Circle, CosineSum
 
 FOCAL_LENGTH, DIAMETER = 50 * mm, 16 * mm
 VIEWS, PIXELS, SENSOR = 20, 112, 64

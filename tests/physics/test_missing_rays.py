@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.units import mm
+from vcc.base.units import mm
 
 FOCAL_LENGTH = 50 * mm
 

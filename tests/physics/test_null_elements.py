@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm
 from vcc.optics import CellDeflection, Faces, FacetDeflection, Lattice
-from vcc.plan.model import Plan
-from vcc.surfaces import Axicon, Cubic, HeightMap, PathMap, Rough, Tilt, Zernike
-from vcc.units import mm
+from vcc.plan.footprints.model import Plan
+from vcc.shapes.surfaces import Axicon, Cubic, HeightMap, PathMap, Rough, Tilt, Zernike
 
 D = 1 / (1 / 50e-3 - 1)
 NOTHING = {

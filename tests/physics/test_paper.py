@@ -16,8 +16,8 @@ from scipy.ndimage import affine_transform
 
 import vcc
 from vcc import Affine
-from vcc.patterns import CosineSum
-from vcc.units import m, mm
+from vcc.base.units import m, mm
+from vcc.shapes.patterns import CosineSum
 
 # -- matrices: the paper writes rows [u v s t]·M with s, t of the opposite sign
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm, nm, um
 from vcc.optics import SlopeFunction, SurfaceDeflection
 from vcc.plot.tracing import trace
-from vcc.surfaces import (
+from vcc.shapes.surfaces import (
     Axicon,
     Cubic,
     HeightMap,
@@ -20,7 +21,6 @@ from vcc.surfaces import (
     Tilt,
     Zernike,
 )
-from vcc.units import mm, nm, um
 
 FOCUS = 50 * mm
 RNG = np.random.default_rng(9)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.electronics import Electronics
+from vcc.optics.electronics import Electronics
 
 LEVELS = np.arange(1, 13) / 12
 """Twelve flats up to 70 % of saturation, where EMVA 1288 fits."""

@@ -22,8 +22,8 @@ from ray_oracle import Bench, Thin, agree, cells, disc, grown, lens, nearest_cen
 from two_planes import TwoPlanes
 
 import vcc
-from vcc.kernels import Gaussian, TopHat
-from vcc.units import m, mm, um
+from vcc.base.units import m, mm, um
+from vcc.shapes.kernels import Gaussian, TopHat
 
 F, FOCUS = 50 * mm, 1 * m
 D = 1 / (1 / F - 1 / FOCUS)

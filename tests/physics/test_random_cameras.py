@@ -12,7 +12,7 @@ from random_cameras import AFFINE, BENT, KINDS, drawn
 from random_tracer import Bench, Plane, Scene, Table
 
 import vcc
-from vcc.units import mm
+from vcc.base.units import mm
 
 SLOW = {"stores"}
 """Laws that take half a second a camera."""

@@ -18,11 +18,11 @@ from scipy.integrate import quad
 from two_planes import TwoPlanes
 
 import vcc
-from vcc.errors import ResultWarning
-from vcc.kernels import Gaussian
-from vcc.patterns import Circle, CosineSum
-from vcc.surfaces import Axicon, Cubic, PathMap
-from vcc.units import m, mm
+from vcc.base.errors import ResultWarning
+from vcc.base.units import m, mm
+from vcc.shapes.kernels import Gaussian
+from vcc.shapes.patterns import Circle, CosineSum
+from vcc.shapes.surfaces import Axicon, Cubic, PathMap
 
 F, FOCUS = 50 * mm, 1 * m
 D = 1 / (1 / F - 1 / FOCUS)

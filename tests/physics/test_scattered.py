@@ -14,8 +14,8 @@ import pytest
 
 import vcc
 from vcc import Affine
-from vcc.kernels import Gaussian, Kernel, Radial, Samples, TopHat
-from vcc.units import m, mm
+from vcc.base.units import m, mm
+from vcc.shapes.kernels import Gaussian, Kernel, Radial, Samples, TopHat
 
 VIEWS, PIXELS, SPACING, SLOPE = (3, 4), (18, 22), (2 * mm, 1.5 * mm), (2e-3, 1e-3)
 

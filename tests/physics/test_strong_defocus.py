@@ -13,7 +13,7 @@ from brute_force import Layer, Scene, Texture, cosines, psnr, views
 from scipy.special import j1
 
 import vcc
-from vcc.units import m, mm
+from vcc.base.units import m, mm
 
 FOCAL_LENGTH, SPACING, SLOPE, FOCUS = 50 * mm, 1 * mm, 1e-3, 1 * m
 VIEWS, PIXELS = 16, 96

@@ -17,7 +17,7 @@ import pytest
 from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 
 import vcc
-from vcc.units import m, mm
+from vcc.base.units import m, mm
 
 FOCAL_LENGTH, DIAMETER = 50 * mm, 16 * mm
 VIEWS, PIXELS, SENSOR = 20, 112, 64

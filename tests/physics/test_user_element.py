@@ -16,10 +16,10 @@ from ray_oracle import Bench, Thin, agree, disc, lens
 from two_planes import TwoPlanes
 
 import vcc
+from vcc.base.units import m, mm, nm
 from vcc.engines import record
-from vcc.kernels import Gaussian
-from vcc.patterns import Circle
-from vcc.units import m, mm, nm
+from vcc.shapes.kernels import Gaussian
+from vcc.shapes.patterns import Circle
 
 F, FOCUS = 50 * mm, 1 * m
 D = 1 / (1 / F - 1 / FOCUS)

@@ -12,7 +12,7 @@ import pytest
 from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 
 import vcc
-from vcc.units import m, mm
+from vcc.base.units import m, mm
 
 FOCAL_LENGTH, SPACING, SLOPE, FOCUS = 50 * mm, 1 * mm, 1e-3, 1 * m
 VIEWS, PIXELS, SENSOR = 7, 88, 40

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc import kernels, surfaces
-from vcc.patterns import CosineSum, Open
-from vcc.plan.diffuser_rules import Blurs, diffusers_as_blurs
-from vcc.plan.model import Plan
-from vcc.plan.rays import RayPlan
-from vcc.units import mm
+from vcc.base.units import mm
+from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
+from vcc.plan.footprints.model import Plan
+from vcc.plan.rays.model import RayPlan
+from vcc.shapes import kernels, surfaces
+from vcc.shapes.patterns import CosineSum, Open
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")  # cameras here ask for what they like
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from vcc.plan.footprint import Division, cumulative, shares, taps, weight
+from vcc.plan.footprints.shares import Division, cumulative, shares, taps, weight
 
 STEPS = st.floats(0.05, 7.0).flatmap(lambda step: st.sampled_from([step, -step]))
 

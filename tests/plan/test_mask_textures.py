@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc import patterns
-from vcc.plan.planes import texture_error
-from vcc.units import mm, um
+from vcc.base.units import mm, um
+from vcc.plan.footprints.planes import texture_error
+from vcc.shapes import patterns
 
 
 @pytest.mark.parametrize("points", [24, 40, 100])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.units import mm
+from vcc.base.units import mm
 
 
 def light_field(disparity_range) -> vcc.LightField:

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.patterns import Cells
-from vcc.plan import steps
-from vcc.plan.rays import RayPlan
-from vcc.surfaces import PathMap
-from vcc.units import mm
+from vcc.base.units import mm
+from vcc.plan.rays import steps
+from vcc.plan.rays.model import RayPlan
+from vcc.shapes.patterns import Cells
+from vcc.shapes.surfaces import PathMap
 
 D = 1 / (1 / 50e-3 - 1)
 LENS = vcc.Lens(focal_length=50 * mm, diameter=8 * mm)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc import kernels, surfaces
+from vcc.base.units import mm, um
 from vcc.optics import Element, Faces
-from vcc.patterns import Circle, CosineSum
-from vcc.plan import steps
-from vcc.plan.ray_compiler import compile_rays
-from vcc.plan.rays import TABLE, CellWindows, RayPlan, Window, hashed
-from vcc.plan.steps import Bundle
-from vcc.units import mm, um
+from vcc.plan.rays import steps
+from vcc.plan.rays.compile import compile_rays
+from vcc.plan.rays.model import TABLE, CellWindows, RayPlan, Window, hashed
+from vcc.plan.rays.steps import Bundle
+from vcc.shapes import kernels, surfaces
+from vcc.shapes.patterns import Circle, CosineSum
 
 D = 1 / (1 / 50e-3 - 1)
 LENS = vcc.Lens(focal_length=50 * mm, diameter=6 * mm)

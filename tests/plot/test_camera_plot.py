@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from vcc import Camera, InputError, Lens, LightField, Mask, Prism, Sensor, patterns
+from vcc import Camera, InputError, Lens, LightField, Mask, Prism, Sensor
+from vcc.base.units import mm, um
 from vcc.plot import focused_distance, plot_camera, style
 from vcc.plot.camera_plot import spread
 from vcc.plot.tracing import fan, trace
-from vcc.units import mm, um
+from vcc.shapes import patterns
 
 SENSOR = Sensor(52 * mm, (500, 400), 48 * um)
 

@@ -10,10 +10,10 @@ from matplotlib.patches import Polygon
 from numpy.polynomial import Polynomial
 
 import vcc
+from vcc.base.units import mm, um
 from vcc.plot import focused_distance, plot_camera, style
 from vcc.plot.elements import MOST_CELLS, Pen, label_of, magnification
-from vcc.surfaces import Cubic
-from vcc.units import mm, um
+from vcc.shapes.surfaces import Cubic
 
 SENSOR = vcc.Sensor(52 * mm, (500, 500), 48 * um)
 LENS = vcc.Lens(50 * mm, diameter=20 * mm)

@@ -17,12 +17,12 @@ from vcc import (
     Prism,
     Sensor,
 )
-from vcc.kernels import Gaussian
+from vcc.base.units import mm
 from vcc.plot import phase_space_stages, plot_phase_space, plot_phase_space_stages, style
 from vcc.plot.phase_space import cell_corners
 from vcc.plot.phase_space_rays import sheet_of_rays, slice_of
-from vcc.surfaces import Cubic
-from vcc.units import mm
+from vcc.shapes.kernels import Gaussian
+from vcc.shapes.surfaces import Cubic
 
 
 def some_light_field(channels=None):

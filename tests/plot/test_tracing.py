@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm, um
 from vcc.optics import Scatter
 from vcc.plot.tracing import BINS, branches, crossings, fan, openings, spread_along, trace
-from vcc.surfaces import Axicon, Cubic
-from vcc.units import mm, um
+from vcc.shapes.surfaces import Axicon, Cubic
 
 PLACES = np.linspace(-7, 7, 11) * mm
 D = 40 * mm

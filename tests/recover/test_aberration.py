@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm
 from vcc.recover import without_aberration
+from vcc.shapes.surfaces import Cubic, Tilt
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.surfaces import Cubic, Tilt
-from vcc.units import mm
 
 FOCUS = 1.2
 TURNED = vcc.Affine.from_parts(

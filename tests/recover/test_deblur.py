@@ -7,8 +7,8 @@ import pytest
 from scipy import ndimage
 
 import vcc
-from vcc.demo.scene import demo_scene
 from vcc.recover.deblur import _Blur, blurred, richardson_lucy, sparse_gradients, wiener
+from vcc.showcase.scene import demo_scene
 
 LOPSIDED = np.array([[0.0, 0.1, 0.0], [0.05, 0.7, 0.0], [0.0, 0.05, 0.1]])
 """|K| ≥ 0.7 − 0.3 = 0.4 at all frequencies, and no symmetry."""

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm, um
 from vcc.recover.defocus_depth import DefocusDepth, _beliefs, defocus_kernels, depth_from_defocus
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Picture
-from vcc.units import mm, um
 
 FOCAL, FOCUS, WIDTH, PITCH = 50 * mm, 2.0, 10 * mm, 20 * um
 BEHIND = 1 / (1 / FOCAL - 1 / FOCUS)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import deg, mm
 from vcc.recover.depth import DepthMap, depth_by_plane_sweep, depth_by_structure_tensor, disparity_error
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.units import deg, mm
 
 PUBLISHED = Path(__file__).parents[3] / "shared" / "data" / "light_fields" / "hci_antinous"
 SLOPE, SPACING, FOCUS = 1e-3, 4 * mm, 1.5
@@ -65,7 +65,7 @@ def test_planes_are_where_they_are(method, yaw: float) -> None:
     relative = found.distance[8:-8, 8:-8] / distance[8:-8, 8:-8] - 1
     # dZ/Z = Z·p·dd/du: 0.0028 for a hundredth of a pixel at 1.1 m
     assert np.sqrt(np.mean(relative**2)) < 0.003
-    assert np.median(found.confidence[8:-8, 8:-8]) > 0.6  # what `vcc.parallax` trusts
+    assert np.median(found.confidence[8:-8, 8:-8]) > 0.6  # what `vcc.fields.parallax` trusts
 
 
 @both
@@ -112,7 +112,7 @@ def test_no_texture_no_confidence(method) -> None:
     flat[..., :36, :] = 0.5
     confidence = method(field.replaced(flat)).confidence
     assert confidence[8:-8, :24].max() < 0.05
-    assert np.median(confidence[8:-8, 48:-8]) > 0.6  # what `vcc.parallax` trusts
+    assert np.median(confidence[8:-8, 48:-8]) > 0.6  # what `vcc.fields.parallax` trusts
 
 
 def test_progress_and_figures() -> None:

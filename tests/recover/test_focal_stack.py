@@ -7,11 +7,11 @@ import pytest
 from typer.testing import CliRunner
 
 import vcc
-from vcc.affine import Affine
+from vcc.base.affine import Affine
 from vcc.cli.commands import app
-from vcc.demo.scene import demo_scene
 from vcc.recover.focal_stack import FocalStack, focal_stack, focus_distances
 from vcc.recover.refocus import refocused
+from vcc.showcase.scene import demo_scene
 
 
 def psnr(picture: np.ndarray, truth: np.ndarray) -> float:
@@ -117,7 +117,7 @@ def test_films_hold_the_pictures(tmp_path, demo_stack, shape, ending):
     assert len(frames) == 6
     even = [n + n % 2 for n in shape[:2]] if ending == "mp4" else list(shape[:2])
     assert all(list(frame.shape[:2]) == even for frame in frames)
-    from vcc.formats.transfer import encode
+    from vcc.files.transfer import encode
 
     for frame, number in zip(frames, (0, 1, 2, 3, 2, 1), strict=True):
         codes = encode(stack.pictures[number].reshape(*shape[:2], -1), 8).astype(float)

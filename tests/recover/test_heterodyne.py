@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.errors import InputError
-from vcc.patterns import CosineSum
+from vcc.base.errors import InputError
+from vcc.base.units import m, mm, short, um
 from vcc.recover.heterodyne import HeterodyneGeometry, decode_heterodyne, heterodyne_calibration
-from vcc.units import m, mm, short, um
+from vcc.shapes.patterns import CosineSum
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "physics"))
 from brute_force import Layer, Scene, Texture, ThinLensCamera, psnr, square_stop, views

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.errors import InputError
-from vcc.patterns import CosineSum
+from vcc.base.errors import InputError
+from vcc.base.units import m, mm
 from vcc.recover import band_limited, true_views
-from vcc.units import m, mm
+from vcc.shapes.patterns import CosineSum
 
 F, FOCUS, STOP, HARMONICS, TILE = 50 * mm, 1 * m, 10 * mm, 2, 10
 D = 1 / (1 / F - 1 / FOCUS)

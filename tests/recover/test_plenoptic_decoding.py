@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.units import m, mm, um
 from vcc.recover.plenoptic import LensletGrid, decode_plenoptic, find_lenslets
-from vcc.units import m, mm, um
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "physics"))
 from brute_force import psnr

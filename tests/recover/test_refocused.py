@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.demo.scene import demo_scene
-from vcc.formats.pictures import read_picture
-from vcc.formats.transfer import decode
+from vcc.base.units import m, mm
+from vcc.files.pictures import read_picture
+from vcc.files.transfer import decode
 from vcc.recover.refocus import ideal_camera, novel_view, refocused
-from vcc.units import m, mm
+from vcc.showcase.scene import demo_scene
 
 VIEWS, PIXELS = 7, 80
 SPACING, SLOPE, FOCUS = 2 * mm, 2e-3, 1.5 * m

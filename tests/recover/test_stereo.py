@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm, um
 from vcc.recover.stereo import BiprismStereo, depth_by_biprism
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
-from vcc.units import mm, um
 
 DELTA, AHEAD, BEHIND, PITCH = 0.05, 100 * mm, 52.6 * mm, 20 * um
 SENSOR = vcc.Sensor(z=AHEAD + BEHIND, shape=(41, 540), pitch=PITCH)

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from vcc import InputError, open_light_field
-from vcc.affine import Affine
+from vcc.base.affine import Affine
+from vcc.base.units import mm
+from vcc.files.pictures import save_image
 from vcc.formats.hci import read_geometry
-from vcc.formats.pictures import save_image
 from vcc.image import Image
 from vcc.sources import CameraArray
 from vcc.sources.blender import blender_script
-from vcc.units import mm
 
 ARRAY = CameraArray((3, 4), (30, 40), 5 * mm, 2e-3, 1.7)
 EYE = np.array([1.0, 2.0, 3.0])

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from vcc import InputError
-from vcc.formats.pfm import read_pfm
-from vcc.formats.pictures import read_picture
-from vcc.formats.transfer import decode
+from vcc.base.units import mm
+from vcc.files.pfm import read_pfm
+from vcc.files.pictures import read_picture
+from vcc.files.transfer import decode
 from vcc.sources import CameraArray, PlanesScene, TexturedPlane
 from vcc.sources.depth_map import DepthMapScene
 from vcc.sources.textures import Painting, Spot, Uniform, Waves
-from vcc.units import mm
 
 SLOPE = 2e-3
 ARRAY = CameraArray((5, 5), (90, 120), 8 * mm, SLOPE, 1.2)

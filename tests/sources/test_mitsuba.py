@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 import vcc
 from vcc import InputError
+from vcc.base.units import mm
 from vcc.cli.commands import app
 from vcc.sources import CameraArray
 from vcc.sources.textures import Waves
-from vcc.units import mm
 
 mi = pytest.importorskip("mitsuba", reason="the package mitsuba is not installed")
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from vcc import InputError
-from vcc.formats.transfer import to_linear
+from vcc.base.units import mm
+from vcc.files.transfer import to_linear
 from vcc.sources import CameraArray
 from vcc.sources.opengl import Lighting, OpenGLRenderer, Viewpoint
-from vcc.units import mm
 
 trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed")
 moderngl = pytest.importorskip("moderngl", reason="moderngl is not installed")

@@ -13,10 +13,10 @@ import pytest
 from typer.testing import CliRunner
 
 from vcc import InputError
+from vcc.base.units import mm
 from vcc.cli.commands import app
 from vcc.sources import CameraArray
 from vcc.sources.pbrt import PbrtRenderer, PbrtScene, pbrt_program
-from vcc.units import mm
 
 needs_pbrt = pytest.mark.skipif(
     pbrt_program() is None, reason="there is no program pbrt (on the PATH, or named by PBRT in the environment)"

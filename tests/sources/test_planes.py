@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.units import mm, um
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Painting, Picture, Spot, Uniform, Waves, glyphs
-from vcc.units import mm, um
 
 SLOPE = 50 * um / (50 * mm)
 GEOMETRY = {"spacing": 2 * mm, "slope_per_pixel": SLOPE, "focus_distance": 1.2}

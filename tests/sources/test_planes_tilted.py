@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from vcc import InputError
-from vcc.formats.transfer import to_linear
+from vcc.base.units import deg, mm
+from vcc.files.transfer import to_linear
 from vcc.sources import CameraArray, PlanesScene, TexturedPlane
 from vcc.sources.textures import Picture, Spot, Uniform, Waves
-from vcc.units import deg, mm
 
 SLOPE = 1e-3
 GEOMETRY = {"spacing": 2 * mm, "slope_per_pixel": SLOPE, "focus_distance": 1.2}

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 
 import vcc
 from vcc import InputError
+from vcc.base.units import mm
 from vcc.cli.commands import app
 from vcc.sources import CameraArray
 from vcc.sources.synthesis import synthesize
-from vcc.units import mm
 
 CAMERAS = CameraArray((2, 3), (4, 5), 2 * mm, 0.01, 1.3)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vcc import InputError
+from vcc.base.units import deg, mm
 from vcc.sources import CameraArray
-from vcc.units import deg, mm
 
 
 def seen_at(camera, point, distance):

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.engines import pieces
-from vcc.engines.pieces import Block, Blocks
-from vcc.patterns import CosineSum
+from vcc.base.units import mm
+from vcc.run import pieces
+from vcc.run.pieces import Block, Blocks
+from vcc.shapes.patterns import CosineSum
 from vcc.store import open_store, save_store
-from vcc.units import mm
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

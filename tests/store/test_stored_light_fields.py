@@ -18,8 +18,8 @@ import pytest
 import zarr
 
 import vcc
-from vcc.affine import Affine
-from vcc.formats.transfer import decode
+from vcc.base.affine import Affine
+from vcc.files.transfer import decode
 from vcc.sources import CameraArray
 from vcc.store import (
     Lossless,
@@ -274,7 +274,7 @@ def test_work_goes_on_where_it_stopped(tmp_path):
 KILLED = """
 import sys
 import numpy as np
-from vcc.affine import Affine
+from vcc.base.affine import Affine
 from vcc.store import create_store
 writer = create_store(sys.argv[1], Affine.identity(), (20, 20, 300, 300), "float32", provenance={}, description={})
 noise = np.random.default_rng(0).random((300, 300)).astype(np.float32)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.analysis.deblurring import expected_deblurring_error
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 
 Array = NDArray[np.float64]
 

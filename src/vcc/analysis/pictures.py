@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from vcc.analysis.plane_spectrum import PlaneSpectrum
 from vcc.analysis.spectrum import Spectrum
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.fields.sampled import LIGHT_FIELD_AXES
 from vcc.plot import style
-from vcc.sampled import LIGHT_FIELD_AXES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.fields.sampled import to_numpy
 from vcc.image import Image
-from vcc.kernels import Kernel
 from vcc.optics import Mask
-from vcc.patterns import Pattern, as_pattern
-from vcc.sampled import to_numpy
+from vcc.shapes.kernels import Kernel
+from vcc.shapes.patterns import Pattern, as_pattern
 
 Array = NDArray[np.float64]
 

@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
 from vcc.analysis.plane_spectrum import PlaneSpectrum, plane_spectrum
-from vcc.camera import Camera, Stage
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.camera import Camera
 from vcc.optics import Scatter
+from vcc.optics.train import Stage
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ class PointSpread:
         return float(x), float(y)
 
     def __repr__(self) -> str:
-        from vcc.units import short
+        from vcc.base.units import short
 
         rows, columns = self.shape
         pitch = short(abs(self.frame.determinant) ** 0.5)

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
 from vcc.analysis.plane_spectrum import BLOCK_BYTES
 from vcc.analysis.spectrum import check_size
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.fields.sampled import to_numpy
 from vcc.image import Image
 from vcc.light_field import LightField
-from vcc.sampled import to_numpy
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ class Refocuser:
             None weighs all alike.
         border: pixels added on each side of the pictures, in which one border fades into the opposite one: what a
             transform takes to lie beyond a border is there, and not at the opposite end of the picture.
-        memory_limit: bytes that the transform may take; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes that the transform may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Raises:
         InputError: a light field on disk, weights of another shape, negative or all zero, a negative border, or

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vcc.affine import Affine
+from vcc.advice.limits import GREEN_LIGHT, SamplingLimits, sampling_limits
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
 from vcc.camera import Camera
-from vcc.errors import InputError
 from vcc.light_field import LightField, describe_geometry
 from vcc.plan.parallax_rule import vergences
-from vcc.plan.sampling_limits import GREEN_LIGHT, SamplingLimits, sampling_limits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +30,7 @@ class SamplingAdvice(SamplingLimits):
     """Limits of sampling, of paraxial optics and of diffraction, of one camera and one light field.
 
     ``advice["disparity near"].value`` is a number; ``str(advice)`` tells all in words, ``advice.plot()`` draws it.
-    What the fields hold is said at `vcc.plan.sampling_limits.SamplingLimits`.
+    What the fields hold is said at `vcc.advice.limits.SamplingLimits`.
 
     Args:
         light_field: in words: the one given, or the one that the camera asks for.

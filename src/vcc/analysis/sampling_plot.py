@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.plan.sampling_limits import distance_in_words
+from vcc.advice.limits import distance_in_words
+from vcc.base.units import short, um
 from vcc.plot import style
-from vcc.units import short, um
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
 from vcc.analysis.plane_spectrum import PlaneSpectrum, transformed_along
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.memory import check_samples
+from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
 from vcc.light_field import LightField, Sample
-from vcc.memory import check_samples
-from vcc.sampled import LIGHT_FIELD_AXES, to_numpy
 
 Array = NDArray[np.float64]
 Window = str | tuple[Any, ...] | None
@@ -218,7 +218,7 @@ def fft4(
         window: by which samples are weighted towards the borders, which otherwise show as crosses: the name of
             one of `scipy.signal.get_window` such as ``"hann"``, or a tuple of a name and numbers, for all four
             axes; or a list of four, for (v, u, t, s), with None for an axis left as it is.
-        memory_limit: bytes that the spectrum may take; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes that the spectrum may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Raises:
         InputError: a light field on disk, an unknown window, or more memory needed than allowed (said before
@@ -249,7 +249,7 @@ def ifft4(spectrum: Spectrum, *, memory_limit: int | None = None) -> LightField:
 
     Args:
         spectrum: see `fft4`; of a real light field, F(−f) is the conjugate of F(f).
-        memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes that the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Returns:
         Float32 samples on the frame `spectrum.light_field_frame`, means or points as `spectrum.sample` says.
@@ -275,7 +275,7 @@ def samples_of(spectrum: Spectrum, *, memory_limit: int | None = None) -> NDArra
 
     Args:
         spectrum: see `ifft4`.
-        memory_limit: bytes; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Raises:
         InputError: samples that are not real by more than rounding, or more memory needed than allowed.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from vcc.base.errors import InputError
 from vcc.cli import decode as decoding
 from vcc.cli import options as given
 from vcc.cli import refocus as refocusing
@@ -17,7 +18,6 @@ from vcc.cli.gallery import gallery
 from vcc.cli.spectrum import EPILOG as SPECTRUM_EPILOG
 from vcc.cli.spectrum import spectrum
 from vcc.cli.synth import synth
-from vcc.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -114,8 +114,8 @@ def capture(
         samples=samples,
         ray_seed=ray_seed,
     )
-    from vcc.camera_file import load_camera
-    from vcc.formats.pictures import WRITE_ENDINGS
+    from vcc.files.camera_file import load_camera
+    from vcc.files.pictures import WRITE_ENDINGS
 
     output = check_output(output, WRITE_ENDINGS)
     optics = load_camera(camera)
@@ -206,9 +206,9 @@ def expose(
         samples=samples,
         ray_seed=ray_seed,
     )
-    from vcc.camera_file import load_camera
-    from vcc.formats.pictures import RAW_ENDINGS, WRITE_ENDINGS
-    from vcc.recording import electronics_of
+    from vcc.files.camera_file import load_camera
+    from vcc.files.pictures import RAW_ENDINGS, WRITE_ENDINGS
+    from vcc.run.recording import electronics_of
 
     output = check_output(output, RAW_ENDINGS)
     if picture is not None:
@@ -263,7 +263,7 @@ def explain(
         samples=samples,
         ray_seed=ray_seed,
     )
-    from vcc.camera_file import load_camera
+    from vcc.files.camera_file import load_camera
 
     optics = load_camera(camera)
     field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
@@ -364,8 +364,8 @@ def plot(
         raise InputError("--slice chooses what --phase-space draws: give --phase-space too")
     target = check_output(output or Path(f"{camera.stem}.png"), (".png", ".svg", ".pdf"))
     distances = [given.length(each, "--object-distance") or 0.0 for each in object_distance or []]
-    from vcc.camera_file import load_camera
-    from vcc.formats.atomic import atomic_path
+    from vcc.files.atomic import atomic_path
+    from vcc.files.camera_file import load_camera
     from vcc.plot import plot_camera, plot_phase_space_stages
 
     optics = load_camera(camera)

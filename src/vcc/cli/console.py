@@ -13,7 +13,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from vcc.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning
 
 _LIBRARY_OPTION = re.compile(
     r"\b(transfer|spacing|slope_per_pixel|focus_distance|orientation|scene_distance|interpolation"

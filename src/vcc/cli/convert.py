@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from vcc.base.errors import InputError
 from vcc.cli import options as given
 from vcc.cli.console import progress
-from vcc.errors import InputError
 
 if TYPE_CHECKING:
     from vcc.light_field import LightField
@@ -132,9 +132,9 @@ def store_facts(path: Path, quick: bool) -> str:
     Raises:
         InputError: what `vcc.store.open_store` refuses.
     """
+    from vcc.base.units import short
     from vcc.light_field import SAMPLES_IN_WORDS, describe_geometry
     from vcc.store import open_store
-    from vcc.units import short
 
     stored = open_store(path)
     nv, nu, nt, ns = stored.shape[:4]

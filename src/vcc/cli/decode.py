@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from vcc.base.errors import InputError
 from vcc.cli import options as given
 from vcc.cli.console import progress, show
-from vcc.errors import InputError
 
 EPILOG = (
     "Example:  vcc decode raw.tif --camera camera.toml -o field.zarr\n\n"
@@ -183,7 +183,6 @@ def decode(
     Where lenslets' micro-images are is taken from --centres, or found in --white, or follows from --camera.
     Through a mask of cosines, carriers follow from --camera.
     """
-    from vcc.camera_file import load_camera
     from vcc.cli.convert import free_output
     from vcc.cli.raw_recordings import (
         described,
@@ -194,6 +193,7 @@ def decode(
         through_lenslets,
         write_light_field,
     )
+    from vcc.files.camera_file import load_camera
     from vcc.formats.writing import kind_of
 
     factor, limit = given.exposure_of(exposure), given.memory_size(memory_limit)

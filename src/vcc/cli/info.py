@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError
 from vcc.cli import options as given
-from vcc.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from vcc.affine import Affine
+    from vcc.base.affine import Affine
     from vcc.formats import FolderInfo
     from vcc.light_field import LightField
     from vcc.store import StoredLightField
@@ -139,8 +139,8 @@ def _describe_store(path: Path, quick: bool, picture: Path | None) -> str:
 
 def _facts(facts: FolderInfo) -> dict[str, str]:
     """What the folder or file states and what is taken for granted, line by line."""
+    from vcc.base.units import short
     from vcc.light_field import SAMPLES_IN_WORDS
-    from vcc.units import short
 
     def assumed(name: str) -> str:
         return "  (not stated: assumed)" if name in facts.unknown else ""
@@ -186,7 +186,7 @@ def _missing(places: Iterable[tuple[int, int]], total: int) -> str:
 
 def _disparities(field: LightField | StoredLightField, facts: FolderInfo) -> str:
     """The disparities and what they mean in metres."""
-    from vcc.units import short
+    from vcc.base.units import short
 
     known = field.measured_disparity_range()
     if known is None:
@@ -243,7 +243,7 @@ def _rounded(ratio: float) -> str:
 
 def _histogram(views: Iterable[NDArray[Any]], transfer: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Linear light that occurs, growing, and how often; of very many floating-point samples only some are seen."""
-    from vcc.formats import transfer as curves
+    from vcc.files import transfer as curves
 
     counts: NDArray[np.float64] | None = None
     some: list[NDArray[Any]] = []
@@ -270,8 +270,8 @@ def _histogram(views: Iterable[NDArray[Any]], transfer: str) -> tuple[NDArray[np
 
 
 def _lytro_facts(path: Path) -> dict[str, str]:
+    from vcc.base.units import short
     from vcc.formats.lytro_lfp import read_lytro
-    from vcc.units import short
 
     raw = read_lytro(path)
     rows, columns = raw.mosaic.shape
@@ -307,7 +307,7 @@ def _lytro_facts(path: Path) -> dict[str, str]:
 
 def _draw(views: _Views, title: str, path: Path, assumed: bool) -> str:
     """Write the picture of the grid of views; returns its path."""
-    from vcc.formats.atomic import atomic_path
+    from vcc.files.atomic import atomic_path
 
     figure = grid_figure(views.at, views.shape, views.frame, views.transfer, title, assumed)
     with atomic_path(path) as temporary:
@@ -390,7 +390,7 @@ def _mark_missing(axes: Any, left: float, top: float, width: float, height: floa
 
 def _small(view: NDArray[Any], shape: tuple[int, int], transfer: str) -> NDArray[np.float32]:
     """A view's linear light in blocks of whole pixels, so that all views fit on a sheet."""
-    from vcc.formats import transfer as curves
+    from vcc.files import transfer as curves
 
     room = np.clip(_SHEET / max(shape), _SMALLEST, _LARGEST)
     step = max(1, math.ceil(max(view.shape[:2]) / room))
@@ -411,7 +411,7 @@ def _small(view: NDArray[Any], shape: tuple[int, int], transfer: str) -> NDArray
 
 def _exposure(small: dict[tuple[int, int], NDArray[np.float32]], shape: tuple[int, int]) -> np.float32:
     """1 where the middle view is not too bright, else what makes it fit; dark pictures are brightened too."""
-    from vcc.formats.pictures import auto_exposure
+    from vcc.files.pictures import auto_exposure
 
     middle = ((shape[0] - 1) / 2, (shape[1] - 1) / 2)
     nearest = min(small, key=lambda place: math.dist(place, middle))
@@ -419,7 +419,7 @@ def _exposure(small: dict[tuple[int, int], NDArray[np.float32]], shape: tuple[in
 
 
 def _shown(light: NDArray[np.float32]) -> NDArray[np.float32]:
-    from vcc.formats import transfer as curves
+    from vcc.files import transfer as curves
 
     return curves.from_linear(np.clip(light, 0, 1))
 

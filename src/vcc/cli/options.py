@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 
 if TYPE_CHECKING:
     from vcc.light_field import LightField
@@ -200,7 +200,7 @@ def length(given: str | None, option: str) -> float | None:
     Raises:
         InputError: no unit, or not a length.
     """
-    from vcc.units import parse
+    from vcc.base.units import parse
 
     if given is None:
         return None
@@ -265,7 +265,7 @@ def exposure_time(given: str) -> Any:
     Raises:
         InputError: no unit, or not a time.
     """
-    from vcc.units import parse
+    from vcc.base.units import parse
 
     return given if given == "auto" else parse(given, "time", "--exposure")
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError, ResultWarning
 from vcc.cli.console import progress, show
-from vcc.errors import InputError, ResultWarning
 
 if TYPE_CHECKING:
     from vcc.camera import Camera
@@ -66,7 +66,7 @@ def read_raw(path: Path, camera: Camera | None, color_filter: str | None, black:
     Raises:
         InputError: a file that cannot be read, or a colour filter other than the camera's or the file's.
     """
-    from vcc.formats.pictures import READ_ENDINGS, read_picture
+    from vcc.files.pictures import READ_ENDINGS, read_picture
 
     path = path.expanduser()
     if path.suffix.lower() in _LYTRO:
@@ -186,8 +186,8 @@ def through_a_mask(
 
     light: NDArray[Any] = raw.light()
     if raw.color_filter is not None:
-        from vcc.electronics import Electronics
-        from vcc.recording import demosaic
+        from vcc.optics.electronics import Electronics
+        from vcc.run.recording import demosaic
 
         light = demosaic(light.astype(np.float32), Electronics(color_filter=raw.color_filter), "bilinear")
     if upright:
@@ -202,7 +202,7 @@ def has_carrier(camera: Camera) -> bool:
         InputError: it has neither.
     """
     from vcc.optics import LensArray, Mask
-    from vcc.patterns import CosineSum
+    from vcc.shapes.patterns import CosineSum
 
     carrier = any(isinstance(each, Mask) and isinstance(each.pattern, CosineSum) for each in camera.elements)
     if not carrier and not any(isinstance(each, LensArray) for each in camera.elements):

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from vcc.base.errors import InputError
 from vcc.cli import options as given
 from vcc.cli.console import check_output, progress, show
-from vcc.errors import InputError
 
 if TYPE_CHECKING:
     from vcc.light_field import LightField
@@ -97,7 +97,7 @@ def refocus(
         raise InputError(
             'where should it focus? Give --distance "1.2 m", --stack "0.8 m" "3 m" 12 or --all-in-focus'
         )
-    from vcc.formats.pictures import WRITE_ENDINGS
+    from vcc.files.pictures import WRITE_ENDINGS
     from vcc.recover.focal_stack import ENDINGS, focal_stack, focus_distances
     from vcc.recover.refocus import refocused
 

@@ -58,7 +58,7 @@ def spectrum(
     field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
     from vcc.analysis import fft4, plot_spectrum
     from vcc.analysis.spectrum import check_size
-    from vcc.formats.atomic import atomic_path
+    from vcc.files.atomic import atomic_path
     from vcc.light_field import LightField
 
     if not isinstance(field, LightField):

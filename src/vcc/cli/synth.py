@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from vcc.base.errors import InputError
 from vcc.cli import options as given
 from vcc.cli.console import progress, show
-from vcc.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -112,8 +112,8 @@ def camera_array(
     Raises:
         InputError: a quantity without its unit, or what `CameraArray.over_aperture` refuses.
     """
+    from vcc.base.units import parse
     from vcc.sources import CameraArray
-    from vcc.units import parse
 
     sides = [parse(part, "length", "--aperture") for part in aperture.split(",")]
     if len(sides) > 2:
@@ -265,7 +265,7 @@ def planes(
     """Render pictures on planes, the nearer ones before the others."""
     output = check_store(output)
     cameras = camera_array(views, pixels, aperture, field_of_view, focus_distance)
-    from vcc.demo.scene import demo_scene
+    from vcc.showcase.scene import demo_scene
     from vcc.sources import PlanesScene
 
     scene = PlanesScene([_plane(text) for text in plane]) if plane else demo_scene()
@@ -339,7 +339,7 @@ class _PlanesAtOnce:
 
 
 def _unit(text: str) -> float:
-    from vcc.units import parse
+    from vcc.base.units import parse
 
     return parse(text, "length", "--unit")
 
@@ -354,9 +354,9 @@ def _parameters(settings: list[str]) -> dict[str, str]:
 
 def _plane(text: str) -> TexturedPlane:
     """A plane from "FILE, DISTANCE, WIDTH"; a comma in the file's name is the file's."""
+    from vcc.base.units import parse
     from vcc.sources import TexturedPlane
     from vcc.sources.textures import Picture
-    from vcc.units import parse
 
     parts = text.rsplit(",", 2)
     if len(parts) != 3:

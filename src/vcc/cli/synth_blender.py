@@ -52,7 +52,7 @@ def blender_script(
     ] = None,
 ) -> None:
     """Write a script that renders the views in your own Blender, 3.6 to 5.x, and states their geometry."""
-    from vcc.formats.atomic import atomic_path
+    from vcc.files.atomic import atomic_path
     from vcc.sources import blender
 
     output = check_output(output, (".py",))

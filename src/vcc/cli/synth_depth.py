@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from vcc.base.errors import InputError
 from vcc.cli import options as given
 from vcc.cli import synth
 from vcc.cli.console import show
-from vcc.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -75,10 +75,10 @@ def depth(
     """Make the views around a picture from its depth; what no picture shows is made up behind edges."""
     import numpy as np
 
-    from vcc.formats.pictures import read_picture
-    from vcc.formats.transfer import decode
+    from vcc.base.units import parse
+    from vcc.files.pictures import read_picture
+    from vcc.files.transfer import decode
     from vcc.sources.depth_map import DepthMapScene
-    from vcc.units import parse
 
     output = synth.check_store(output)
     unit = parse(depth_unit, "length", "--depth-unit")
@@ -126,10 +126,10 @@ def _depth_samples(path: Path) -> NDArray[np.float64]:
     """
     import numpy as np
 
-    from vcc.formats.pictures import read_picture
+    from vcc.files.pictures import read_picture
 
     if path.suffix.lower() == ".pfm":
-        from vcc.formats.pfm import read_pfm
+        from vcc.files.pfm import read_pfm
 
         return read_pfm(path).astype(np.float64)
     samples = np.asarray(read_picture(path)[0], dtype=np.float64)

@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
+from vcc.base.errors import InputError
 from vcc.cli import options as given
 from vcc.cli import synth
 from vcc.cli.console import show
-from vcc.errors import InputError
 
 _VIEWPOINT = "Where the views are"
 
@@ -95,9 +95,9 @@ def opengl(
     dtype: synth.Dtype = "float16",
 ) -> None:
     """Draw meshes by OpenGL, textured and simply lit: quick, without shadows, mirrors and glass."""
+    from vcc.base.units import parse, short
     from vcc.sources import CameraArray
     from vcc.sources.opengl import OpenGLRenderer, Vector, Viewpoint
-    from vcc.units import parse, short
 
     def vector(text: str, option: str) -> Vector:
         try:

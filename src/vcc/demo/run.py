@@ -13,16 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vcc.base.errors import InputError, ResultWarning
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import Bench, built_in, from_someone
-from vcc.demo.figures import Crop, SheetRow, Shown
-from vcc.demo.page import write_page
+from vcc.demo import story
 from vcc.demo.report import DemoReport, Timing, duration, speed_up
-from vcc.demo.truth import psnr, true_picture
-from vcc.errors import InputError, ResultWarning
 from vcc.image import Image
 from vcc.light_field import LightField
+from vcc.showcase import figures
+from vcc.showcase.bench import Bench, built_in, from_someone
+from vcc.showcase.figures import Crop, SheetRow, Shown
+from vcc.showcase.page import write_page
+from vcc.showcase.truth import psnr, true_picture
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Uniform
 

@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from vcc.demo.bench import Bench
-from vcc.demo.page import Panel, Section, psnr_table, timings_table
+from vcc.base.units import mm, short
 from vcc.demo.report import Timing, duration, speed_up
-from vcc.demo.scene import FAR, MIDDLE, NEAR
-from vcc.units import mm, short
+from vcc.showcase.bench import Bench
+from vcc.showcase.page import Panel, Section, psnr_table, timings_table
+from vcc.showcase.scene import FAR, MIDDLE, NEAR
 
 TITLE = "A virtual computational camera at work"
 

@@ -1,6 +1,6 @@
 """Engines run a plan on the samples of a light field; they know nothing of optics.
 
-All of them compute the same sum (`vcc.plan.model`). ``reference`` is the plain one that defines what is
+All of them compute the same sum (`vcc.plan.footprints.model`). ``reference`` is the plain one that defines what is
 correct, ``array_api`` works on arrays of PyTorch, JAX and others and carries gradients, ``numba`` is fast on
 NumPy arrays. An engine is an argument or follows from the arrays' type; there is no global setting.
 """
@@ -13,9 +13,9 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from vcc.errors import InputError
-from vcc.plan.model import Plan
-from vcc.plan.rays import RayPlan
+from vcc.base.errors import InputError
+from vcc.plan.footprints.model import Plan
+from vcc.plan.rays.model import RayPlan
 
 EngineName = Literal["reference", "array_api", "numba"]
 Progress = Callable[[int, int], None]

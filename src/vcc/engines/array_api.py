@@ -15,9 +15,9 @@ from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
 from vcc.engines.smear import band_matrix, finishing_terms
-from vcc.plan.footprint import reach_in_pixels, shares
-from vcc.plan.model import MaskLookup, Plan
-from vcc.sampled import to_dtype
+from vcc.fields.sampled import to_dtype
+from vcc.plan.footprints.model import MaskLookup, Plan
+from vcc.plan.footprints.shares import reach_in_pixels, shares
 
 
 def run(plan: Plan, values: Any, progress: Callable[[int, int], None] | None = None) -> Any:

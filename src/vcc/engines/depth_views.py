@@ -22,15 +22,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError, ResultWarning
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError, ResultWarning
 from vcc.light_field import LightField
 from vcc.plan.depth_rule import ViewsBetween
 
 if TYPE_CHECKING:
     from vcc.engines import EngineName, Progress
-    from vcc.engines.pieces import Unread
-    from vcc.plan.model import Plan
+    from vcc.plan.footprints.model import Plan
+    from vcc.run.pieces import Unread
 
 Array = NDArray[np.float32]
 
@@ -132,7 +132,7 @@ class DenserViews:
         self._source.check_complete()
 
     def linear_view(self, row: int, column: int, first: int, stop: int) -> Array:
-        """Rows of pixels of one view of the denser grid, radiance; see `vcc.engines.pieces.Unread`."""
+        """Rows of pixels of one view of the denser grid, radiance; see `vcc.run.pieces.Unread`."""
         down, across = self._between.times
         j, i = row // down, column // across
         y, x = (row % down + 0.5) / down - 0.5, (column % across + 0.5) / across - 0.5
@@ -240,7 +240,7 @@ def run(plan: Plan, values: Any, engine: EngineName, progress: Progress | None =
     Raises:
         InputError: samples that are no NumPy array.
     """
-    from vcc.engines.pieces import record_pieces
+    from vcc.run.pieces import record_pieces
 
     if not isinstance(values, np.ndarray):
         raise InputError(
@@ -253,7 +253,7 @@ def run(plan: Plan, values: Any, engine: EngineName, progress: Progress | None =
 
 def _room(plan: Plan, source: InMemory) -> int:
     """Bytes for blocks of denser views: as few as serve well, and as many as a block of one view takes."""
-    from vcc.engines.pieces import least_memory
+    from vcc.run.pieces import least_memory
 
     return max(IN_MEMORY, math.ceil(least_memory(plan, source.outline) / (1 - HELD)))
 

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from vcc.engines import numba_kernels as kernels
 from vcc.engines.smear import LONG, finish, finishing_terms
 from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
-from vcc.plan.footprint import REACH, Division, taps
-from vcc.plan.model import Plan
+from vcc.plan.footprints.model import Plan
+from vcc.plan.footprints.shares import REACH, Division, taps
 
 Progress = Callable[[int, int], None]
 

@@ -372,7 +372,7 @@ def filter_rows(  # type: ignore[no-untyped-def]
 
 @_inlined
 def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
-    """Φ of `vcc.plan.footprint`; interpolation 1 is linear, 2 cubic, 3 a spline."""
+    """Φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 a spline."""
     r = abs(a)
     if interpolation == 1:
         r = min(r, 1.0)

@@ -1,6 +1,6 @@
 """The compiled kernel that traces packets of rays from the sensor to the light field and adds up what they find.
 
-One kernel serves every camera: what a ray meets comes as a list of numbers (`vcc.plan.steps`), read step by
+One kernel serves every camera: what a ray meets comes as a list of numbers (`vcc.plan.rays.steps`), read step by
 step for a packet of rays at a time, so that reading the list costs nothing and the arithmetic runs on several
 rays at once. A packet holds the rays of one pixel.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add_views_of_4
-from vcc.plan.rays import DIGITS
+from vcc.plan.rays.model import DIGITS
 
 PACKET = 256
 """Rays at a time: six numbers each, which stay in the first-level cache."""
@@ -390,7 +390,7 @@ def to_indices(index, n, x, y, s, t):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def hashed(number, seed):  # type: ignore[no-untyped-def]
-    """See `vcc.plan.rays.hashed`."""
+    """See `vcc.plan.rays.model.hashed`."""
     h = np.uint32(number & 0xFFFFFFFF) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
     h = np.uint32(np.uint32(h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B))
     h = np.uint32(np.uint32(h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35))
@@ -450,7 +450,7 @@ def cells_seen(cells, cell_kinds, cell_whole, x, y, pixels, near):  # type: igno
 
 @njit(**INLINED)
 def unit(point, flipped):  # type: ignore[no-untyped-def]
-    """A number 0 … 1 of `DIGITS` binary digits, some of them flipped; see `vcc.plan.rays.RayPlan._moved`."""
+    """A number 0 … 1 of `DIGITS` binary digits, some of them flipped; see `vcc.plan.rays.model.RayPlan._moved`."""
     return (np.float64(np.int32(point * DIGITS_ABOVE) ^ flipped) + 0.5) * DIGITS_BELOW
 
 
@@ -467,7 +467,7 @@ def at_pixel(points, start, n, flipped, middle_x, middle_y, wide, high, x, y):  
 def through_window(  # type: ignore[no-untyped-def]
     points, start, n, flipped, window, scatter, x, y, s, t, share
 ):  # fmt: skip
-    """Slopes and weights of n rays towards a window, making up for diffusers; see `vcc.plan.rays.Window`."""
+    """Slopes and weights of n rays towards a window, making up for diffusers; see `vcc.plan.rays.model.Window`."""
     f0, f1, f2, f3, f4 = window[0, 0], window[0, 1], window[0, 2], window[0, 3], window[0, 4]
     g0, g1, g2, g3, g4 = window[1, 0], window[1, 1], window[1, 2], window[1, 3], window[1, 4]
     solid_angle, disc = window[2, 0], window[2, 1] == 1.0
@@ -559,8 +559,8 @@ def add_tile(  # type: ignore[no-untyped-def]
         cells: rows of numbers by axis (x, y) where rays are aimed through cells, else empty.
         cell_kinds: (kinds, 3): power, δs, δt.
         cell_whole: layout, rows and columns of kinds, reach in rows and columns.
-        borders: (strips, 2): what cuts out a cell's opening, see `vcc.plan.rays.CellWindows`.
-        codes: see `vcc.plan.steps.Packer`, likewise the next four.
+        borders: (strips, 2): what cuts out a cell's opening, see `vcc.plan.rays.model.CellWindows`.
+        codes: see `vcc.plan.rays.steps.Packer`, likewise the next four.
         whole: see above.
         real: see above.
         shares: see above.

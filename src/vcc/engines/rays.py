@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError, ResultWarning
 from vcc.engines.sharpening import sharpened
-from vcc.errors import InputError, ResultWarning
-from vcc.plan.rays import TABLE, CellWindows, RayPlan, Window
-from vcc.sampled import to_dtype
+from vcc.fields.sampled import to_dtype
+from vcc.plan.rays.model import TABLE, CellWindows, RayPlan, Window
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -121,7 +121,7 @@ def _doubled(plan: RayPlan, round_number: int) -> RayPlan:
 
 
 def _mean(values: Any) -> float:
-    from vcc.sampled import known
+    from vcc.fields.sampled import known
 
     numbers = known(values)
     return float("nan") if numbers is None else float(np.mean(numbers, dtype=np.float64))

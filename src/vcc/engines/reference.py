@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.engines.smear import finish
-from vcc.plan.footprint import shares
-from vcc.plan.model import Plan
+from vcc.plan.footprints.model import Plan
+from vcc.plan.footprints.shares import shares
 
 Array = NDArray[np.float64]
 

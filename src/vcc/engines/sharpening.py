@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.plan.ray_sharpening import DIGITS, REACH
-from vcc.plan.rays import RayPlan
-from vcc.sampled import to_dtype
+from vcc.fields.sampled import to_dtype
+from vcc.plan.rays.model import RayPlan
+from vcc.plan.rays.sharpening import DIGITS, REACH
 
 KEPT_DIGITS = 5
 """Binary digits after the point with which 8-bit samples are kept in 16 bits: 2⁻⁵ of a level, sixteen times finer

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from vcc.engines.sharpening import KEPT_DIGITS
-from vcc.plan.ray_sharpening import DIGITS, REACH
+from vcc.plan.rays.sharpening import DIGITS, REACH
 
 OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy"}
 SHIFT = 2 * DIGITS - KEPT_DIGITS

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.plan.model import Plan
+from vcc.plan.footprints.model import Plan
 
 
 def tent(half_width: float) -> NDArray[np.float64]:

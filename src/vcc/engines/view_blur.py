@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vcc.engines import EngineName, Progress, run_plan
 from vcc.engines.smear import separable_terms, spreading_matrix, without_rounding
-from vcc.plan.model import Plan
+from vcc.plan.footprints.model import Plan
 
 
 def run(plan: Plan, values: Any, engine: EngineName, progress: Progress | None = None) -> Any:

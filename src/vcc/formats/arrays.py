@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError
-from vcc.formats.atomic import atomic_path
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.files.atomic import atomic_path
 from vcc.formats.grid import Decoded, Geometry
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def save(light_field: LightField, path: str | PathLike[str]) -> Path:
     Raises:
         InputError: another ending, or a place that cannot be written to.
     """
-    from vcc.sampled import to_numpy
+    from vcc.fields.sampled import to_numpy
 
     path = Path(path).expanduser()
     if path.suffix.lower() != ".npz":

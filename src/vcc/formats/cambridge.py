@@ -6,7 +6,7 @@ import math
 import re
 from pathlib import Path
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats.grid import Geometry
 
 PARAMETERS = "param.txt"

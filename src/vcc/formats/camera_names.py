@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.base.units import mm
+from vcc.files.pictures import read_picture
 from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, mean_step, pictures_in
-from vcc.formats.pictures import read_picture
-from vcc.units import mm
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _NAME = re.compile(rf"(.+?)_(\d+)_(\d+)_(-?\d+\.\d+)_(-?\d+\.\d+)_{_NUMBER}_{_NUMBER}")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats.grid import Decoded
 
 CONTAINERS = (

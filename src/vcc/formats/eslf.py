@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
-from vcc.formats import transfer as curves
-from vcc.formats.atomic import atomic_path
+from vcc.base.errors import InputError
+from vcc.fields.sampled import to_numpy
+from vcc.files import transfer as curves
+from vcc.files.atomic import atomic_path
+from vcc.files.pictures import read_picture
 from vcc.formats.grid import Decoded
-from vcc.formats.pictures import read_picture
 from vcc.light_field import LightField
-from vcc.sampled import to_numpy
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".ppm")
 

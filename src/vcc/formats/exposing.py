@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
-from vcc.formats import transfer
-from vcc.formats.pictures import auto_exposure, checked_exposure
-from vcc.sampled import to_numpy
+from vcc.base.errors import InputError
+from vcc.fields.sampled import to_numpy
+from vcc.files import transfer
+from vcc.files.pictures import auto_exposure, checked_exposure
 
 if TYPE_CHECKING:
     from vcc.light_field import LightField

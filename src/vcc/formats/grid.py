@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
-from vcc.units import mm
+from vcc.base.errors import InputError
+from vcc.base.units import mm
 
 if TYPE_CHECKING:
-    from vcc.affine import Affine
+    from vcc.base.affine import Affine
     from vcc.light_field import Sample
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")

@@ -12,9 +12,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.files.pfm import read_pfm
 from vcc.formats import cambridge, containers, hci
-from vcc.formats.pfm import read_pfm
 
 Quantity = Literal["disparity", "depth"]
 

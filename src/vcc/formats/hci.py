@@ -10,10 +10,10 @@ import math
 import re
 from pathlib import Path
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.base.units import mm
 from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
 from vcc.light_field import Sample
-from vcc.units import mm
 
 PARAMETERS = "parameters.cfg"
 

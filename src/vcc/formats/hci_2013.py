@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats import hdf5
 from vcc.formats.grid import Decoded, Geometry
 

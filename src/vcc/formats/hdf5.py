@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 

@@ -16,13 +16,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.fields.sampled import to_numpy
+from vcc.files.atomic import atomic_path
 from vcc.formats import hdf5
-from vcc.formats.atomic import atomic_path
 from vcc.formats.grid import Decoded, Geometry
 from vcc.light_field import LightField, Sample
-from vcc.sampled import to_numpy
 
 _TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
 _FROM_ZERO = Affine.translation(1, 1, 1, 1)  # from indices counted from 0 to MATLAB's

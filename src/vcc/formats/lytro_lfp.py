@@ -29,7 +29,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats.grid import Decoded
 
 ENDINGS = (".lfp", ".lfr", ".lfx")

@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.files.pictures import read_picture
 from vcc.formats.grid import ViewGrid, pictures_in
-from vcc.formats.pictures import read_picture
 
 Order = Literal["row-major", "column-major", "serpentine", "serpentine-columns"]
 

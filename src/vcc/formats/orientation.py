@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc import parallax
-from vcc.affine import Affine
+from vcc.base.affine import Affine
+from vcc.fields import parallax
 from vcc.formats.grid import Geometry
 
 OrientationChoice = Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"]

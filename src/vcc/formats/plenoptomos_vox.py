@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.units import mm, um
 from vcc.formats import hdf5
 from vcc.formats.grid import Decoded, Geometry
-from vcc.units import mm, um
 
 ENDINGS = (".vox",)
 

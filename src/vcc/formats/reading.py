@@ -13,9 +13,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc import parallax, units
-from vcc.affine import Affine
-from vcc.errors import InputError, ResultWarning
+from vcc.base import units
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError, ResultWarning
+from vcc.fields import parallax
+from vcc.files.pictures import read_picture
+from vcc.files.transfer import decode
 from vcc.formats import (
     cambridge,
     camera_names,
@@ -29,10 +32,8 @@ from vcc.formats import (
 from vcc.formats.grid import DEFAULT_SPACING, Decoded, Geometry, ViewGrid
 from vcc.formats.numbered import ORDERS, Order
 from vcc.formats.orientation import VISIBLE_DISPARITY, OrientationChoice, look, looked_at, rearranged
-from vcc.formats.pictures import read_picture
 from vcc.formats.reading_views import read_views
 from vcc.formats.sparse import SparseViews
-from vcc.formats.transfer import decode
 from vcc.light_field import DisparityRange, LightField, Sample
 
 Transfer = Literal["auto", "srgb", "linear"]

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
-from vcc.formats.pictures import read_picture, read_png_into
-from vcc.formats.transfer import decode
+from vcc.base.errors import InputError
+from vcc.files.pictures import read_picture, read_png_into
+from vcc.files.transfer import decode
 
 _THREADS = 2  # decoding releases the interpreter's lock
 

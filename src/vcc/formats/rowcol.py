@@ -8,7 +8,7 @@ import re
 from collections import defaultdict
 from pathlib import Path
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats.grid import Place, ViewGrid, arrange, pictures_in
 
 _NAME = re.compile(r"(?P<before>.*?)(?P<row>\d+)(?P<between>[^\d.]{1,8})(?P<column>\d+)")

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from vcc.base.units import mm
 from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, mean_step, pictures_in
-from vcc.units import mm
 
 _NAME = re.compile(r"(.+?)_(\d+)_(\d+)_(-?\d+\.\d+)_(-?\d+\.\d+)_?", re.IGNORECASE)
 

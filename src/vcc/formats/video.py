@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
-from vcc.formats.atomic import atomic_path
+from vcc.base.errors import InputError
+from vcc.files.atomic import atomic_path
 from vcc.formats.exposing import Codes, Exposure
 from vcc.formats.grid import Decoded
 

@@ -27,10 +27,10 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.base.units import mm
+from vcc.files.pictures import read_picture
 from vcc.formats.grid import Decoded, Geometry, Place, arrange
-from vcc.formats.pictures import read_picture
-from vcc.units import mm
 
 ENDINGS = (".zip", ".xml")
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.formats.grid import Place, ViewGrid, arrange
 
 NAME = "views.csv"

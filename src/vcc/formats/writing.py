@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.units import mm
 from vcc.formats.exposing import Codes, Exposure, stored_view
 from vcc.formats.hci import PARAMETERS
-from vcc.units import mm
 
 if TYPE_CHECKING:
     from vcc.light_field import LightField
@@ -330,7 +330,7 @@ def _write_codes(codes: NDArray[Any], file: Path) -> None:
 
 
 def _write_exr(samples: NDArray[Any], full_scale: float, file: Path) -> None:
-    from vcc.affine import Affine
+    from vcc.base.affine import Affine
     from vcc.image import Image
 
     light = samples.astype(np.float32) / np.float32(full_scale) if full_scale != 1 else samples.astype(np.float32)

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import APERTURE, Bench
+from vcc.demo import story
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.optics import Biprism, Lens
+from vcc.optics.sensor import Sensor
 from vcc.recover import BiprismStereo, StereoDepth, depth_by_biprism
-from vcc.sensor import Sensor
+from vcc.showcase import figures
+from vcc.showcase.bench import APERTURE, Bench
 from vcc.sources import PlanesScene
-from vcc.units import mm
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError
+from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import APERTURE, Bench
-from vcc.errors import InputError
+from vcc.demo import story
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.gallery.published_codes import LEVIN
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
-from vcc.patterns import Circle, Open
+from vcc.optics.sensor import Sensor
 from vcc.recover import (
     DefocusDepth,
     blurred,
@@ -27,8 +27,9 @@ from vcc.recover import (
     sparse_gradients,
     wiener,
 )
-from vcc.sensor import Sensor
-from vcc.units import mm
+from vcc.shapes.patterns import Circle, Open
+from vcc.showcase import figures
+from vcc.showcase.bench import APERTURE, Bench
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

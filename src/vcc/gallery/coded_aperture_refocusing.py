@@ -11,18 +11,19 @@ from numpy.typing import NDArray
 
 from vcc.analysis import psf
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import APERTURE, Bench
-from vcc.demo.scene import MIDDLE
+from vcc.demo import story
 from vcc.gallery import flat_target
 from vcc.gallery.closeness import psnr
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.gallery.flat_target import OPENING
 from vcc.gallery.published_codes import VEERARAGHAVAN
 from vcc.optics import Lens, Mask
-from vcc.patterns import Open
+from vcc.optics.sensor import Sensor
 from vcc.recover import sparse_gradients, wiener
-from vcc.sensor import Sensor
+from vcc.shapes.patterns import Open
+from vcc.showcase import figures
+from vcc.showcase.bench import APERTURE, Bench
+from vcc.showcase.scene import MIDDLE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +38,7 @@ NOISE = 0.002
 NOISES = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02)
 """Those that gains are drawn for."""
 FULL_WELL, READ_NOISE = 10_000.0, 2.5
-"""Electrons at white through the open aperture, and of reading a pixel: `vcc.electronics`' defaults."""
+"""Electrons at white through the open aperture, and of reading a pixel: `vcc.optics.electronics`' defaults."""
 TARGET = 300
 """Largest side of the flat target, pixels."""
 STEPS = 60

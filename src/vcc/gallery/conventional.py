@@ -7,15 +7,16 @@ import warnings
 
 import numpy as np
 
-from vcc.affine import Affine
+from vcc.base.affine import Affine
+from vcc.base.errors import ResultWarning
+from vcc.base.units import um
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import Bench
-from vcc.errors import ResultWarning
+from vcc.demo import story
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.light_field import LightField
-from vcc.sensor import Sensor
-from vcc.units import um
+from vcc.optics.sensor import Sensor
+from vcc.showcase import figures
+from vcc.showcase.bench import Bench
 
 POINT_VIEWS = 60
 """Views a side of the light field of a point: a disc of so many cells has its second moment within 0.1 %."""

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.demo import figures, story
-from vcc.demo.bench import Bench
+from vcc.demo import story
 from vcc.gallery import extended_depth
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, paragraphs
 from vcc.gallery.extended_depth import ALIKE, PUPIL, WAVELENGTH, Comparison, Elements, Measured
 from vcc.optics import Lens, Mask, PhasePlate
-from vcc.patterns import Circle
-from vcc.surfaces import Surface
+from vcc.shapes.patterns import Circle
+from vcc.shapes.surfaces import Surface
+from vcc.showcase import figures
+from vcc.showcase.bench import Bench
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,9 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vcc.demo.bench import Bench, built_in, from_someone
-from vcc.demo.figures import Shown
 from vcc.light_field import LightField
+from vcc.showcase.bench import Bench, built_in, from_someone
+from vcc.showcase.figures import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -127,8 +127,8 @@ class Entry:
 
         Args:
             light_field: a light field, or a folder, file or store that holds one; its world is scaled so that its
-                grid of views is 20 mm wide (`vcc.demo.bench.from_someone`). None takes the built-in scene: leaves
-                at 0.8 m, a chart at 1.3 m and a town at 3 m, 20×20 views of 500×500 pixels.
+                grid of views is 20 mm wide (`vcc.showcase.bench.from_someone`). None takes the built-in scene:
+                leaves at 0.8 m, a chart at 1.3 m and a town at 3 m, 20×20 views of 500×500 pixels.
             progress: called with (done, total) as the work advances.
 
         Raises:

@@ -14,18 +14,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError
+from vcc.base.units import mm, nm
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import Bench
-from vcc.errors import InputError
+from vcc.demo import story
 from vcc.gallery import closeness, flat_target
 from vcc.gallery.entry import Picture
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, PhasePlate
+from vcc.optics.sensor import Sensor
 from vcc.plot.tracing import trace
 from vcc.recover import wiener
-from vcc.sensor import Sensor
-from vcc.units import mm, nm
+from vcc.showcase import figures
+from vcc.showcase.bench import Bench
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError
+from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo.bench import Bench
-from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
-from vcc.sensor import Sensor
-from vcc.units import mm
+from vcc.optics.sensor import Sensor
+from vcc.showcase.bench import Bench
 
 Array = NDArray[np.float64]
 

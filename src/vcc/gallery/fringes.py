@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.demo import figures, story
+from vcc.demo import story
 from vcc.gallery.entry import Finding
 from vcc.light_field import LightField
+from vcc.showcase import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.analysis import OptimisedAperture, expected_deblurring_error, natural_image_power, optimised_aperture
-from vcc.demo import figures, story
-from vcc.demo.bench import Bench
+from vcc.demo import story
 from vcc.gallery import flat_target
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.gallery.flat_target import OPENING
 from vcc.gallery.published_codes import LEVIN, VEERARAGHAVAN, ZHOU_NAYAR
 from vcc.optics import Mask
-from vcc.patterns import Circle, as_pattern, mura
 from vcc.recover import wiener
+from vcc.shapes.patterns import Circle, as_pattern, mura
+from vcc.showcase import figures
+from vcc.showcase.bench import Bench
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,12 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.units import mm, um
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import Bench
-from vcc.electronics import Electronics
-from vcc.errors import InputError, ResultWarning
+from vcc.demo import story
 from vcc.gallery import heterodyne_figures
 from vcc.gallery.closeness import psnr
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
@@ -23,13 +22,15 @@ from vcc.gallery.heterodyne_figures import TRANSMITTED
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
-from vcc.patterns import CosineSum, Open
-from vcc.recording import expose_image
+from vcc.optics.electronics import Electronics
+from vcc.optics.sensor import Sensor
 from vcc.recover import decode_heterodyne, heterodyne_calibration, refocused
 from vcc.recover.heterodyne import PINHOLE_SHARE, HeterodyneGeometry
 from vcc.recover.heterodyne_band import band_limited, places_on_sensor, true_views
-from vcc.sensor import Sensor
-from vcc.units import mm, um
+from vcc.run.recording import expose_image
+from vcc.shapes.patterns import CosineSum, Open
+from vcc.showcase import figures
+from vcc.showcase.bench import Bench
 
 Floats = NDArray[np.float32]
 

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.analysis import picture_spectrum, plot_plane_spectrum
+from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo import figures
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.recover.heterodyne import HeterodyneGeometry
-from vcc.units import mm
+from vcc.showcase import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

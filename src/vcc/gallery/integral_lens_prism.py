@@ -9,17 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import ResultWarning
+from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import APERTURE, Bench
-from vcc.errors import ResultWarning
+from vcc.demo import story
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, PrismArray
-from vcc.patterns import Open
-from vcc.sensor import Sensor
-from vcc.units import mm
+from vcc.optics.sensor import Sensor
+from vcc.shapes.patterns import Open
+from vcc.showcase import figures
+from vcc.showcase.bench import APERTURE, Bench
 
 Array = NDArray[np.float64]
 
@@ -32,7 +33,7 @@ MAIN, OPENING = 25 * mm, 2 * mm
 REACH = 0.92
 """How much of the light field's angle the views use; the rest is for openings that are no points."""
 FARTHEST = 7.5
-"""Pixels a view: what moves farther from view to view is not measured (`vcc.parallax`)."""
+"""Pixels a view: what moves farther from view to view is not measured (`vcc.fields.parallax`)."""
 BORDER = 0.06
 """Share of each window at each side that decoding leaves out: there the edges of neighbours are blurred in."""
 

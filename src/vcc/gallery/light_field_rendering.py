@@ -8,18 +8,19 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import Bench
-from vcc.errors import InputError, ResultWarning
+from vcc.demo import story
 from vcc.gallery.closeness import psnr
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.light_field import LightField
 from vcc.optics import Mask
-from vcc.patterns import Circle
-from vcc.sensor import Sensor
-from vcc.units import mm
+from vcc.optics.sensor import Sensor
+from vcc.shapes.patterns import Circle
+from vcc.showcase import figures
+from vcc.showcase.bench import Bench
 
 STEP = 20 * mm
 """How far before and behind the plane of the views new pictures are taken."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import importlib
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.gallery.entry import Entry
 
 ENTRIES = (

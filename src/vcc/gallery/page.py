@@ -10,11 +10,11 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from vcc.demo.figures import write_figure
-from vcc.demo.page import Panel, Section, write_page
-from vcc.errors import InputError
-from vcc.formats.atomic import atomic_path
+from vcc.base.errors import InputError
+from vcc.files.atomic import atomic_path
 from vcc.gallery.entry import Entry, Finding, Picture, Result
+from vcc.showcase.figures import write_figure
+from vcc.showcase.page import Panel, Section, write_page
 
 VERDICTS = {True: "reached", False: "not reached", None: "–"}
 JPEG_QUALITY = 88

@@ -12,22 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.analysis import Refocuser
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.units import um
 from vcc.camera import Camera
-from vcc.demo import figures, story
-from vcc.demo.bench import Bench
-from vcc.electronics import Electronics
-from vcc.errors import InputError, ResultWarning
+from vcc.demo import story
 from vcc.gallery import closeness, fringes
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, LensArray, PhasePlate
-from vcc.patterns import Circle
-from vcc.recording import expose_image
+from vcc.optics.electronics import Electronics
+from vcc.optics.sensor import Sensor
 from vcc.recover import LensletGrid, decode_plenoptic, without_aberration
-from vcc.sensor import Sensor
-from vcc.surfaces import Surface, Zernike
-from vcc.units import um
+from vcc.run.recording import expose_image
+from vcc.shapes.patterns import Circle
+from vcc.shapes.surfaces import Surface, Zernike
+from vcc.showcase import figures
+from vcc.showcase.bench import Bench
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

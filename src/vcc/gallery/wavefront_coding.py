@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vcc.demo import story
-from vcc.demo.bench import Bench
 from vcc.gallery import extended_depth
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, paragraphs
 from vcc.gallery.extended_depth import ALIKE, PUPIL, WAVELENGTH, Comparison, Measured
 from vcc.optics import Lens, Mask, PhasePlate
-from vcc.patterns import Open
-from vcc.surfaces import Cubic
+from vcc.shapes.patterns import Open
+from vcc.shapes.surfaces import Cubic
+from vcc.showcase.bench import Bench
 
 RATIO = 3.0
 """α over the largest misfocus ψ: the paper's example has α = 90, and ψ up to 30."""

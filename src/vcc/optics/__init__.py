@@ -5,13 +5,13 @@ from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection, 
 from vcc.optics.diffuser import CodedDiffuser, Diffuser
 from vcc.optics.faces import Element, Faces, Part
 from vcc.optics.first_order import FirstOrder, Pupil
-from vcc.optics.lattice import Lattice
 from vcc.optics.lens import Lens
 from vcc.optics.lens_array import LensArray, PrismArray
 from vcc.optics.mask import Mask
 from vcc.optics.phase_plate import PhasePlate, SurfaceDeflection
 from vcc.optics.prism import Prism
 from vcc.optics.scatter import Scatter, SheetMap
+from vcc.shapes.lattice import Lattice
 
 __all__ = [
     "Biprism",

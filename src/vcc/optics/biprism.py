@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.optics.deflections import FacetDeflection
 from vcc.optics.faces import Element, Faces
-from vcc.patterns import Circle
+from vcc.shapes.patterns import Circle
 
 
 @dataclass(frozen=True)

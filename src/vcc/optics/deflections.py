@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError
-from vcc.optics.lattice import Lattice
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.shapes.lattice import Lattice
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
-from vcc.kernels import SUM_TOLERANCE, Kernel, Samples
+from vcc.base.errors import InputError
 from vcc.optics.faces import Element, Faces
 from vcc.optics.scatter import Scatter, SheetMap
-from vcc.patterns import Bounded, Circle, Open, Pattern
+from vcc.shapes.kernels import SUM_TOLERANCE, Kernel, Samples
+from vcc.shapes.patterns import Bounded, Circle, Open, Pattern
 
 Array = NDArray[np.float64]
 
@@ -219,7 +219,7 @@ class CodedDiffuser(Element):
 
     def described(self) -> str:
         """The kernels, the cells of the maps and the sheet's size in words."""
-        from vcc.units import short
+        from vcc.base.units import short
 
         assert isinstance(self.kernels, tuple)
         assert self.height is not None

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError
-from vcc.kernels import Kernel
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
 from vcc.optics.deflections import Deflection, as_deflection
 from vcc.optics.scatter import Scatter
-from vcc.patterns import Pattern, as_pattern
+from vcc.shapes.kernels import Kernel
+from vcc.shapes.patterns import Pattern, as_pattern
 
 Array = NDArray[np.float64]
 
@@ -163,7 +163,7 @@ class Element(abc.ABC):
 
     def described(self) -> str:
         """The element's parameters in words, for `explain`."""
-        from vcc.describe import parameters_in_words
+        from vcc.base.describe import parameters_in_words
 
         return parameters_in_words(self, leave_out=("z", "name", "source"))
 

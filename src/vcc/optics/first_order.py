@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.units import short
 from vcc.optics.faces import Element, Faces, Part
-from vcc.patterns import Circle
-from vcc.units import short
+from vcc.shapes.patterns import Circle
 
 Matrix = NDArray[np.float64]
 

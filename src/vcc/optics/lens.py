@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
 from vcc.optics.faces import Element, Faces
-from vcc.patterns import Circle
+from vcc.shapes.patterns import Circle
 
 
 @dataclass(frozen=True)

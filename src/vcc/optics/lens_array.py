@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.optics.deflections import CellDeflection
 from vcc.optics.faces import Element, Faces
-from vcc.optics.lattice import CellApertures, CellBlock, Lattice, interleaved
-from vcc.patterns import Bounded, Open, Pattern
+from vcc.shapes.lattice import CellApertures, CellBlock, Lattice, interleaved
+from vcc.shapes.patterns import Bounded, Open, Pattern
 
 LARGEST_DISC = {"square": math.pi / 4, "hexagonal": math.pi / (2 * math.sqrt(3))}
 """The share of a cell that the largest disc in it covers."""
@@ -30,7 +30,7 @@ class LensArray(Element):
     Args:
         pitch: distance between the centres of neighbouring lenslets, metres.
         focal_length: of the lenslets, metres, negative for diverging ones, infinite for none; several are
-            interleaved so that neighbours differ (`vcc.optics.lattice.interleaved`), the first at ``offset``.
+            interleaved so that neighbours differ (`vcc.shapes.lattice.interleaved`), the first at ``offset``.
         layout: ``"square"`` or ``"hexagonal"`` (every second row shifted by half a pitch).
         rotation: of the rows against x, radians, from x towards y.
         offset: place (x, y) of the centre of a lenslet from the element's middle, metres; at (0, 0) one is centred
@@ -232,7 +232,7 @@ class PrismArray(Element):
 
     def described(self) -> str:
         """The number of cells and the parameters in words."""
-        from vcc.describe import parameters_in_words
+        from vcc.base.describe import parameters_in_words
 
         steepest = float(np.abs(self.slopes).max())
         words = parameters_in_words(self, leave_out=("z", "name", "slopes"))

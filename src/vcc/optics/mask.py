@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.optics.faces import Element, Faces
-from vcc.patterns import Bounded, Cells, Pattern, as_pattern
+from vcc.shapes.patterns import Bounded, Cells, Pattern, as_pattern
 
 
 @dataclass(frozen=True)

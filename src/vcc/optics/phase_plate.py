@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
-from vcc.describe import parameters_in_words
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.describe import parameters_in_words
+from vcc.base.errors import InputError
+from vcc.base.units import short
 from vcc.optics.deflections import Deflection, SlopeFunction, checked_slopes
 from vcc.optics.faces import Element, Faces
-from vcc.patterns import Bounded, Circle, Open, Pattern
-from vcc.surfaces import Surface
-from vcc.units import short
+from vcc.shapes.patterns import Bounded, Circle, Open, Pattern
+from vcc.shapes.surfaces import Surface
 
 Array = NDArray[np.float64]
 

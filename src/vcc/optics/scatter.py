@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.errors import InputError
-from vcc.kernels import SUM_TOLERANCE, Kernel
+from vcc.base.errors import InputError
+from vcc.shapes.kernels import SUM_TOLERANCE, Kernel
 
 Array = NDArray[np.float64]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from vcc.errors import InputError
-from vcc.plan.compiler import compile_plan, why_not_footprints
+from vcc.base.errors import InputError
 from vcc.plan.depth_rule import denser
-from vcc.plan.model import Plan
-from vcc.plan.ray_compiler import compile_rays
-from vcc.plan.rays import RayPlan
+from vcc.plan.footprints.compile import compile_plan, why_not_footprints
+from vcc.plan.footprints.model import Plan
+from vcc.plan.rays.compile import compile_rays
+from vcc.plan.rays.model import RayPlan
 
 if TYPE_CHECKING:
     from vcc.camera import Camera

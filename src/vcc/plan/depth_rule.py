@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.disparity import DisparityMaps
-from vcc.errors import InputError
+from vcc.advice.view_gaps import ViewGaps
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.fields.disparity import DisparityMaps
 from vcc.light_field import LightField
-from vcc.plan.view_gaps import ViewGaps
 
 if TYPE_CHECKING:
     from vcc.camera import Camera

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.camera import Camera, Stage
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.units import mm, short
+from vcc.camera import Camera
 from vcc.light_field import LightField
 from vcc.optics import CellDeflection, Element, FirstOrder, Lens
+from vcc.optics.train import Stage
 from vcc.plot import style
 from vcc.plot.elements import Pen, draw_element, draw_sensor, half_size, label_of, length_in_words, magnification
 from vcc.plot.tracing import Paths, fan, openings, trace
-from vcc.units import mm, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

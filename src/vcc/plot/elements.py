@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.base.units import mm, short
 from vcc.optics import (
     Biprism,
     CellDeflection,
@@ -31,12 +32,11 @@ from vcc.optics import (
     Pyramid,
     Scatter,
 )
-from vcc.patterns import Pattern
+from vcc.optics.sensor import Sensor
 from vcc.plot import style
 from vcc.plot.tracing import Crossing, crossings, spread_along
-from vcc.sensor import Sensor
-from vcc.surfaces import Surface
-from vcc.units import mm, short
+from vcc.shapes.patterns import Pattern
+from vcc.shapes.surfaces import Surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError
+from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.errors import InputError
+from vcc.fields.sampled import to_numpy
 from vcc.light_field import LightField
 from vcc.optics import Faces
+from vcc.optics.sensor import Sensor
 from vcc.plot import style
 from vcc.plot.phase_space_rays import (
     FULL,
@@ -24,9 +27,6 @@ from vcc.plot.phase_space_rays import (
     slice_of,
     traced,
 )
-from vcc.sampled import to_numpy
-from vcc.sensor import Sensor
-from vcc.units import mm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -313,7 +313,7 @@ def _radiance(piece: LightField, across: str) -> Array:
 
 def _for_display(values: Array) -> Any:
     """Linear light as screens want it, 0 to 1."""
-    from vcc.formats.transfer import from_linear
+    from vcc.files.transfer import from_linear
 
     return np.clip(from_linear(np.clip(values, 0, 1)), 0, 1)
 

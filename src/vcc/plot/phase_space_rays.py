@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.camera import Camera, Stage, about
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.camera import Camera
+from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
 from vcc.light_field import LightField
 from vcc.optics import Scatter
+from vcc.optics.train import Stage, about
 from vcc.plot.tracing import marginals
-from vcc.sampled import LIGHT_FIELD_AXES, to_numpy
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
-from vcc.camera import Camera, Stage, about
-from vcc.kernels import Kernel
+from vcc.base.affine import Affine
+from vcc.camera import Camera
 from vcc.optics import Element, Faces, Scatter
+from vcc.optics.train import Stage, about
+from vcc.shapes.kernels import Kernel
 
 Array = NDArray[np.float64]
 

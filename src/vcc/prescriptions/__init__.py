@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.optics.first_order import FirstOrder
 from vcc.prescriptions import pbrt, zemax
 from vcc.prescriptions.glasses import D_LINE, Glasses

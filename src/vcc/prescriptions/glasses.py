@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 
 D_LINE = 587.5618e-9
 """The yellow helium line d, metres: the wavelength at which lenses and nd are specified."""

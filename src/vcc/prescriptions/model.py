@@ -11,9 +11,9 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.units import short
 from vcc.optics.first_order import FirstOrder, gap, refraction, surface_power
-from vcc.units import short
 
 Matrix = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.base.units import mm
 from vcc.prescriptions.glasses import Glasses
 from vcc.prescriptions.model import Prescription, Surface
-from vcc.units import mm
 
 _COLUMNS = ("radius", "thickness", "index", "diameter")
 

@@ -14,10 +14,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.base.units import cm, m, mm
 from vcc.prescriptions.glasses import Glasses
 from vcc.prescriptions.model import Prescription, Surface
-from vcc.units import cm, m, mm
 
 _UNITS = {
     "MM": mm,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.fields.sampled import to_numpy
 from vcc.light_field import LightField
-from vcc.sampled import to_numpy
-from vcc.surfaces import Surface
+from vcc.shapes.surfaces import Surface
 
 _TURNED = 1e-9
 """Share of a pixel's step in slope by which it may leave its axis: rounding."""

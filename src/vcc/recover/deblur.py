@@ -20,8 +20,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.errors import InputError
-from vcc.memory import check_memory
+from vcc.base.errors import InputError
+from vcc.base.memory import check_memory
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -316,7 +316,7 @@ def richardson_lucy(
         iterations: at most.
         tolerance: stop once a step changes the picture by no more than this share, ‖Δx‖ ≤ tolerance·‖x‖.
         borders: see `blurred`.
-        memory_limit: bytes; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
         progress: called with (steps done, most steps).
 
     Raises:
@@ -399,7 +399,7 @@ def sparse_gradients(
         iterations: at most.
         tolerance: stop once a step lowers the objective by no more than this share.
         borders: see `blurred`.
-        memory_limit: bytes; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
         progress: called with (steps done, most steps).
 
     Raises:

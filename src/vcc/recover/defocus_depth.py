@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.memory import check_memory
 from vcc.camera import Camera
-from vcc.errors import InputError, ResultWarning
+from vcc.fields.sampled import to_numpy
 from vcc.image import Image
 from vcc.light_field import LightField
-from vcc.memory import check_memory
-from vcc.sampled import to_numpy
 
 Array = NDArray[np.float64]
 
@@ -196,7 +196,7 @@ def depth_from_defocus(
             and tells zeros of a spectrum apart that lie 2/block or more from each other: a kernel's lie 1/width
             apart, so blocks should be twice as wide.
         step: from block to block, pixels; None takes half a block.
-        memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes that the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Returns:
         The distances of blocks side by side from the upper left corner on.

@@ -7,8 +7,8 @@ Two ways that err differently:
 - `depth_by_plane_sweep` tries disparities one after the other and asks how well the views then agree with the
   middle one: slower, sharp at borders, and sound beside things that hide what lies behind them.
 
-Disparities are those of `vcc.parallax`: along u, pixels per view, positive = nearer than where the views converge.
-Both give the distance in metres through the frame of the light field.
+Disparities are those of `vcc.fields.parallax`: along u, pixels per view, positive = nearer than where the views
+converge. Both give the distance in metres through the frame of the light field.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.disparity import DisparityMaps
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.base.memory import check_memory
+from vcc.fields.disparity import DisparityMaps
+from vcc.fields.sampled import to_numpy
 from vcc.light_field import LightField
-from vcc.memory import check_memory
-from vcc.sampled import to_numpy
 
 if TYPE_CHECKING:
     from vcc.store import StoredLightField
@@ -149,7 +149,7 @@ def depth_by_structure_tensor(
             `vcc.LightField.measured_disparity_range`, widened by 0.3 if it was measured.
         inner_scale: σ of the Gaussian under which derivatives are taken, pixels and views.
         outer_scale: σ of the Gaussian over which their products are summed, pixels and views.
-        memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes that the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Returns:
         Depth of the middle view (row (n − 1) // 2, likewise column). Disparities are not held to the range to
@@ -209,7 +209,7 @@ def depth_by_plane_sweep(
             `vcc.LightField.measured_disparity_range`, widened by 0.3 if it was measured.
         step: between the disparities tried, pixels per view.
         window: side of the window, pixels, an odd number.
-        memory_limit: bytes that the costs and the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes that the costs and the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
         progress: called with (done, total) as the sweep advances.
 
     Returns:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.memory import check_memory, check_samples
 from vcc.image import Image
-from vcc.memory import check_memory, check_samples
 from vcc.recover.refocus import refocused
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class FocalStack:
             window: standard deviation of the Gaussian, pixels: wider ones are safer against noise, and smear the
                 choice over edges in depth.
             selectivity: 0 averages all pictures; infinite takes the sharpest alone.
-            memory_limit: bytes that the work may take; None takes `vcc.memory.MEMORY_LIMIT`.
+            memory_limit: bytes that the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
         Raises:
             InputError: a window of zero or less, a negative selectivity, or more memory needed than allowed.
@@ -161,9 +161,10 @@ class FocalStack:
             InputError: another ending, an impossible rate, pictures of neither 1 nor 3 channels, no PyAV for an
                 MP4, or a place that cannot be written to.
         """
-        from vcc.formats import transfer, video
-        from vcc.formats.atomic import atomic_path
-        from vcc.formats.pictures import auto_exposure, checked_exposure
+        from vcc.files import transfer
+        from vcc.files.atomic import atomic_path
+        from vcc.files.pictures import auto_exposure, checked_exposure
+        from vcc.formats import video
 
         path = Path(path).expanduser()
         ending = path.suffix.lower()
@@ -246,7 +247,7 @@ def focal_stack(
     Args:
         light_field: in memory or on disk.
         distances: metres before its plane; see `focus_distances`.
-        memory_limit: bytes that the stack may take; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes that the stack may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
         progress: called with (pictures done, pictures).
         options: diameter, centre, interpolation and between_views, as `refocused` has them.
 

@@ -24,15 +24,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.units import short
 from vcc.camera import Camera
-from vcc.errors import InputError
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Mask
-from vcc.patterns import Bounded, CosineSum, as_pattern
-from vcc.recording import Recording
-from vcc.units import short
+from vcc.run.recording import Recording
+from vcc.shapes.patterns import Bounded, CosineSum, as_pattern
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -354,7 +354,7 @@ def decode_heterodyne(
             that is cut off the views. A Fourier transform takes what is beyond one edge for what is at the other;
             0 is for scenes that are alike there, as black ones are, and carriers that fit a whole number of times.
         memory_limit: bytes that the tiles and what is made of them may take; None takes
-            `vcc.memory.MEMORY_LIMIT`.
+            `vcc.base.memory.MEMORY_LIMIT`.
 
     Returns:
         float32 radiance, shape (v, u, t, s[, channels]), at the entrance plane, upright; 0 where ringing
@@ -377,7 +377,7 @@ def decode_heterodyne(
         white = white.mean(axis=2)
     if not white.mean() > 0:
         raise InputError("the calibration is dark: it must show a white scene through a pinhole")
-    from vcc.memory import check_samples
+    from vcc.base.memory import check_samples
 
     channels = raw[..., None] if raw.ndim == 2 else raw
     numbers = _WORKING_NUMBERS + channels.shape[2]  # of float32, for each sample

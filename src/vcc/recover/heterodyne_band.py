@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
 from vcc.camera import Camera
-from vcc.errors import InputError
 from vcc.light_field import LightField
 from vcc.recover.heterodyne import HeterodyneGeometry
 

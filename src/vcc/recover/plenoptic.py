@@ -16,18 +16,18 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.affine import Affine
-from vcc.errors import InputError, ResultWarning
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError, ResultWarning
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import LensArray
-from vcc.optics.lattice import Lattice
-from vcc.recording import Recording
+from vcc.run.recording import Recording
+from vcc.shapes.lattice import Lattice
 
 if TYPE_CHECKING:
     from vcc.camera import Camera
-    from vcc.recording import Demosaicing
-    from vcc.sensor import Sensor
+    from vcc.optics.sensor import Sensor
+    from vcc.run.recording import Demosaicing
 
 Array = NDArray[np.float64]
 
@@ -619,7 +619,7 @@ def decode_plenoptic(
             lattices its √(√3/2), which keeps the number of samples.
         inverted: whether the recording is as light lands on the sensor, upside down, which is then turned. Views
             are upright either way.
-        memory_limit: bytes that the light field may take; None takes `vcc.memory.MEMORY_LIMIT`.
+        memory_limit: bytes that the light field may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Returns:
         float32, shape (v, u, t, s[, channels]), upright; 0 where the white image is dark, and where noise went
@@ -646,7 +646,7 @@ def decode_plenoptic(
     channels = raw.shape[2] if raw.ndim == 3 else None
     result = (*counts, *resampling.shape)
 
-    from vcc.memory import check_samples
+    from vcc.base.memory import check_samples
 
     check_samples((*result, channels or 1), memory_limit, "the decoded light field")
     planes = np.moveaxis(np.atleast_3d(raw), 2, 0).astype(np.float32)
@@ -758,8 +758,8 @@ def _default_step(grid: LensletGrid) -> float:
 
 def _demosaiced(raw: Array, color_filter: str | tuple[str, ...], method: Demosaicing) -> NDArray[np.float32]:
     """All channels of a mosaic whose numbers are no longer those of a sensor."""
-    from vcc.electronics import Electronics
-    from vcc.recording import demosaic
+    from vcc.optics.electronics import Electronics
+    from vcc.run.recording import demosaic
 
     return demosaic(raw.astype(np.float32), Electronics(color_filter=color_filter), method)
 

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc import patterns
-from vcc.affine import Affine
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError, ResultWarning
 from vcc.camera import Camera
-from vcc.errors import InputError, ResultWarning
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Element, Lens, Mask
-from vcc.sensor import Sensor
+from vcc.optics.sensor import Sensor
+from vcc.shapes import patterns
 
 if TYPE_CHECKING:
-    from vcc.plan.model import Plan
+    from vcc.plan.footprints.model import Plan
     from vcc.store import StoredLightField
 
 Progress = Callable[[int, int], None]

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError
 from vcc.camera import Camera
-from vcc.errors import InputError
+from vcc.fields.sampled import to_numpy
 from vcc.image import Image
 from vcc.optics import Biprism, Lens
-from vcc.sampled import to_numpy
 
 Array = NDArray[np.float64]
 

@@ -18,9 +18,9 @@ import json
 import math
 from typing import Final, Literal, get_args
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.base.units import mm
 from vcc.sources.views import CameraArray
-from vcc.units import mm
 
 PictureFormat = Literal["exr", "png"]
 Engine = Literal["as in the file", "cycles", "eevee"]

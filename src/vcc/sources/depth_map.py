@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.sources.views import CameraArray, ViewCamera
 
 Array = NDArray[np.float64]

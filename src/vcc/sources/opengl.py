@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.sources.views import CameraArray, ViewCamera
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply")
@@ -576,7 +576,7 @@ def _interleaved(*columns: NDArray[np.float64]) -> NDArray[np.float32]:
 
 def _linear(colours: NDArray[Any], already: bool) -> NDArray[np.float64]:
     """Linear colour and opacity, 0 to 1, of 8-bit ones."""
-    from vcc.formats.transfer import to_linear
+    from vcc.files.transfer import to_linear
 
     shares = colours.astype(np.float64) / 255
     if not already:

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.sources.views import ViewCamera
 
 Matrix = NDArray[Any]

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 from vcc.light_field import LightField
 from vcc.sources.textures import Array, Texture, mean_radiance_and_opacity, radiance_and_opacity
 from vcc.sources.views import CameraArray, ViewCamera

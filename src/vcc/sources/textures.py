@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 
 Array = NDArray[Any]
 Texture = Callable[[Array, Array], Array]
@@ -185,7 +185,7 @@ class Picture:
         """The picture in a file, with its opacity where it is a PNG or OpenEXR file that has one.
 
         Args:
-            path: a file that `vcc.formats.pictures.read_picture` reads.
+            path: a file that `vcc.files.pictures.read_picture` reads.
             width: of the sheet, metres.
             transfer: how stored integers stand for light: ``"srgb"``, as pictures for people do, or ``"linear"``.
                 Floating point is linear.
@@ -194,7 +194,7 @@ class Picture:
             InputError: a file that cannot be read, an opacity in another kind of file, or a transfer that there is
                 not.
         """
-        from vcc.formats.transfer import decode
+        from vcc.files.transfer import decode
 
         if transfer not in ("srgb", "linear"):
             raise InputError(f'transfer is "srgb" or "linear", not "{transfer}"')
@@ -275,7 +275,7 @@ def _averaged(values: Array, axis: int, count: int) -> Array:
 
 def _read_with_opacity(path: Path) -> tuple[Array, Array | None]:
     """Samples as stored, (rows, columns[, 3]), and opacity, 0 to 1, if there is any that is not 1."""
-    from vcc.formats.pictures import read_picture
+    from vcc.files.pictures import read_picture
 
     if path.suffix.lower() == ".png" and path.is_file():
         import imagecodecs

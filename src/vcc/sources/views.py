@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
 from vcc.light_field import LightField, Sample
 
 

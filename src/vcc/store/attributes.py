@@ -10,8 +10,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from vcc.affine import Affine
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
 from vcc.light_field import Sample
 
 FORMAT_VERSION = 1

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 
 CHUNK_BYTES = 2**17
 """About how many bytes of samples an inner chunk holds: some rows of pixels of one view."""

@@ -10,10 +10,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vcc.errors import InputError
-from vcc.formats.transfer import decode, encode
+from vcc.base.errors import InputError
+from vcc.fields.sampled import to_numpy
+from vcc.files.transfer import decode, encode
 from vcc.light_field import LightField
-from vcc.sampled import to_numpy
 from vcc.store.attributes import DTYPES, Transfer
 from vcc.store.compression import Compression
 from vcc.store.reading import StoredLightField

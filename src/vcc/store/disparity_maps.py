@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from vcc.disparity import DisparityMaps
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.fields.disparity import DisparityMaps
 
 FOLDER = "disparity"
 """The name of the array in the group."""

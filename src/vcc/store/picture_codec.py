@@ -15,7 +15,7 @@ from zarr.core.buffer import Buffer, NDBuffer
 from zarr.core.common import JSON
 from zarr.registry import register_codec
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
 
 NAME = "vcc.picture"
 

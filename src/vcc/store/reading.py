@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.affine import Affine
-from vcc.disparity import Disparities, DisparityMaps
-from vcc.errors import InputError, ResultWarning
-from vcc.formats.transfer import decode
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError, ResultWarning
+from vcc.fields.disparity import Disparities, DisparityMaps
+from vcc.fields.sampled import Index
+from vcc.files.transfer import decode
 from vcc.light_field import (
     SAMPLES_IN_WORDS,
     DisparityRange,
@@ -25,7 +26,6 @@ from vcc.light_field import (
     describe_geometry,
     told_along_u,
 )
-from vcc.sampled import Index
 from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ Progress = Callable[[int, int], None]
 MEASURED_BYTES = 2**26
 """Views from which disparities are measured are cut to a band of rows if they take more than this as stored."""
 MEASURED_REACH = 3
-"""How many views on either side of the middle one disparities are measured from; see `vcc.parallax`."""
+"""How many views on either side of the middle one disparities are measured from; see `vcc.fields.parallax`."""
 NOT_THERE = 2**64 - 1
 """How the index of a Zarr shard says that a chunk was never written."""
 
@@ -397,7 +397,7 @@ class StoredLightField:
         return found
 
     def _measured(self) -> tuple[float, float] | None:
-        from vcc.parallax import Axis, disparity_range
+        from vcc.fields.parallax import Axis, disparity_range
 
         nt = self.shape[2]
         shown: list[tuple[float, float] | None] = [None, None]

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vcc.affine import Affine
-from vcc.disparity import DisparityMaps
-from vcc.errors import InputError
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.fields.disparity import DisparityMaps
 from vcc.light_field import LightField, Sample
 from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
 from vcc.store.compression import Compression, Lossless, Lossy, layout
@@ -279,7 +279,7 @@ def save_store(
             `StoreWriter.write_view` refuse.
     """
     from vcc import __version__
-    from vcc.sampled import to_numpy
+    from vcc.fields.sampled import to_numpy
 
     values = to_numpy(light_field.values)
     known = light_field.disparity.maps() if light_field.disparity.known else None

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning
 from vcc.sources.views import ViewCamera
 
 FAST, PLAIN = "llvm_ad_rgb", "scalar_rgb"

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.errors import InputError
+from vcc.base.errors import InputError
+from vcc.base.units import deg, mm
 from vcc.sources.views import CameraArray
-from vcc.units import deg, mm
 
 Plugin = dict[str, Any]
 Colour = tuple[float, float, float]

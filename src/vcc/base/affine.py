@@ -1,0 +1,216 @@
+"""Affine maps of rays and of sample indices: the whole of linear optics, and every frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.base.errors import InputError
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Affine:
+    """A frozen affine map as a homogeneous matrix: 5×5 on rays (u, v, s, t, 1), 3×3 on points (x, y, 1).
+
+    On rays, with position (u, v) and slope (s, t) = (du/dz, dv/dz)::
+
+        ⎡u'⎤   ⎡ uu uv us ut │ u0 ⎤ ⎡u⎤
+        ⎢v'⎥   ⎢ vu vv vs vt │ v0 ⎥ ⎢v⎥
+        ⎢s'⎥ = ⎢ su sv ss st │ s0 ⎥ ⎢s⎥
+        ⎢t'⎥   ⎢ tu tv ts tt │ t0 ⎥ ⎢t⎥
+        ⎣1 ⎦   ⎣  0  0  0  0 │  1 ⎦ ⎣1⎦
+
+    Maps are named ``to_from``, so that ``a_from_b @ b_from_c`` can be checked by eye.
+
+    Args:
+        matrix: n+1 by n+1 numbers with last row (0 … 0 1); n is 4 (rays, light fields) or 2 (points,
+            images, masks). Lengths in metres, slopes dimensionless.
+
+    Raises:
+        InputError: another shape or last row, or a number that is not finite.
+    """
+
+    matrix: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        matrix = np.array(self.matrix, dtype=np.float64)
+        if matrix.shape not in ((5, 5), (3, 3)):
+            raise InputError(f"an affine map is a 5×5 or 3×3 matrix, not {'×'.join(map(str, matrix.shape))}")
+        if not np.isfinite(matrix).all():
+            raise InputError(f"an affine map needs finite numbers, not\n{matrix}")
+        if not np.array_equal(matrix[-1], np.eye(len(matrix))[-1]):
+            raise InputError(f"the last row of an affine map is 0 … 0 1, not {matrix[-1]}")
+        matrix.flags.writeable = False
+        object.__setattr__(self, "matrix", matrix)
+
+    @classmethod
+    def from_parts(cls, linear: ArrayLike, offset: ArrayLike) -> Affine:
+        """The map x ↦ linear · x + offset, of n×n numbers and n numbers."""
+        linear, offset = np.asarray(linear, dtype=np.float64), np.asarray(offset, dtype=np.float64)
+        matrix = np.eye(len(offset) + 1)
+        matrix[:-1, :-1] = linear
+        matrix[:-1, -1] = offset
+        return cls(matrix)
+
+    @classmethod
+    def identity(cls, dimensions: int = 4) -> Affine:
+        """The map that changes nothing, on rays (4 dimensions) or points (2)."""
+        return cls(np.eye(dimensions + 1))
+
+    @classmethod
+    def propagation(cls, distance: float) -> Affine:
+        """Free flight towards +z over ``distance`` metres: u' = u + distance·s (paper, eq. 2, M1).
+
+        ::
+
+            ⎡1 0 d 0 0⎤
+            ⎢0 1 0 d 0⎥
+            ⎢0 0 1 0 0⎥     The paper writes row vectors and the opposite sign of s:
+            ⎢0 0 0 1 0⎥     u' = u − d·s. The maps agree once s is negated.
+            ⎣0 0 0 0 1⎦
+        """
+        matrix = np.eye(5)
+        matrix[0, 2] = matrix[1, 3] = distance
+        return cls(matrix)
+
+    @classmethod
+    def lens(cls, focal_length: float) -> Affine:
+        """A thin lens of ``focal_length`` metres on the axis: s' = s − u/f (paper, eq. 3, M2).
+
+        ::
+
+            ⎡  1    0  0 0 0⎤
+            ⎢  0    1  0 0 0⎥
+            ⎢-1/f   0  1 0 0⎥
+            ⎢  0  -1/f 0 1 0⎥
+            ⎣  0    0  0 0 1⎦
+
+        Raises:
+            InputError: a focal length of zero.
+        """
+        if focal_length == 0:
+            raise InputError("a lens needs a focal length other than 0 m")
+        matrix = np.eye(5)
+        matrix[2, 0] = matrix[3, 1] = -1.0 / focal_length
+        return cls(matrix)
+
+    @classmethod
+    def prism(cls, deflection: tuple[float, float]) -> Affine:
+        """A thin prism: every slope changes by the same (δs, δt), dimensionless.
+
+        ::
+
+            ⎡1 0 0 0 0 ⎤
+            ⎢0 1 0 0 0 ⎥    The paper prints a shear here (M3, M4, eq. 4: t' = t − θ·s), against
+            ⎢0 0 1 0 δs⎥    its own text, which describes this constant deflection.
+            ⎢0 0 0 1 δt⎥
+            ⎣0 0 0 0 1 ⎦
+        """
+        matrix = np.eye(5)
+        matrix[2:4, 4] = deflection
+        return cls(matrix)
+
+    @classmethod
+    def abcd(cls, matrix: ArrayLike) -> Affine:
+        """A rotationally symmetric first-order system: u' = A·u + B·s, s' = C·u + D·s, likewise v and t.
+
+        ::
+
+            ⎡A 0 B 0 0⎤
+            ⎢0 A 0 B 0⎥
+            ⎢C 0 D 0 0⎥     A, D without unit, B in metres, C in 1/metres.
+            ⎢0 C 0 D 0⎥
+            ⎣0 0 0 0 1⎦
+
+        Args:
+            matrix: ((A, B), (C, D)), the ray transfer matrix (Hecht, *Optics*, section 6.2).
+
+        Raises:
+            InputError: not 2×2 numbers.
+        """
+        given = np.asarray(matrix, dtype=np.float64)
+        if given.shape != (2, 2):
+            raise InputError(f"a ray transfer matrix is 2×2, not {'×'.join(map(str, given.shape)) or 'a number'}")
+        return cls.from_parts(np.kron(given, np.eye(2)), np.zeros(4))
+
+    @classmethod
+    def translation(cls, *offsets: float) -> Affine:
+        """x ↦ x + offsets; four offsets (u, v, s, t) make a map of rays, two a map of points."""
+        return cls.from_parts(np.eye(len(offsets)), offsets)
+
+    @classmethod
+    def scaling(cls, *factors: float) -> Affine:
+        """x ↦ factors · x, axis by axis; four factors make a map of rays, two a map of points."""
+        return cls.from_parts(np.diag(factors), np.zeros(len(factors)))
+
+    @property
+    def dimensions(self) -> int:
+        """4 for a map of rays, 2 for a map of points."""
+        return len(self.matrix) - 1
+
+    @property
+    def linear(self) -> NDArray[np.float64]:
+        """The n×n part that acts on differences."""
+        return self.matrix[:-1, :-1]
+
+    @property
+    def offset(self) -> NDArray[np.float64]:
+        """The n numbers to which the origin goes."""
+        return self.matrix[:-1, -1]
+
+    @property
+    def determinant(self) -> float:
+        """The factor by which volumes grow; 1 for every lossless optical element and flight in air."""
+        return float(np.linalg.det(self.linear))
+
+    def is_invertible(self) -> bool:
+        """Whether the map can be undone, judged free of the units of its rows and columns."""
+        linear = self.linear
+        for axis in (0, 1):
+            norms = np.linalg.norm(linear, axis=axis, keepdims=True)
+            if not norms.all():
+                return False
+            linear = linear / norms
+        return bool(abs(np.linalg.det(linear)) > 1e-12)
+
+    def inverse(self) -> Affine:
+        """The map that undoes this one.
+
+        Raises:
+            InputError: this map cannot be undone.
+        """
+        if not self.is_invertible():
+            raise InputError(f"this affine map has no inverse:\n{self!r}")
+        linear = np.linalg.inv(self.linear)
+        return Affine.from_parts(linear, -linear @ self.offset)
+
+    def __matmul__(self, other: Affine) -> Affine:
+        """This map after ``other``."""
+        if self.dimensions != other.dimensions:
+            raise InputError(
+                f"a map of {self.dimensions} dimensions cannot follow one of {other.dimensions} dimensions"
+            )
+        return Affine(self.matrix @ other.matrix)
+
+    def __call__(self, points: ArrayLike | Sequence[float]) -> NDArray[np.float64]:
+        """Rays or points as rows of an array (…, n), mapped."""
+        return np.asarray(points, dtype=np.float64) @ self.linear.T + self.offset
+
+    def isclose(self, other: Affine, tolerance: float = 1e-9) -> bool:
+        """Whether every entry agrees within ``tolerance``, relative to the larger entry or 1."""
+        return self.matrix.shape == other.matrix.shape and bool(
+            np.allclose(self.matrix, other.matrix, rtol=tolerance, atol=tolerance)
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Affine) and np.array_equal(self.matrix, other.matrix)
+
+    def __hash__(self) -> int:
+        return hash(self.matrix.tobytes())
+
+    def __repr__(self) -> str:
+        rows = np.array2string(self.matrix, precision=6, suppress_small=True, prefix="Affine(")
+        return f"Affine({rows})"

@@ -1,0 +1,106 @@
+"""Parameters of frozen dataclasses in words, with the units that their fields state."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, Field, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.units import short
+
+LONGEST_LIST = 6
+"""Of more numbers than this only how many they are and their range are told."""
+
+
+def parameters_in_words(thing: Any, leave_out: tuple[str, ...] = ()) -> str:
+    """The parameters of a dataclass that differ from their defaults, such as ``"diameter 20 mm"``.
+
+    Numbers are rounded to 6 digits; of arrays and long lists the shape and the range are told, of dataclasses in
+    fields their own words (``described()`` where they have it).
+
+    Args:
+        thing: an instance of a dataclass; fields with ``metadata={"unit": ...}`` are written with that unit.
+        leave_out: names of fields to pass over.
+    """
+    parts = []
+    for parameter in fields(thing):
+        value = getattr(thing, parameter.name)
+        if parameter.name in leave_out or value is None or is_default(value, parameter):
+            continue
+        name = parameter.name.replace("_", " ")
+        if isinstance(value, bool):  # it stands apart from its default, so that its name says it all
+            parts.append(name if value else f"not {name}")
+        else:
+            parts.append(f"{name} {_value(value, parameter.metadata.get('unit'))}")
+    return ", ".join(parts)
+
+
+def is_default(value: Any, parameter: Field[Any]) -> bool:
+    """Whether a field of a dataclass has its default value; values may be arrays, or hold some.
+
+    Args:
+        value: of the field.
+        parameter: the field, as `dataclasses.fields` lists it.
+    """
+    made = parameter.default_factory
+    default = parameter.default if made is MISSING else made()
+    if value is default:
+        return True
+    if default is MISSING:
+        return False
+    if isinstance(value, np.ndarray) or isinstance(default, np.ndarray):
+        return isinstance(value, np.ndarray) and isinstance(default, np.ndarray) and np.array_equal(value, default)
+    try:
+        return bool(value == default)
+    except (ValueError, TypeError):  # arrays inside, of which == makes an array
+        return False
+
+
+def _value(value: Any, unit: str | None) -> str:
+    if isinstance(value, np.ndarray):
+        return _array(value, unit) if value.ndim else _value(value.item(), unit)
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, tuple | list):
+        return _list(value, unit)
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return _number(value, unit)
+    described = getattr(value, "described", None)
+    if described is not None:
+        return str(described())
+    if is_dataclass(value) and not isinstance(value, type):
+        kind = type(value).__name__
+        words = parameters_in_words(value)
+        return f"{kind} ({words})" if words else kind
+    # A function has a name; what has neither that nor words of its own may print itself at any length.
+    return str(getattr(value, "__name__", None) or (value if isinstance(value, str) else type(value).__name__))
+
+
+def _number(value: float, unit: str | None) -> str:
+    if unit is not None:
+        return short(value, unit) if math.isfinite(value) else ("infinite" if value > 0 else "minus infinite")
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _list(values: tuple[Any, ...] | list[Any], unit: str | None) -> str:
+    try:
+        numbers = np.asarray(values)
+    except ValueError:  # lists of different lengths inside
+        numbers = np.asarray([])
+    if numbers.size > LONGEST_LIST and numbers.dtype.kind in "biuf":
+        return _array(numbers, unit)
+    if len(values) > LONGEST_LIST:
+        return f"({len(values)} values)"
+    return "(" + ", ".join(_value(part, unit) for part in values) + ")"
+
+
+def _array(values: NDArray[Any], unit: str | None) -> str:
+    """The shape, and from where to where the numbers lie."""
+    what = f"{'×'.join(map(str, values.shape))} numbers" if values.ndim > 1 else f"{values.size} numbers"
+    if values.size == 0 or values.dtype.kind not in "biuf":
+        return what
+    low, high = (_number(float(end), unit) for end in (values.min(), values.max()))
+    return f"{what}, all {low}" if low == high else f"{what} from {low} to {high}"

@@ -1,0 +1,1 @@
+"""Light fields as data: grids, samples, and what views show of depth."""

@@ -1,0 +1,148 @@
+"""The disparities that a light field shows: how far what is at each pixel of a view moves to the next view.
+
+They belong to the grid of samples, not to where the grid lies: flight, lenses and prisms leave them as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.base.errors import InputError
+
+Progress = Callable[[int, int], None]
+
+OUTERMOST = 0.5
+"""Per cent of a map's pixels at either end of its disparities that their range leaves out: what errs, errs far."""
+
+
+@dataclass(frozen=True, eq=False)
+class DisparityMaps:
+    """Maps of the disparities that some views of a light field show.
+
+    Args:
+        values: pixels per view along u, shape (maps, t, s): what is at column k of view i is at column k − d of
+            the next one to the right.
+        views: (row, column) of the view that each map belongs to; of a piece of a light field these may be views
+            outside it, or between its own.
+        source: where the maps come from, in words.
+        whole_extent: (lowest, highest) that a piece takes over from the whole; None takes it from the values.
+
+    Raises:
+        InputError: other shapes, or values that are not finite.
+    """
+
+    values: NDArray[np.float32]
+    views: tuple[tuple[float, float], ...]
+    source: str
+    whole_extent: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.values.ndim != 3 or 0 in self.values.shape or len(self.views) != len(self.values):
+            raise InputError(
+                f"maps of disparities have the shape (maps, t, s) and a view each, not {self.values.shape} and "
+                f"{len(self.views)} views"
+            )
+        if not np.isfinite(self.values).all():
+            raise InputError("disparities are finite numbers of pixels per view: fill what is not known first")
+
+    @classmethod
+    def given(cls, maps: ArrayLike, shape: Sequence[int]) -> DisparityMaps:
+        """What a user gives with a light field.
+
+        Args:
+            maps: pixels per view along u, (v, u, t, s) of all views, or (t, s) of the middle one, which is
+                ((rows − 1) // 2, (columns − 1) // 2).
+            shape: of the light field's samples.
+
+        Raises:
+            InputError: another shape, or values that are not finite.
+        """
+        values = np.asarray(maps, dtype=np.float32)
+        rows, columns = shape[:2]
+        if values.shape == tuple(shape[2:4]):
+            return cls(values[None], (((rows - 1) // 2, (columns - 1) // 2),), "given for the middle view")
+        if values.shape == tuple(shape[:4]):
+            views = tuple((float(j), float(i)) for j, i in np.ndindex(rows, columns))
+            return cls(values.reshape(-1, *shape[2:4]), views, "given for each view")
+        raise InputError(
+            f"disparity has the shape {values.shape}: it is (v, u, t, s) = {tuple(shape[:4])}, or (t, s) = "
+            f"{tuple(shape[2:4])} of the middle view"
+        )
+
+    @cached_property
+    def extent(self) -> tuple[float, float]:
+        """(lowest, highest) disparity, pixels per view along u, but for the outermost half per cent of each map.
+
+        Of a piece it is that of the whole, so that all pieces are treated alike.
+        """
+        if self.whole_extent is not None:
+            return self.whole_extent
+        ends = np.percentile(self.values, (OUTERMOST, 100 - OUTERMOST), axis=(1, 2))
+        return float(ends[0].min()), float(ends[1].max())
+
+    def piece(self, ranges: Sequence[range]) -> DisparityMaps:
+        """The maps of a piece of the light field.
+
+        Args:
+            ranges: the indices that the piece takes along (v, u, t, s).
+        """
+        v, u, t, s = ranges[:4]
+        factor = u.step / s.step
+        values = self.values[:, _slice(t), _slice(s)] * np.float32(factor)
+        views = tuple(((row - v.start) / v.step, (column - u.start) / u.step) for row, column in self.views)
+        low, high = sorted(end * factor for end in self.extent)
+        return DisparityMaps(values, views, self.source, (low, high))
+
+
+class Disparities:
+    """The disparity maps of a light field: given, or found when first asked for and then kept.
+
+    Shared by a light field and all pieces of it, so that each piece is treated like the whole.
+
+    Args:
+        known: the maps, where they are given.
+        find: finds them, called with a progress callback or None.
+        whole: that of which this is a piece, where it is one.
+    """
+
+    def __init__(
+        self,
+        known: DisparityMaps | None = None,
+        find: Callable[[Progress | None], DisparityMaps] | None = None,
+        whole: Disparities | None = None,
+    ) -> None:
+        self._maps, self._find, self._whole = known, find, whole
+
+    @property
+    def known(self) -> bool:
+        """Whether the maps are there without further work."""
+        return self._maps is not None or (self._whole is not None and self._whole.known)
+
+    def maps(self, progress: Progress | None = None) -> DisparityMaps:
+        """The maps, found now if they are not known yet.
+
+        Args:
+            progress: called with (done, total) while they are found.
+
+        Raises:
+            InputError: what `vcc.recover.depth.disparity_maps` refuses.
+        """
+        if self._maps is None:
+            assert self._find is not None
+            self._maps = self._find(progress)
+        return self._maps
+
+    def piece(self, ranges: Sequence[Any]) -> Disparities:
+        """Those of a piece of the light field, found from the whole; see `DisparityMaps.piece`."""
+        return Disparities(find=lambda progress: self.maps(progress).piece(ranges), whole=self)
+
+
+def _slice(part: range) -> slice:
+    """The slice that takes a range of indices from an axis that begins at 0."""
+    return slice(part.start, None if part.stop < 0 else part.stop, part.step)

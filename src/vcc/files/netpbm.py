@@ -1,0 +1,48 @@
+"""Netpbm's binary pictures, ``.ppm`` and ``.pgm``; JPEG Pleno's light fields are such, with 10 bits."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+
+_SPACE = rb"(?:\s|#[^\n]*\n)+"
+_HEADER = re.compile(rb"P([56])" + _SPACE + rb"(\d+)" + _SPACE + rb"(\d+)" + _SPACE + rb"(\d+)\s")
+
+
+def read_netpbm(path: Path) -> NDArray[Any]:
+    """The samples of a P5 or P6 file, shape (rows, columns) or (rows, columns, 3).
+
+    A largest value of 255 or 65535 leaves them as they are; any other (1023 for 10 bits) is widened so that it
+    becomes the full scale of uint8 or uint16, rounded.
+
+    Raises:
+        InputError: another format, a truncated file, or samples above the stated largest value.
+    """
+    data = path.read_bytes()
+    match = _HEADER.match(data)
+    if match is None:
+        raise InputError("this is no binary Netpbm picture (P5 or P6)")
+    width, height, largest = (int(match[n]) for n in (2, 3, 4))
+    channels = 3 if match[1] == b"6" else 1
+    if not 0 < largest < 65536 or width * height == 0:
+        raise InputError(f"this Netpbm picture states {width}×{height} pixels up to {largest}")
+    kind = np.dtype(np.uint8) if largest < 256 else np.dtype(">u2")
+    count = width * height * channels
+    if len(data) - match.end() < count * kind.itemsize:
+        raise InputError(
+            f"this picture is truncated: {width}×{height} pixels are {count * kind.itemsize} bytes, and it has "
+            f"{len(data) - match.end()}"
+        )
+    samples: NDArray[Any] = np.frombuffer(data, kind, count, match.end()).astype(kind.newbyteorder("="))
+    full = 255 if largest < 256 else 65535
+    if largest != full:
+        if int(samples.max()) > largest:
+            raise InputError(f"this picture holds {samples.max()}, and states that nothing is above {largest}")
+        samples = np.rint(samples * np.float64(full / largest)).astype(samples.dtype)
+    return samples.reshape((height, width, 3) if channels == 3 else (height, width))

@@ -1,0 +1,493 @@
+"""Single pictures: reading what is stored in a file, and writing an image for people or for
+programs.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+from vcc.files import transfer
+from vcc.files.atomic import atomic_path
+from vcc.files.netpbm import read_netpbm
+from vcc.image import Image
+
+READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
+"""The endings that `read_picture` knows."""
+WRITE_ENDINGS = (".png", ".tif", ".tiff", ".exr", ".npy")
+"""The endings that `save_image` knows."""
+RAW_ENDINGS = (".tif", ".tiff", ".png", ".npy")
+"""The endings that `save_numbers` knows."""
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)  # IEC 61966-2-1
+_BRIGHT_PERCENTILE = 99.5
+
+
+class _Unsuitable(Exception):
+    """A file that its library reads, and this package does not want."""
+
+
+def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
+    """The samples of a picture as they are stored: nothing is scaled and no transfer curve undone.
+
+    PNG and JPEG of 8 bits and PNG of 16, TIFF, BMP, OpenEXR, Netpbm, and NumPy's .npy. Palettes become the
+    colours that they stand for, and PNGs of 1, 2 or 4 bits are widened to 8 (1-bit: 0 and 255), Netpbm of 10 to
+    16. A channel of opacity (alpha) that is opaque everywhere is dropped; any other is refused, because
+    what lies behind is not known. OpenEXR gives the channels R, G, B, or the only one that there
+    is.
+
+    Returns:
+        The samples, shape (rows, columns) or (rows, columns, channels), uint8, uint16 or float32,
+        and their number of bits: 8, 16 or 32.
+
+    Raises:
+        InputError: no such file, an ending that is not known, a truncated or damaged file, a
+            picture that is not of one of these types, or one that is not opaque.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in _READERS:
+        raise InputError(
+            f'{path} has the ending "{ending}", which is not a picture that can be read: '
+            f"{', '.join(READ_ENDINGS)} can"
+        )
+    if not path.is_file():
+        raise InputError(f"there is no picture file {path}")
+    try:
+        samples = _READERS[ending](path)
+    except (_Unsuitable, InputError) as error:
+        raise InputError(f"{path}: {error}") from None
+    except Exception as error:  # each library has its own types for a damaged file
+        raise InputError(
+            f"{path} cannot be read as a picture: it is truncated, damaged or not a "
+            f"{ending[1:].upper()} file ({error}). Copy it again from where it came from"
+        ) from error
+    return _checked(samples, path)
+
+
+def read_png_into(path: Path, out: NDArray[Any]) -> bool:
+    """Read a PNG of just this shape and type into memory that is there already, which spares fresh memory.
+
+    Args:
+        path: the file.
+        out: where to write, shape (rows, columns) or (rows, columns, channels), uint8 or uint16, contiguous.
+
+    Returns:
+        False, with anything in ``out``, for whatever is not such a PNG: `read_picture` reads it, or says why not.
+    """
+    if path.suffix.lower() != ".png" or out.dtype not in (np.uint8, np.uint16):
+        return False
+    import imagecodecs
+
+    try:
+        imagecodecs.png_decode(path.read_bytes(), out=out)
+    except Exception:  # each library has its own types for a damaged file
+        return False
+    return True
+
+
+def read_grey(path: str | PathLike[str]) -> NDArray[np.float64]:
+    """A mask file as transmission: the mean of the channels, 0 to 1, shape (rows, columns).
+
+    A mask's file states how much light passes, so its samples are taken as they are, *not* as sRGB:
+    an 8-bit 128 is a transmission of 128/255 = 0.502. Integers are fractions of full scale;
+    floating-point values are the transmission itself.
+
+    Raises:
+        InputError: what `read_picture` refuses, or a floating-point value outside 0…1.
+    """
+    samples, bits = read_picture(path)
+    values = samples.astype(np.float64) / (2**bits - 1 if bits < 32 else 1)
+    if values.ndim == 3:
+        values = values.mean(axis=2)
+    low, high = float(values.min()), float(values.max())
+    if not (low >= 0 and high <= 1):
+        raise InputError(
+            f"{path} holds values from {low:g} to {high:g}: a transmission is between 0 and 1. Scale it"
+        )
+    return values
+
+
+@dataclass(frozen=True)
+class SavedPicture:
+    """What was written: where, with which exposure, and a line that says so to a person.
+
+    Args:
+        path: the file.
+        exposure: the factor between the image's values and what was stored (before the sRGB curve);
+            pass it to `save_image` for another picture, and the two can be compared.
+        clipped: the share of the pixels, 0 to 1, in which a channel was brighter than the file can
+            hold.
+        description: one line for people.
+    """
+
+    path: Path
+    exposure: float
+    clipped: float
+    description: str
+
+
+def save_image(
+    image: Image,
+    path: str | PathLike[str],
+    *,
+    exposure: float | Literal["auto"] = "auto",
+    upright: bool = True,
+    bits: int | None = None,
+) -> SavedPicture:
+    """Write an image; the ending chooses the format.
+
+    ======================  ==================================================================
+    ``.png``                sRGB, 8 bits (or 16): for people
+    ``.tif``, ``.tiff``     sRGB, 16 bits (or 8)
+    ``.exr``                linear float32, values untouched; channels R, G, B or Y
+    ``.npy``                linear float32, values untouched
+    ======================  ==================================================================
+
+    Args:
+        image: what to write; its values may be of any array library.
+        path: where to.
+        exposure: the factor that brings the image's values to the range 0…1 of an sRGB file. "auto"
+            takes 1 over the 99.5th percentile of the luminance: the brightest 0.5 % of the pixels
+            may clip. It is returned, so that a second picture can be written with the same.
+        upright: turn a real image (which lies upside down on the sensor) so that people see it
+            upright.
+        bits: bits per sample for PNG and TIFF.
+
+    Returns:
+        The path, the exposure used, the share of clipped pixels, and all that in words. The file
+        appears whole or not at all.
+
+    Raises:
+        InputError: an unknown ending, a folder that does not exist or cannot be written to, an
+            exposure that is not a finite number above 0 (or not 1, for .exr and .npy), bits that
+            the format does not have, values that are not finite, or a number of channels that the
+            format cannot show.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in WRITE_ENDINGS:
+        raise InputError(
+            f'a picture cannot be written as "{path.name}": end the name in {", ".join(WRITE_ENDINGS)}'
+        )
+    values = (image.upright() if upright else image).to_numpy()
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    if ending in (".exr", ".npy"):
+        return _save_linear(values, path, ending, exposure, bits)
+    return _save_display(values, path, ending, exposure, bits)
+
+
+def save_numbers(
+    values: NDArray[Any], path: str | PathLike[str], meaning: dict[str, Any], words: str, saturated: float
+) -> SavedPicture:
+    """Write a camera's raw numbers as they are: linear, not scaled, not turned.
+
+    Args:
+        values: uint8 or uint16, shape (rows, columns) or (rows, columns, channels).
+        path: where to, .tif, .tiff, .png or .npy.
+        meaning: what the numbers mean; a TIFF holds it as JSON in its description.
+        words: the same for people.
+        saturated: the share of the pixels that are saturated, 0 to 1.
+
+    Raises:
+        InputError: another ending, a number of channels that the format does not have, or a place that cannot be
+            written to.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in RAW_ENDINGS:
+        raise InputError(
+            f'raw numbers cannot be written as "{path.name}": end the name in {", ".join(RAW_ENDINGS)}'
+        )
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    if ending != ".npy" and values.ndim == 3 and values.shape[2] != 3:
+        raise InputError(
+            f"{ending} files have 1 or 3 channels, and this recording has {values.shape[2]}: use .npy"
+        )
+    with atomic_path(path) as temporary:
+        if ending == ".npy":
+            with temporary.open("wb") as file:
+                np.save(file, values)
+        elif ending == ".png":
+            import imagecodecs
+
+            temporary.write_bytes(imagecodecs.png_encode(np.ascontiguousarray(values)))
+        else:
+            _write_tiff(values, temporary, json.dumps(meaning))
+    description = f"{path}: {_size(values)}, {words}; {values.dtype} numbers as recorded, upside down"
+    return SavedPicture(path, 1.0, saturated, description)
+
+
+def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
+    """The exposure that "auto" stands for: 1 over the 99.5th percentile of the luminance (1 if
+    black).
+
+    Args:
+        values: linear, shape (rows, columns) or (rows, columns, 3).
+    """
+    luminance = values @ _LUMINANCE if values.ndim == 3 else values
+    bright = float(np.percentile(luminance, _BRIGHT_PERCENTILE))
+    if bright <= 0:
+        bright = float(luminance.max())  # a few points of light on black
+    return 1.0 / bright if bright > 0 else 1.0
+
+
+def _save_linear(
+    values: NDArray[np.float32],
+    path: Path,
+    ending: str,
+    exposure: float | Literal["auto"],
+    bits: int | None,
+) -> SavedPicture:
+    if exposure not in ("auto", 1):
+        raise InputError(
+            f"exposure={exposure} has no place in {path.name}: {ending} files hold the values "
+            "untouched. "
+            "Leave it out, or write a .png or .tif"
+        )
+    if bits not in (None, 32):
+        raise InputError(f"{ending} files hold 32-bit floating-point values, not {bits} bits")
+    with atomic_path(path) as temporary:
+        if ending == ".npy":
+            with temporary.open("wb") as file:  # np.save would append an ending of its own
+                np.save(file, values)
+        else:
+            _write_exr(values, temporary)
+    size = _size(values)
+    return SavedPicture(path, 1.0, 0.0, f"{path}: {size}, linear float32, values untouched (exposure 1)")
+
+
+def _save_display(
+    values: NDArray[np.float32],
+    path: Path,
+    ending: str,
+    exposure: float | Literal["auto"],
+    bits: int | None,
+) -> SavedPicture:
+    if bits is None:
+        bits = 8 if ending == ".png" else 16
+    if bits not in (8, 16):
+        raise InputError(f"{ending} files are written with 8 or 16 bits per sample, not {bits}")
+    if values.ndim == 3 and values.shape[2] != 3:
+        raise InputError(
+            f"an image of {values.shape[2]} channels cannot be shown as {ending}, which has 1 or "
+            "3: "
+            "write it as .npy or .exr, or choose channels, e.g. image[..., :3]"
+        )
+    finite = np.isfinite(values)
+    if not finite.all():
+        where = tuple(int(n) for n in np.argwhere(~finite)[0])
+        raise InputError(
+            f"the image has {values[where]} at index {where}, which {ending} cannot hold; .npy and .exr can"
+        )
+    automatic = exposure == "auto"
+    factor = auto_exposure(values) if automatic else checked_exposure(exposure)
+    exposed = values * np.float32(factor)
+    clipped = _share_beyond(exposed > 1 + 0.5 / (2**bits - 1))  # what rounds to white is not lost
+    negative = _share_beyond(exposed < 0)
+    codes = transfer.encode(exposed, bits)
+    with atomic_path(path) as temporary:
+        if ending == ".png":
+            import imagecodecs
+
+            temporary.write_bytes(imagecodecs.png_encode(codes))
+        else:
+            _write_tiff(codes, temporary)
+    reason = " (auto: the 99.5th percentile of the luminance is white)" if automatic else ""
+    below = f", {negative:.2%} below 0 and shown black" if negative > 0 else ""
+    description = (
+        f"{path}: {_size(values)}, {bits}-bit sRGB, exposure {factor:.6g}{reason}, "
+        f"{clipped:.2%} of the pixels clipped{below}"
+    )
+    return SavedPicture(path, factor, clipped, description)
+
+
+def checked_exposure(exposure: Any) -> float:
+    """An exposure given as a number.
+
+    Raises:
+        InputError: it is not a finite number above 0.
+    """
+    try:
+        factor = float(exposure)
+    except (TypeError, ValueError):
+        factor = float("nan")
+    if not (factor > 0 and np.isfinite(factor)):
+        raise InputError(f'exposure is "auto" or a finite number above 0, not {exposure!r}')
+    return factor
+
+
+def _share_beyond(beyond: NDArray[np.bool_]) -> float:
+    """The share of pixels of which any channel is beyond."""
+    pixels = beyond.any(axis=2) if beyond.ndim == 3 else beyond
+    return float(pixels.mean())
+
+
+def _size(values: NDArray[Any]) -> str:
+    kind = "grey" if values.ndim == 2 else f"{values.shape[2]} channels"
+    return f"{values.shape[1]}×{values.shape[0]} pixels, {kind}"
+
+
+def _write_tiff(codes: NDArray[Any], path: Path, description: str | None = None) -> None:
+    import tifffile
+
+    photometric = "rgb" if codes.ndim == 3 else "minisblack"
+    tifffile.imwrite(
+        path, codes, photometric=photometric, compression="zlib", metadata=None, description=description
+    )
+
+
+def _write_exr(values: NDArray[np.float32], path: Path) -> None:
+    import OpenEXR
+
+    channels: dict[str, NDArray[np.float32]]
+    if values.ndim == 2:
+        channels = {"Y": np.ascontiguousarray(values)}
+    else:
+        names = "RGB" if values.shape[2] == 3 else [f"C{n}" for n in range(values.shape[2])]
+        channels = {name: np.ascontiguousarray(values[..., n]) for n, name in enumerate(names)}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(header, channels) as file:
+        file.write(str(path))
+
+
+def _read_png(path: Path) -> NDArray[Any]:
+    import imagecodecs
+
+    samples: NDArray[Any] = imagecodecs.png_decode(path.read_bytes())
+    return samples
+
+
+def _read_jpeg(path: Path) -> NDArray[Any]:
+    import imagecodecs
+
+    data = path.read_bytes()
+    samples: NDArray[Any] = imagecodecs.jpeg8_decode(data)
+    if not _jpeg_is_complete(data):  # the library paints what is missing grey, and says nothing
+        raise ValueError("the end of the picture is missing")
+    if samples.ndim == 3 and samples.shape[2] == 4:
+        raise _Unsuitable("this JPEG has four inks (CMYK); convert it to RGB")
+    return samples
+
+
+def _jpeg_is_complete(data: bytes) -> bool:
+    """Whether the end marker follows the first scan (an embedded thumbnail has one of its own)."""
+    place = 2
+    while place + 4 <= len(data) and data[place] == 0xFF:
+        marker = data[place + 1]
+        if marker == 0xFF:  # fill byte
+            place += 1
+            continue
+        if marker == 0xDA:
+            return data.rfind(b"\xff\xd9", place) >= 0
+        place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+    return False
+
+
+def _read_tiff(path: Path) -> NDArray[Any]:
+    import tifffile
+
+    with tifffile.TiffFile(path) as file:
+        if len(file.pages) != 1 and len(file.series) != 1:
+            raise _Unsuitable(f"this TIFF holds {len(file.pages)} pictures; one is wanted")
+        page = file.pages.first
+        samples: NDArray[Any] = page.asarray()
+        if page.photometric == tifffile.PHOTOMETRIC.MINISWHITE:
+            if samples.dtype.kind != "u":
+                raise _Unsuitable("this TIFF stores white as 0 in floating point; invert it")
+            samples = np.iinfo(samples.dtype).max - samples
+        elif page.photometric == tifffile.PHOTOMETRIC.PALETTE:
+            samples = np.moveaxis(np.asarray(page.colormap)[:, samples], 0, -1)
+        if samples.ndim == 3 and page.planarconfig == tifffile.PLANARCONFIG.SEPARATE:
+            samples = np.moveaxis(samples, 0, -1)
+    if samples.dtype == np.bool_:
+        samples = samples.astype(np.uint8) * np.uint8(255)
+    return samples
+
+
+def _read_bmp(path: Path) -> NDArray[Any]:
+    import imagecodecs
+
+    samples: NDArray[Any] = imagecodecs.bmp_decode(path.read_bytes())
+    return samples
+
+
+def _read_exr(path: Path) -> NDArray[Any]:
+    import OpenEXR
+
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        channels = {name: channel.pixels for name, channel in file.channels().items()}
+        if {"R", "G", "B"} <= channels.keys():
+            picked = [channels[name] for name in "RGB"]
+        elif len(channels) == 1:
+            picked = list(channels.values())
+        elif "Y" in channels and channels.keys() <= {"Y", "A"}:
+            picked = [channels["Y"]]
+        else:
+            raise _Unsuitable(
+                f"this OpenEXR file has the channels {', '.join(sorted(channels))}; "
+                "R, G, B or a single one is wanted"
+            )
+        alpha = channels.get("A")
+        if alpha is not None and not (alpha >= 1).all():
+            raise _Unsuitable(_NOT_OPAQUE)
+        samples = np.stack(picked, axis=-1) if len(picked) > 1 else np.array(picked[0])
+    return samples.astype(np.float32, copy=False)
+
+
+def _read_npy(path: Path) -> NDArray[Any]:
+    samples: NDArray[Any] = np.load(path, allow_pickle=False)
+    if samples.dtype == np.bool_:
+        samples = samples.astype(np.uint8) * np.uint8(255)
+    return samples
+
+
+_NOT_OPAQUE = (
+    "this picture is not opaque everywhere, and what lies behind it is not known: "
+    "flatten it (remove its alpha channel)"
+)
+_READERS: dict[str, Callable[[Path], NDArray[Any]]] = {
+    ".png": _read_png,
+    ".jpg": _read_jpeg,
+    ".jpeg": _read_jpeg,
+    ".tif": _read_tiff,
+    ".tiff": _read_tiff,
+    ".bmp": _read_bmp,
+    ".exr": _read_exr,
+    ".npy": _read_npy,
+    ".ppm": read_netpbm,
+    ".pgm": read_netpbm,
+}
+
+
+def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
+    """Samples of a type and shape that everything behind can rely on, and their bits."""
+    if samples.dtype.kind == "f":
+        samples = samples.astype(np.float32, copy=False)
+    if samples.dtype not in (np.uint8, np.uint16, np.float32):
+        raise InputError(
+            f"{path} holds samples of type {samples.dtype}; uint8, uint16 and floating point can be read"
+        )
+    if samples.ndim not in (2, 3) or 0 in samples.shape:
+        raise InputError(
+            f"{path} holds an array of shape {samples.shape}; a picture has rows and columns, "
+            "and perhaps channels last"
+        )
+    if path.suffix.lower() != ".npy" and samples.ndim == 3 and samples.shape[2] in (2, 4):
+        opaque = 1 if samples.dtype.kind == "f" else np.iinfo(samples.dtype).max
+        if not (samples[..., -1] >= opaque).all():
+            raise InputError(f"{path}: {_NOT_OPAQUE}")
+        samples = samples[..., :-1]
+    if samples.ndim == 3 and samples.shape[2] == 1:
+        samples = samples[..., 0]
+    return samples, samples.dtype.itemsize * 8

@@ -1,0 +1,304 @@
+"""What turns light on a pixel into a number: the linear camera model of EMVA 1288, as parameters.
+
+The model (EMVA Standard 1288, its linear signal model and its noise model; symbols are the
+standard's)::
+
+    μ_p = E · A · t · λ / (h·c)                    photons on the sensitive area A of a pixel
+    charge ~ Poisson(η·μ_p + μ_I·t)                photo-electrons and dark current, at most the full well
+    y = black level + K · (charge + read noise)    rounded to a whole number, 0 to 2^bits − 1
+
+`vcc.run.recording` draws recordings from it.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Final
+
+from vcc.base.errors import InputError
+
+PLANCK: Final = 6.62607015e-34
+"""Planck's constant h, J·s; exact in the SI of 2019."""
+LIGHT_SPEED: Final = 299792458.0
+"""The speed of light in vacuum c, m/s; exact in the SI."""
+LARGEST_WELL: Final = 1e12
+"""Electrons; no pixel holds a millionth of it, and random numbers stay within 64 bits."""
+_LETTERS: Final = "RGB"
+
+
+@dataclass(frozen=True)
+class Electronics:
+    """How the pixels of a sensor turn light into numbers, in the terms of EMVA 1288.
+
+    The defaults are those of a common monochrome machine-vision sensor (CMOS, global shutter, pixels of about
+    3.5 µm), with the gain chosen so that 12 bits just hold the full well.
+
+    Args:
+        quantum_efficiency: η, the share of the photons on a pixel's sensitive area that free an electron,
+            above 0 and up to 1, filters included; one number, or one per channel.
+        wavelength: λ, metres, at which a channel's light is counted in photons (its middle wavelength); one,
+            or one per channel.
+        full_well: the most electrons that a pixel holds; what is beyond is lost (it does not bloom).
+        gain: K, digital numbers per electron (EMVA's overall system gain).
+        black_level: the number that stands for no electrons at all, DN.
+        bit_depth: bits of a number, 1 to 16.
+        read_noise: standard deviation of the noise of reading a pixel, electrons rms, Gaussian (σ_d0).
+        dark_current: μ_I, electrons per second and pixel that come without light.
+        color_filter: None, or the tile of filters that repeats over the sensor from its first pixel (as the
+            picture lies on the sensor, not upright): ``"RGGB"`` or another 2×2 tile in one word, row by row,
+            or rows of letters, ``("RG", "GB")``, of any size. R, G and B are channels 0, 1 and 2; digits name
+            channels directly. Each pixel records the light field's channel of its filter.
+        prnu: photo response non-uniformity: standard deviation of the pixels' sensitivity as a share of it.
+        dsnu: dark signal non-uniformity: standard deviation of the pixels' offsets, electrons.
+        pattern_seed: what sensor, of all that are made alike: the pattern of PRNU and DSNU follows from it and
+            from the number of pixels, and is the same in all recordings.
+
+    Raises:
+        InputError: a value outside its range, a ragged or unreadable tile, or numbers of channels that do not
+            fit together.
+    """
+
+    quantum_efficiency: float | tuple[float, ...] = 0.6
+    wavelength: float | tuple[float, ...] = field(default=550e-9, metadata={"unit": "length"})
+    full_well: float = 10_000.0
+    gain: float = 0.4
+    black_level: float = 64.0
+    bit_depth: int = 12
+    read_noise: float = 2.5
+    dark_current: float = 1.0
+    color_filter: str | tuple[str, ...] | None = None
+    prnu: float = 0.0
+    dsnu: float = 0.0
+    pattern_seed: int = 0
+
+    def __post_init__(self) -> None:
+        self._keep("quantum_efficiency", _per_channel(self.quantum_efficiency, "quantum_efficiency", "a share", 1))
+        self._keep("wavelength", _per_channel(self.wavelength, "wavelength", "a length in metres", 1e-3))
+        self._keep("full_well", checked_number(self.full_well, "full_well", "electrons", above=0))
+        if self.full_well > LARGEST_WELL:
+            raise InputError(
+                f"full_well is {self.full_well:g} electrons: no pixel holds that many (up to {LARGEST_WELL:g})"
+            )
+        self._keep("gain", checked_number(self.gain, "gain", "digital numbers per electron", above=0))
+        bits = _whole(self.bit_depth)
+        if bits is None or not 1 <= bits <= 16:
+            raise InputError(f"bit_depth is a whole number from 1 to 16, not {self.bit_depth!r}")
+        self._keep("bit_depth", bits)
+        self._keep("black_level", checked_number(self.black_level, "black_level", "digital numbers", least=0))
+        if self.black_level >= self.largest_number:
+            raise InputError(
+                f"black_level is {self.black_level:g}, and {bits} bits end at {self.largest_number}: "
+                "no room is left for light. Lower it or take more bits"
+            )
+        self._keep("read_noise", checked_number(self.read_noise, "read_noise", "electrons rms", least=0))
+        self._keep(
+            "dark_current", checked_number(self.dark_current, "dark_current", "electrons per second", least=0)
+        )
+        self._keep("prnu", checked_number(self.prnu, "prnu", "a share of the sensitivity", least=0))
+        self._keep("dsnu", checked_number(self.dsnu, "dsnu", "electrons", least=0))
+        self._keep("pattern_seed", checked_seed(self.pattern_seed, "pattern_seed"))
+        if self.color_filter is not None:
+            self._keep("color_filter", _tile(self.color_filter))
+        counts = self._channel_counts()
+        if len(set(counts.values())) > 1:
+            said = ", ".join(f"{name} has {count}" for name, count in counts.items())
+            raise InputError(f"the numbers of channels do not fit together: {said}")
+
+    def _keep(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def _channel_counts(self) -> dict[str, int]:
+        """The number of channels that each parameter states, of those that state one."""
+        counts = {
+            name: len(value)
+            for name in ("quantum_efficiency", "wavelength")
+            if isinstance(value := getattr(self, name), tuple)
+        }
+        if self.color_filter is not None:
+            counts["color_filter"] = 1 + max(max(row) for row in self.tile)
+        return counts
+
+    @property
+    def channels(self) -> int | None:
+        """The number of channels that the parameters state; None if the same holds for any number."""
+        return next(iter(self._channel_counts().values()), None)
+
+    @cached_property
+    def tile(self) -> tuple[tuple[int, ...], ...]:
+        """The channel behind each filter of the tile, row by row; ``((0,),)`` without a colour filter."""
+        if self.color_filter is None:
+            return ((0,),)
+        rows = _rows(self.color_filter)
+        return tuple(tuple(_channel(sign) for sign in row) for row in rows)
+
+    @property
+    def is_bayer(self) -> bool:
+        """Whether the colour filter is RGGB or one of its shifts."""
+        return self.bayer_name in ("RGGB", "GRBG", "GBRG", "BGGR")
+
+    @property
+    def bayer_name(self) -> str | None:
+        """The tile as four letters, ``"RGGB"`` for instance; None if it is not 2×2 of channels 0 to 2."""
+        if self.color_filter is None or [len(row) for row in self.tile] != [2, 2]:
+            return None
+        channels = [channel for row in self.tile for channel in row]
+        return "".join(_LETTERS[channel] for channel in channels) if max(channels) < 3 else None
+
+    @property
+    def filter_in_words(self) -> str:
+        """The colour filter as people name it: ``"RGGB"``, or its size for a tile that is not 2×2."""
+        if isinstance(self.color_filter, str):
+            return self.color_filter
+        return f"{len(self.tile)}×{len(self.tile[0])} tile" if self.color_filter else "no colour filter"
+
+    @property
+    def largest_number(self) -> int:
+        """The largest digital number, 2^bits − 1."""
+        return int(2**self.bit_depth - 1)
+
+    @property
+    def saturation(self) -> float:
+        """Electrons at which a pixel saturates: its full well or the largest number, whichever comes first."""
+        return min(self.full_well, (self.largest_number - self.black_level) / self.gain)
+
+    def electrons_per_joule(self, channel: int = 0) -> float:
+        """Photo-electrons per joule of light on the sensitive area: η·λ/(h·c) (EMVA 1288, eq. 1 to 3).
+
+        Args:
+            channel: which channel's quantum efficiency and wavelength.
+        """
+        efficiency, wavelength = _of(self.quantum_efficiency, channel), _of(self.wavelength, channel)
+        return efficiency * wavelength / (PLANCK * LIGHT_SPEED)
+
+    def check_channels(self, channels: int | None) -> None:
+        """Refuse light of a number of channels that this sensor cannot record.
+
+        Args:
+            channels: of the light; None if it is grey, without an axis of channels.
+
+        Raises:
+            InputError: the numbers of channels differ.
+        """
+        grey_on_filter = self.color_filter is not None and channels is None
+        if not grey_on_filter and self.channels in (None, channels or 1):
+            return
+        given = "is grey" if channels is None else f"has {channels} channel{'s' if channels > 1 else ''}"
+        if self.color_filter is not None:
+            raise InputError(
+                f"the colour filter ({self.filter_in_words}) wants light of {self.channels} channels, and the "
+                f"light field {given}. Give it its channels, or record it without a filter (color_filter=None)"
+            )
+        raise InputError(
+            f"the sensor's quantum efficiency or wavelength is stated for {self.channels} channels, and the light "
+            f"field {given}: state one for each of its channels, or a single number for all"
+        )
+
+
+def checked_seed(seed: object, name: str = "seed") -> int:
+    """A seed of random numbers as an int.
+
+    Args:
+        seed: a whole number, 0 or more; truth values and floating-point numbers are none.
+        name: what to call it in an error.
+
+    Raises:
+        InputError: anything else.
+    """
+    number = _whole(seed)
+    if number is None or number < 0:
+        raise InputError(f"{name} is {seed!r}: it is a whole number, 0 or more, such as 1")
+    return number
+
+
+def _whole(value: Any) -> int | None:
+    """A whole number of any library; None for anything else, truth values included."""
+    if isinstance(value, bool) or type(value).__name__ == "bool":
+        return None
+    try:
+        return operator.index(value)
+    except TypeError:
+        return None
+
+
+def checked_number(
+    value: Any, name: str, kind: str, *, above: float = -math.inf, least: float = -math.inf, most: float = math.inf
+) -> float:
+    """A finite number within its range, as a float.
+
+    Args:
+        value: what was given.
+        name: what to call it in an error.
+        kind: what it counts, for the error.
+        above: it must be larger than this.
+        least: the smallest that it may be.
+        most: the largest that it may be.
+
+    Raises:
+        InputError: outside its range, not finite, or no number.
+    """
+    number = math.nan
+    if not isinstance(value, bool | str | bytes):
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            number = math.nan
+    if math.isfinite(number) and number > above and least <= number <= most:
+        return number
+    wanted = f"above {above:g}" if math.isfinite(above) else f"{least:g} or more"
+    limit = f" and at most {most:g}" if math.isfinite(most) else ""
+    raise InputError(f"{name} is {value!r}: it is a number ({kind}), {wanted}{limit}")
+
+
+def _per_channel(given: Any, name: str, kind: str, most: float) -> float | tuple[float, ...]:
+    """One number for all channels, or a tuple with one each; all above 0."""
+    if not isinstance(given, tuple | list):
+        return checked_number(given, name, kind, above=0, most=most)
+    if not given:
+        raise InputError(f"{name} is empty: give one number, or one per channel")
+    return tuple(
+        checked_number(value, f"{name} of channel {channel}", kind, above=0, most=most)
+        for channel, value in enumerate(given)
+    )
+
+
+def _of(given: float | tuple[float, ...], channel: int) -> float:
+    return given[channel] if isinstance(given, tuple) else given
+
+
+def _tile(given: Any) -> str | tuple[str, ...]:
+    """A tile that can be read, in capitals: 2×2 as one word, others as rows."""
+    example = '"RGGB", or rows such as ("RG", "GB")'
+    if not isinstance(given, str | tuple | list) or not all(isinstance(row, str) for row in given):
+        raise InputError(f"color_filter is {given!r}: write {example}")
+    if isinstance(given, str) and len(given) != 4:
+        raise InputError(f'color_filter is "{given}": one word is a tile of 2×2; write other sizes as rows')
+    rows = [row.upper() for row in (_rows(given) if isinstance(given, str) else given)]
+    if not rows or not rows[0]:
+        raise InputError(f"color_filter is empty: write {example}, or None for no filter")
+    if len({len(row) for row in rows}) > 1:
+        raise InputError(f"color_filter has rows of different lengths, {tuple(rows)}: a tile is a rectangle")
+    signs = set("".join(rows))
+    if not (signs <= set(_LETTERS) or all(sign in "0123456789" for sign in signs)):
+        raise InputError(
+            f"color_filter {tuple(rows)} is not all of the letters R, G, B (channels 0, 1, 2), nor all of "
+            "digits that name channels"
+        )
+    channels = {_channel(sign) for sign in signs}
+    missing = sorted(set(range(max(channels))) - channels)
+    if missing:
+        raise InputError(
+            f"color_filter {tuple(rows)} records no channel {missing[0]}: name channels from 0 (R) on, leaving "
+            "out none"
+        )
+    return "".join(rows) if [len(row) for row in rows] == [2, 2] else tuple(rows)
+
+
+def _rows(tile: str | tuple[str, ...]) -> tuple[str, ...]:
+    return (tile[:2], tile[2:]) if isinstance(tile, str) else tile
+
+
+def _channel(sign: str) -> int:
+    return _LETTERS.index(sign) if sign in _LETTERS else int(sign)

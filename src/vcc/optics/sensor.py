@@ -1,0 +1,111 @@
+"""The sensor: a grid of square or rectangular pixels at a place on the axis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.optics.electronics import Electronics, checked_number
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A flat sensor across the axis; a pixel records the mean irradiance over its sensitive area.
+
+    Args:
+        z: place on the axis, metres behind the entrance plane.
+        shape: (rows, columns) of pixels.
+        pitch: distance between pixel centres, metres: one number or (vertical, horizontal).
+        decentre: place (x, y) of the sensor's middle off the axis, metres.
+        fill_factor: the share of a pixel's area that is sensitive, above 0 and up to 1: a rectangle of the
+            pixel's own proportions in its middle. A smaller one gathers less light, and sharper samples.
+        electronics: how pixels turn light into numbers, for `vcc.Camera.expose`; None where only irradiance
+            is asked for.
+
+    Raises:
+        InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, or a fill
+            factor outside its range.
+    """
+
+    z: float = field(metadata={"unit": "length"})
+    shape: tuple[int, int]
+    pitch: float | tuple[float, float] = field(metadata={"unit": "length"})
+    decentre: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
+    fill_factor: float = 1.0
+    electronics: Electronics | None = None
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.z):
+            raise InputError(f"the sensor's z must be a finite number of metres, not {self.z}")
+        if len(self.shape) != 2 or any(int(n) != n or n < 1 for n in self.shape):
+            raise InputError(f"the sensor's shape is (rows, columns), each at least 1, not {self.shape}")
+        for pitch in self.pitches:
+            if not (pitch > 0 and math.isfinite(pitch)):
+                raise InputError(f"the sensor's pitch must be greater than 0 m, not {pitch}")
+        if len(self.decentre) != 2 or not all(math.isfinite(offset) for offset in self.decentre):
+            raise InputError(f"the sensor's decentre is (x, y) in metres, not {self.decentre}")
+        fill = checked_number(
+            self.fill_factor, "the sensor's fill_factor", "a share of the pixel", above=0, most=1
+        )
+        object.__setattr__(self, "fill_factor", fill)
+        if self.electronics is not None and not isinstance(self.electronics, Electronics):
+            raise InputError(
+                f"the sensor's electronics are a vcc.Electronics, not a {type(self.electronics).__name__}"
+            )
+        if not isinstance(self.pitch, int | float):
+            object.__setattr__(self, "pitch", self.pitches)
+        object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
+        object.__setattr__(self, "decentre", (float(self.decentre[0]), float(self.decentre[1])))
+
+    @property
+    def pitches(self) -> tuple[float, float]:
+        """The (vertical, horizontal) pixel pitch, metres."""
+        if isinstance(self.pitch, tuple | list):
+            return float(self.pitch[0]), float(self.pitch[1])
+        return float(self.pitch), float(self.pitch)
+
+    @property
+    def sensitive_pitches(self) -> tuple[float, float]:
+        """The (height, width) of the sensitive area of one pixel, metres: pitch · √fill factor."""
+        vertical, horizontal = self.pitches
+        side = math.sqrt(self.fill_factor)
+        return vertical * side, horizontal * side
+
+    @property
+    def sensitive_area(self) -> float:
+        """The sensitive area of one pixel, m²."""
+        vertical, horizontal = self.pitches
+        return vertical * horizontal * self.fill_factor
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """The (height, width) of all pixels together, metres."""
+        return self.shape[0] * self.pitches[0], self.shape[1] * self.pitches[1]
+
+    @property
+    def frame(self) -> Affine:
+        """Maps (column, row, 1) to (x, y, 1) of the pixel's centre, metres."""
+        rows, columns = self.shape
+        vertical, horizontal = self.pitches
+        return (
+            Affine.translation(*self.decentre)
+            @ Affine.scaling(horizontal, vertical)
+            @ Affine.translation(-(columns - 1) / 2, -(rows - 1) / 2)
+        )
+
+    @property
+    def column_places(self) -> NDArray[np.float64]:
+        """x of the middle of each column of pixels, metres."""
+        columns = np.arange(self.shape[1]) - (self.shape[1] - 1) / 2
+        return np.asarray(columns * self.pitches[1] + self.decentre[0], dtype=np.float64)
+
+    @property
+    def row_places(self) -> NDArray[np.float64]:
+        """y of the middle of each row of pixels, metres."""
+        rows = np.arange(self.shape[0]) - (self.shape[0] - 1) / 2
+        return np.asarray(rows * self.pitches[0] + self.decentre[1], dtype=np.float64)

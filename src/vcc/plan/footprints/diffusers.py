@@ -1,0 +1,199 @@
+"""Rewrite rules for diffusers: when scattering is a blur of the picture, or of each view.
+
+Rule 1, blur of the picture. A uniform diffuser changes a ray's slope by δ with density D(δ), wherever the ray
+meets it. If all optics behind it are affine, the ray lands B·δ further, for every ray alike, with B the place
+on the sensor from slope at the diffuser. So the picture is convolved with D, stretched by B. Preconditions: the
+kernel is uniform; behind the diffuser's plane nothing bends rays other than affinely, nothing absorbs (a rim or
+a mask there would be met in another place by the scattered ray), and whatever else scatters is uniform too.
+What stands in the diffuser's own plane acts by position, which scattering leaves alone, and may absorb.
+
+Rule 2, blur of the views. If all optics before a uniform diffuser are affine and each view meets it in one
+place, then scattering exchanges light between the pixels of one view only: each view's picture is convolved
+with D. Preconditions: the kernel is uniform; up to the diffuser's plane nothing bends rays other than affinely,
+and what absorbs there tells views apart only.
+
+Where neither holds, rays are traced.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.plan.sharpening import along_axis
+from vcc.shapes.sheets import clear_over
+
+if TYPE_CHECKING:
+    from vcc.camera import Camera
+    from vcc.light_field import LightField
+    from vcc.optics.train import Stage
+    from vcc.shapes.kernels import Kernel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Blurs:
+    """What the diffusers of a camera come to.
+
+    Args:
+        picture: kernel in pixels that the picture is convolved with, odd rows × odd columns of sum 1, or None.
+        views: kernel in samples that each view is convolved with, likewise, or None.
+        notes: which rule was applied to what, in words.
+    """
+
+    picture: Array | None
+    views: Array | None
+    notes: tuple[str, ...] = ()
+
+
+def diffusers_as_blurs(camera: Camera, light_field: LightField, sharp: bool = True) -> Blurs | str:
+    """The blurs by which the rules replace all diffusers of a camera, or why they do not.
+
+    Args:
+        camera: with diffusers or without.
+        light_field: that it looks at.
+        sharp: whether the tent by which a kernel is shared out on its lattice is given back.
+    """
+    picture: Array | None = None
+    views: Array | None = None
+    notes = []
+    for n, stage in enumerate(camera.stages):
+        if stage.faces.spread is None:
+            continue
+        label = stage.element.label
+        if not stage.faces.spread.uniform:
+            return f"{label} scatters by a kernel that varies over its surface"
+        kernel = stage.faces.spread.kernels[0]
+        obstacle = behind(camera, n, light_field)
+        try:
+            if obstacle is None:
+                picture = _convolved(picture, _on_lattice(kernel, _pixels_from_slopes(camera, n), sharp))
+                notes.append(
+                    f"blur of the picture: {label}, since all behind it is affine and nothing there absorbs"
+                )
+            elif meets_views_in_points(camera, light_field, n):
+                views = _convolved(views, _on_lattice(kernel, _samples_from_slopes(camera, light_field, n), sharp))
+                notes.append(f"blur of each view: {label}, since each view meets it in one place")
+            else:
+                return f"{label} scatters, and {obstacle} behind it"
+        except InputError:
+            return f"{label} scatters further than a blur can reach"
+    return Blurs(picture, views, tuple(notes))
+
+
+def behind(camera: Camera, n: int, light_field: LightField) -> str | None:
+    """What forbids rule 1 for the diffuser that is stage n, in words; None if nothing does.
+
+    A stop or a mask that lets all light of the light field pass, scattered as far as it may be, forbids nothing.
+    """
+    same_plane = True
+    for stage in camera.stages[n + 1 :]:
+        same_plane = same_plane and np.array_equal(stage.approach.matrix, np.eye(5))
+        label = stage.element.label
+        if same_plane and stage.faces.bending is None:
+            continue
+        if stage.faces.bending is not None:
+            return f"{label} bends rays by a function of position that is not affine"
+        if stage.faces.pattern is not None and not _passes_all(camera, stage, light_field):
+            return f"{label} absorbs"
+        if stage.faces.spread is not None and not stage.faces.spread.uniform:
+            return f"{label} scatters by a kernel that varies over its surface"
+    return None
+
+
+def _passes_all(camera: Camera, stage: Stage, light_field: LightField) -> bool:
+    """Whether a stage behind affine optics and uniform diffusers absorbs none of the light field's rays."""
+    assert stage.faces.pattern is not None
+    nv, nu, nt, ns = light_field.shape[:4]
+    middle = (np.array([nu, nv, ns, nt]) - 1) / 2
+    half = middle + np.array([1.0, 1.0, 2.0, 2.0])  # places between views and footprints reach beyond the samples
+    frame = light_field.frame
+    rays, slack = Affine.identity(), np.zeros(4)
+    for met in camera.stages:
+        rays, slack = met.approach @ rays, np.abs(met.approach.linear) @ slack
+        if met is stage:
+            break
+        if met.faces.bending is not None:
+            return False
+        if met.centred is not None:
+            rays, slack = met.centred @ rays, np.abs(met.centred.linear) @ slack
+        if met.faces.spread is not None:
+            slack = slack + np.array([0.0, 0.0, *met.faces.spread.reach])
+    arriving = rays @ frame
+    centre = arriving(middle[None])[0][:2] - stage.element.decentre
+    reach = np.abs(arriving.linear[:2]) @ half + slack[:2]
+    return clear_over(stage.faces.pattern, centre - reach, centre + reach)
+
+
+def meets_views_in_points(camera: Camera, light_field: LightField, n: int) -> bool:
+    """Whether each view meets stage n, and all that absorbs before it, in one place (rule 2)."""
+    rays = Affine.identity()
+    size = np.array([light_field.shape[3], light_field.shape[2]])
+    for m, stage in enumerate(camera.stages[: n + 1]):
+        rays = stage.approach @ rays
+        if stage.faces.bending is not None:
+            return False
+        if m == n or stage.faces.pattern is not None:
+            place = (rays @ light_field.frame).linear[:2]
+            travel = np.abs(place[:, 2:]) @ size
+            if (travel > 1e-6 * np.abs(place[:, :2]).sum(axis=1)).any():
+                return False
+        rays = _behind_lens(stage, rays)
+    return True
+
+
+def _behind_lens(stage: Stage, rays: Affine) -> Affine:
+    return rays if stage.centred is None else stage.centred @ rays
+
+
+def _pixels_from_slopes(camera: Camera, n: int) -> Array:
+    """2×2: pixels on the sensor by which a ray moves for a change of slope at stage n."""
+    rays = Affine.identity()
+    for stage in camera.stages[n + 1 :]:
+        rays = _behind_lens(stage, stage.approach @ rays)
+    to_sensor = camera.approach_to_sensor @ rays
+    return np.asarray(camera.sensor.frame.inverse().linear @ to_sensor.linear[:2, 2:])
+
+
+def _samples_from_slopes(camera: Camera, light_field: LightField, n: int) -> Array:
+    """2×2: samples of a view by which a ray moves for a change of slope at stage n."""
+    rays = Affine.identity()
+    for stage in camera.stages[:n]:
+        rays = _behind_lens(stage, stage.approach @ rays)
+    rays = camera.stages[n].approach @ rays
+    return np.asarray((rays @ light_field.frame).inverse().linear[2:, 2:])
+
+
+def _on_lattice(kernel: Kernel, steps_from_slopes: Array, sharp: bool) -> Array:
+    """A kernel's weights; ``sharp``, without what they spread by sharing out what falls between lattice points.
+
+    Along an axis that adds E|δ| − E δ² steps² to the variance of a kernel narrower than a step, and 1/6 to that of
+    a wide one, as much as sinc² takes.
+    """
+    weights = kernel.weights(steps_from_slopes)
+    if not sharp:
+        return weights
+    slopes, shares = kernel.quadrature()
+    places = slopes @ steps_from_slopes.T
+    wanted = shares @ places**2 - (shares @ places) ** 2
+    filters = []
+    for axis in (0, 1):
+        along = weights.sum(axis=axis)
+        step = np.arange(len(along)) - len(along) // 2
+        added = along @ step**2 - (along @ step) ** 2 - wanted[axis]
+        filters.append(along_axis(min(max(12 * added, 0.0), 3.0), 1.0))
+    return _convolved(weights, np.outer(filters[1], filters[0]))
+
+
+def _convolved(one: Array | None, other: Array) -> Array:
+    if one is None:
+        return other
+    from scipy.signal import convolve
+
+    return np.asarray(convolve(one, other))

@@ -1,0 +1,410 @@
+"""From a camera whose optics are not affine, and a light field, to a ray plan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.units import short
+from vcc.optics.deflections import CellDeflection, FacetDeflection
+from vcc.optics.electronics import checked_seed
+from vcc.optics.scatter import Scatter, SheetMap
+from vcc.plan.parallax_rule import index_motions, vergences
+from vcc.plan.rays import steps
+from vcc.plan.rays.aim import Aimed, Leg, Path, columns_of
+from vcc.plan.rays.model import DIGITS, FIRST_COLUMNS, TABLE, Aim, CellWindows, RayPlan, Window
+from vcc.plan.rays.sharpening import sharpening
+from vcc.plan.rays.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
+from vcc.shapes.lattice import CellApertures, CellBlock
+from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
+from vcc.shapes.sheets import Product
+
+if TYPE_CHECKING:
+    from vcc.camera import Camera
+    from vcc.light_field import LightField
+    from vcc.optics.train import Stage
+
+Array = NDArray[np.float64]
+
+DEFAULT_SAMPLES = 64
+ASKING_PIXELS, ASKING_RAYS = 16, 2**16
+"""Pixels a side of the sensor, and rays in all, that tell what the light field lacks beyond the aim: shares are
+right to 1/2√n, 0.2 %, or better."""
+
+
+def compile_rays(
+    camera: Camera,
+    light_field: LightField,
+    *,
+    interpolation: str = "sharp",
+    between_views: str = "auto",
+    scene_distance: float | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    reason: str = "asked for",
+) -> RayPlan:
+    """The plan by which rays make the picture that ``camera`` records of ``light_field``.
+
+    Args: see `vcc.Camera.capture`; ``reason`` says why rays are needed, for the plan's notes.
+
+    Raises:
+        InputError: an option that does not exist, an element that returns what it must not (named), or optics
+            through which no bound on the rays can be found.
+    """
+    if between_views not in ("auto", "none"):
+        raise InputError(f"between_views is 'auto' or 'none', not {between_views!r}")
+    if interpolation not in ("sharp", "linear"):
+        raise InputError(f"interpolation by rays is 'sharp' or 'linear', not {interpolation!r}")
+    samples = _checked_samples(samples)
+    seed = checked_seed(seed)
+    motion, followed = _motion(light_field, scene_distance)
+    if between_views == "none":
+        motion = np.zeros((2, 2))
+        followed = "each view stands for its cell of the aperture; views are not interpolated, as asked"
+    path = Path(camera, light_field, motion, samples)
+    aimed, asked = path.aimed()
+    notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {aimed.aim.words}"]
+    made, index_from_ray, scatters = _steps(path, aimed, notes)
+    rows, columns = camera.sensor.shape
+    vertical, horizontal = camera.sensor.pitches
+    high, wide = camera.sensor.sensitive_pitches
+    first = camera.sensor.frame(np.zeros((1, 2)))[0]
+    notes.append(followed)
+    if isinstance(aimed.aim, CellWindows):
+        samples >>= aimed.aim.halvings
+    if interpolation == "sharp":
+        notes.append(
+            "views are made sharper by what interpolating between their samples takes"
+            + (", and by what their pixels' own averaging took" if light_field.sample == "mean" else "")
+        )
+    nv, nu, nt, ns = light_field.shape[:4]
+    plan = RayPlan(
+        sensor_shape=(rows, columns),
+        first_pixel=(float(first[0]), float(first[1])),
+        pitch=(horizontal, vertical),
+        sensitive=(wide, high),
+        aim=aimed.aim,
+        steps=tuple(made),
+        index_from_ray=index_from_ray,
+        motion=motion,
+        between_views=between_views == "auto",
+        views=(nv, nu, nt, ns),
+        scale=1.0 / light_field.full_scale,
+        sharpening=sharpening(light_field.sample) if interpolation == "sharp" else None,
+        samples=samples,
+        seed=seed,
+        points=_table(seed, scatters, aimed.aim),
+        views_may_end=path.stop_at_views,
+        cautions=tuple(_cautions(camera)),
+        notes=tuple(notes),
+    )
+    if asked is None:
+        return plan
+    missing = _missing(plan, path, asked)
+    more = f"the camera asks for light from {asked.aim.words}, of which the light field lacks {missing:.1%}"
+    return replace(plan, missing_rays=missing, notes=(*plan.notes, more))
+
+
+def _missing(plan: RayPlan, path: Path, asked: Aimed) -> float:
+    """The share of the light asked for that the light field lacks, where the plan's aim is narrower than that.
+
+    By rays to all that is asked for, from pixels all over the sensor.
+    """
+    made, index_from_ray, scatters = _steps(path, asked, [], coarse=True)
+    rows, columns = (np.unique(np.arange(ASKING_PIXELS) * n // ASKING_PIXELS) for n in plan.sensor_shape)
+    pixel = (rows[:, None] * plan.sensor_shape[1] + columns).reshape(-1)
+    wide = replace(
+        plan,
+        aim=asked.aim,
+        steps=tuple(made),
+        index_from_ray=index_from_ray,
+        points=_table(plan.seed, scatters, asked.aim),
+        samples=2 ** int(math.log2(ASKING_RAYS // len(pixel))),
+    )
+    index, share = wide.looked_up(pixel, wide.block(pixel))
+    inside, held = wide.held(index)
+    asked_for = share * (inside | plan.views_may_end)
+    return float((asked_for * ~held).sum() / asked_for.sum()) if asked_for.any() else 0.0
+
+
+def _checked_samples(samples: int | None) -> int:
+    if samples is None:
+        return DEFAULT_SAMPLES
+    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or not 2 <= samples <= TABLE:
+        raise InputError(f"samples is a whole number of rays a pixel from 2 to {TABLE}, not {samples!r}")
+    return int(2 ** math.ceil(math.log2(samples)))
+
+
+def _cautions(camera: Camera) -> Iterator[str]:
+    """What the optics do that a picture can hardly show."""
+    pixel = max(camera.sensor.pitches)
+    for stage in camera.stages:
+        bending = stage.faces.bending
+        if isinstance(bending, CellDeflection) and bending.lattice.pitch < pixel:
+            yield (
+                f"cells of {stage.element.label} are {short(bending.lattice.pitch)} wide, less than a pixel of "
+                f"the sensor ({short(pixel)}): what each of them does is averaged away"
+            )
+
+
+# --- steps ---
+
+
+@dataclass(frozen=True, eq=False)
+class _Met:
+    """What is met, where, and how finely it must be known.
+
+    Args:
+        stage: what is met.
+        region: lowest and highest (x, y) at which it is, metres.
+        footprint: (width, height) in metres over which the rays of one pixel spread there; None where unknown.
+        index_from_slope: (4, 2), by how many samples of the light field a ray moves for a slope there; None where
+            that is not known.
+        sizes: points a side of textures for masks, and for bends.
+    """
+
+    stage: Stage
+    region: tuple[Array, Array]
+    footprint: Array | None
+    index_from_slope: Array | None
+    sizes: tuple[tuple[int, ...], tuple[int, ...]]
+
+    @property
+    def label(self) -> str:
+        return self.stage.element.label
+
+
+def _steps(
+    path: Path, aimed: Aimed, notes: list[str], coarse: bool = False
+) -> tuple[list[steps.Step], Affine, list[Scatter]]:
+    """What rays meet, the map to the light field's indices, and the scatterers in the order of the table.
+
+    ``coarse`` takes the coarsest textures, for a share of light rather than for a picture.
+    """
+    sizes = (COARSE_SIZES[:1], SIZES[:1]) if coarse else (COARSE_SIZES, SIZES)
+    made: list[steps.Step] = []
+    scatters: list[Scatter] = []
+    pending, column = Affine.identity(), FIRST_COLUMNS
+    for leg, region in zip(path.legs, aimed.regions, strict=True):
+        pending = leg.undone @ pending
+        stage, faces = leg.stage, leg.stage.faces
+        met = _Met(stage, region, path.footprint(aimed.aim, leg), path.index_from_slope(leg), sizes)
+        here: list[steps.Step] = []
+        with stage.named():
+            if faces.pattern is not None and not _is_aimed_at(aimed.aim, leg):
+                here += _transmission(faces.pattern, met, notes)
+            if faces.bending is not None:
+                here.append(_deflection(met, notes))
+            if faces.spread is not None:
+                here.append(_scatter(faces.spread, column, met))
+                column += columns_of(faces.spread)
+                scatters.append(faces.spread)
+        if here:
+            made += [steps.Move(pending), *here]
+            pending = Affine.identity()
+    index = path.index_from_entrance @ path.last @ pending
+    return made, index, scatters
+
+
+def _is_aimed_at(aim: Aim, leg: Leg) -> bool:
+    """Whether the leg's stop is the very disc aimed at, which lets all rays pass that are aimed at it.
+
+    Elements without names in one plane have one label, so that the disc itself counts too.
+    """
+    pattern, element = leg.stage.faces.pattern, leg.stage.element
+    if not (isinstance(aim, Window) and aim.disc and aim.words == element.label and isinstance(pattern, Circle)):
+        return False
+    middle, half = np.array(element.decentre), pattern.diameter / 2
+    back = np.linalg.inv(leg.from_sensor.linear[:2, 2:])
+    return np.allclose(half * back, aim.slope_from_point, rtol=1e-9, atol=0) and np.allclose(
+        back @ (middle - leg.from_sensor.offset[:2]), aim.offset, rtol=1e-9, atol=1e-12
+    )
+
+
+def _transmission(pattern: Pattern, met: _Met, notes: list[str]) -> list[steps.Step]:
+    """The steps by which a pattern weighs rays."""
+    decentre, label = met.stage.element.decentre, met.label
+    if isinstance(pattern, Open):
+        return []
+    if isinstance(pattern, Circle):
+        return [steps.Disc(decentre, pattern.diameter / 2, label)]
+    if isinstance(pattern, Bounded):
+        sheet = steps.Rectangle(decentre, (pattern.width / 2, pattern.height / 2), f"edges of {label}")
+        return [sheet, *_transmission(pattern.pattern, met, notes)]
+    if isinstance(pattern, Product):
+        return [step for one in pattern.patterns for step in _transmission(one, met, notes)]
+    if isinstance(pattern, CellApertures):
+        half = pattern.scale * pattern.lattice.pitch / 2
+        return [steps.CellGaps(pattern.lattice, decentre, half, pattern.circular, f"gaps of {label}")]
+    if isinstance(pattern, CellBlock):
+        return [steps.BlockOfCells(pattern.lattice, decentre, pattern.rows, pattern.columns, f"edges of {label}")]
+    if isinstance(pattern, Cells):
+        rows, columns = pattern.values.shape
+        size = (pattern.width / columns, float(pattern.height or 0.0) / rows)
+        corner = (
+            pattern.middle[0] + decentre[0] - size[0] * columns / 2,
+            pattern.middle[1] + decentre[1] - size[1] * rows / 2,
+        )
+        return [steps.CellShares(pattern.values.astype(np.float32), corner, size, label)]
+    if isinstance(pattern, CosineSum):
+        across, down = (2 * math.pi / period for period in pattern.periods)
+        return [steps.Cosines(decentre, (across, down), pattern.phase, pattern.harmonics, label)]
+
+    def sampled(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
+        return means_around(pattern, x - decentre[0], y - decentre[1], spacing)[..., None]
+
+    def itself(x: Array, y: Array) -> Array:
+        return np.asarray(pattern(x - decentre[0], y - decentre[1]))[..., None]
+
+    enough = None if met.footprint is None else met.footprint / POINTS_PER_FOOTPRINT
+    texture, error = textured(sampled, met.region, met.sizes[0], itself=itself, spacing_enough=enough)
+    if error > WORTH_SAYING:
+        note = f"{label} is finer than its texture shows: {error:.1%} root mean square of its largest value"
+        if met.footprint is not None:
+            note += f", of which a pixel averages {min(met.footprint / texture.spacing):.0f} points across or more"
+        notes.append(note)
+    single = replace(texture, values=texture.values.astype(np.float32))
+    return [steps.TextureShares(single, label)]
+
+
+def _deflection(met: _Met, notes: list[str]) -> steps.Step:
+    bending, decentre, label = met.stage.faces.bending, met.stage.element.decentre, met.label
+    assert bending is not None
+    if isinstance(bending, CellDeflection):
+        return steps.CellsUnbend(bending.lattice, decentre, bending.powers, bending.slopes, label)
+    if isinstance(bending, FacetDeflection):
+        return steps.FacetsUnbend(bending.directions, bending.slopes, decentre, label)
+
+    def sampled(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
+        s, t = bending(x - decentre[0], y - decentre[1])
+        return np.stack(np.broadcast_arrays(s, t), axis=-1)
+
+    texture, error = textured(sampled, met.region, met.sizes[1], index_from_value=met.index_from_slope)
+    if error > WORTH_SAYING:
+        notes.append(
+            f"{label} bends by a texture of {texture.values.shape[0]}² points, {error:.1%} root mean square of "
+            "its steepest slope away from it"
+        )
+    return steps.TextureUnbend(texture, label)
+
+
+def _scatter(scatter: Scatter, column: int, met: _Met) -> steps.Unscatter:
+    """The step of a diffuser whose numbers begin at this column of the table."""
+    kernels = len(scatter.kernels)
+    cumulative = width = None
+    if scatter.weights is not None:
+        shares = _sheet(scatter.weights, met)
+        cumulative = replace(shares, values=np.cumsum(shares.values, axis=-1))
+    if scatter.width is not None:
+        width = _sheet(scatter.width, met)
+    pick = column + 2 * kernels if cumulative is not None else -1
+    return steps.Unscatter(column, kernels, pick, cumulative, width, met.label)
+
+
+def _sheet(given: object, met: _Met) -> steps.Texture:
+    """A map over a sheet as a texture: as it is where it is one, else sampled."""
+    decentre = met.stage.element.decentre
+    if isinstance(given, SheetMap):
+        values = np.moveaxis(given.values, 0, -1) if given.values.ndim == 3 else given.values[..., None]
+        rows, columns = values.shape[:2]
+        spacing = (given.width / columns, given.height / rows)
+        start = (
+            decentre[0] - given.width / 2 + spacing[0] / 2,
+            decentre[1] - given.height / 2 + spacing[1] / 2,
+        )
+        return steps.Texture(values.astype(np.float32), start, spacing)
+
+    def sampled(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
+        values = np.asarray(given(x - decentre[0], y - decentre[1]))  # type: ignore[operator]
+        shape = np.broadcast_shapes(x.shape, y.shape)
+        return values[..., None] if values.shape == shape else values
+
+    return textured(sampled, met.region, met.sizes[1])[0]
+
+
+# --- points ---
+
+
+def _table(seed: int, scatters: list[Scatter], aim: Aim) -> NDArray[np.float32]:
+    """The points that all pixels share; see `RayPlan.points`."""
+    dimensions = FIRST_COLUMNS + sum(2 + (scatter.weights is not None) for scatter in scatters)
+    even = _sobol(dimensions, seed)
+    disc = isinstance(aim, Window) and aim.disc
+    columns = [even[:, 0], even[:, 1], *(_on_disc(even[:, 2], even[:, 3]) if disc else even[:, 2:4].T)]
+    next_one = FIRST_COLUMNS
+    for scatter in scatters:
+        xi, eta = (even[:, next_one + n] + 2.0 ** -(DIGITS + 1) for n in range(2))  # neither 0 nor 1
+        next_one += 2
+        for kernel in scatter.kernels:
+            columns += list(kernel.deflections(xi, eta))
+        if scatter.weights is not None:
+            columns.append(even[:, next_one])
+            next_one += 1
+    return np.stack(columns, axis=1).astype(np.float32)
+
+
+@lru_cache(maxsize=4)
+def _sobol(dimensions: int, seed: int) -> Array:
+    """`TABLE` points of a scrambled Sobol' sequence: any aligned block of 2ⁿ of them is evenly spread.
+
+    (`TABLE`, dimensions) of numbers 0 … 1 of `DIGITS` binary digits. Each digit is flipped or not by chance, by
+    all digits before it (Owen 1995). A linear scrambling would make all blocks alike but for a shift, and pixels
+    would err alike.
+    """
+    from scipy.stats import qmc
+
+    depth = TABLE.bit_length() - 1  # digits in which the first points of the sequence differ
+    plain = (qmc.Sobol(dimensions, scramble=False).random(TABLE) * TABLE).astype(np.int64)
+    generator = np.random.default_rng(seed)
+    points = np.empty((TABLE, dimensions))
+    for column in range(dimensions):
+        number = plain[:, column]
+        scrambled = np.zeros(TABLE, dtype=np.int64)
+        for before in range(depth):
+            flips = generator.integers(0, 2, 2**before)
+            digit = (number >> (depth - 1 - before)) & 1
+            scrambled = 2 * scrambled + (digit ^ flips[number >> (depth - before)])
+        rest = DIGITS - depth  # no two points share all digits so far
+        points[:, column] = (scrambled * 2**rest + generator.integers(0, 2**rest, TABLE)) * 2.0**-DIGITS
+    points.flags.writeable = False
+    return points
+
+
+def _on_disc(xi: Array, eta: Array) -> list[Array]:
+    """Points of the unit square on the unit disc, equal areas to equal areas, neighbours to neighbours.
+
+    The concentric map of Shirley and Chiu (1997).
+    """
+    a, b = 2 * xi - 1, 2 * eta - 1
+    wide = np.abs(a) > np.abs(b)
+    radius = np.where(wide, a, b)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = np.where(wide, np.pi / 4 * b / a, np.pi / 2 - np.pi / 4 * a / b)
+    angle = np.where(radius == 0, 0.0, angle)
+    return [radius * np.cos(angle), radius * np.sin(angle)]
+
+
+# --- between views ---
+
+
+def _motion(light_field: LightField, scene_distance: float | None) -> tuple[Array, str]:
+    """How a point of the scene's middle depth moves from view to view, and what is done with it, in words."""
+    if max(light_field.whole_views) <= 1:
+        return np.zeros((2, 2)), "a single view: nothing between views"
+    known = vergences(light_field, scene_distance)
+    if known is None:
+        return np.zeros((2, 2)), "views are interpolated in place: the pictures show no parallax to follow"
+    motions = index_motions(light_field.frame, known)
+    middle = motions[np.abs(motions[:, 0, 0] - (motions[:, 0, 0].min() + motions[:, 0, 0].max()) / 2).argmin()]
+    return middle, (
+        "views are interpolated along the parallax of the scene's middle depth, "
+        f"{round(float(middle[0, 0]), 3) + 0.0:.2g} pixels from view to view"
+    )

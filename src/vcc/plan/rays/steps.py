@@ -1,0 +1,451 @@
+"""Steps of a ray on its way back from the sensor to the light field, as plain data.
+
+A ray travels against the light: from a place on the sensor through what the camera holds, last first, to the
+entrance plane. Each class is one step and says twice what it does: as a function on NumPy bundles of rays, which
+defines what is correct, and as numbers (`packed`) for the compiled kernel, which knows these steps by ``code``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.shapes.lattice import Lattice
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Bundle:
+    """Rays in one plane: places x, y in metres, slopes s, t, and the share of light that each carries.
+
+    ``points`` holds the numbers that belong to each ray, (..., columns of the plan's table).
+    """
+
+    x: Array
+    y: Array
+    s: Array
+    t: Array
+    share: Array
+    points: Array
+
+
+class Packer:
+    """Collects the numbers of steps for the compiled kernel: small ones by step, tables one after another."""
+
+    def __init__(self) -> None:
+        self.codes: list[int] = []
+        self.whole: list[list[int]] = []
+        self.real: list[list[float]] = []
+        self._shares: list[NDArray[np.float32]] = []
+        self._slopes: list[Array] = []
+        self._places = {"shares": 0, "slopes": 0}
+
+    def step(self, code: int, whole: list[int], real: list[float]) -> None:
+        """One step's own numbers."""
+        self.codes.append(code)
+        self.whole.append(whole)
+        self.real.append(real)
+
+    def shares(self, table: NDArray[np.float32]) -> int:
+        """Where a table of shares (float32) will begin."""
+        self._shares.append(np.ascontiguousarray(table, dtype=np.float32).reshape(-1))
+        self._places["shares"] += table.size
+        return self._places["shares"] - table.size
+
+    def slopes(self, table: Array) -> int:
+        """Where a table of slopes (float64) will begin."""
+        self._slopes.append(np.ascontiguousarray(table, dtype=np.float64).reshape(-1))
+        self._places["slopes"] += table.size
+        return self._places["slopes"] - table.size
+
+    def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, NDArray[np.float32], Array]:
+        """(codes, whole numbers, real numbers, shares, slopes) as the kernel takes them."""
+        whole = np.zeros((len(self.codes), max((len(row) for row in self.whole), default=1) or 1), dtype=np.int64)
+        real = np.zeros((len(self.codes), max((len(row) for row in self.real), default=1) or 1))
+        for n, (whole_row, real_row) in enumerate(zip(self.whole, self.real, strict=True)):
+            whole[n, : len(whole_row)] = whole_row
+            real[n, : len(real_row)] = real_row
+        shares = _one_after_another(self._shares or [np.zeros(1, dtype=np.float32)])
+        slopes = _one_after_another(self._slopes or [np.zeros(1)])
+        return np.array(self.codes, dtype=np.int64), whole, real, shares, slopes
+
+
+def _one_after_another(tables: list[Any]) -> Any:
+    """Tables in one array; a single one, often large, is not copied."""
+    return tables[0] if len(tables) == 1 else np.concatenate(tables)
+
+
+class Step(Protocol):
+    """What every step can do."""
+
+    @property
+    def words(self) -> str:
+        """The step in a few words."""
+
+    def __call__(self, rays: Bundle) -> None:
+        """Take rays one step back."""
+
+    def packed(self, packer: Packer) -> None:
+        """Hand the step's numbers to the compiled kernel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """All affine optics and free flight between two planes, undone."""
+
+    before_from_behind: Affine
+    words: str = "moved"
+    code_parted: ClassVar[int] = 0
+    code_mixed: ClassVar[int] = 1
+
+    def __call__(self, rays: Bundle) -> None:
+        """Move rays to the plane before."""
+        m = self.before_from_behind.matrix
+        old = (rays.x, rays.y, rays.s, rays.t)
+        rays.x, rays.y, rays.s, rays.t = (
+            m[n, 0] * old[0] + m[n, 1] * old[1] + m[n, 2] * old[2] + m[n, 3] * old[3] + m[n, 4] for n in range(4)
+        )
+
+    def packed(self, packer: Packer) -> None:
+        """Twelve numbers where x and y do not mix, else twenty."""
+        m = self.before_from_behind.matrix
+        if m[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]].any():
+            packer.step(self.code_mixed, [], m[:4].reshape(-1).tolist())
+            return
+        parted = [m[n, c] for n in (0, 2) for c in (0, 2, 4)] + [m[n, c] for n in (1, 3) for c in (1, 3, 4)]
+        packer.step(self.code_parted, [], parted)
+
+
+def _lattice_numbers(lattice: Lattice, decentre: tuple[float, float]) -> tuple[int, list[float]]:
+    """(0 square, 1 hexagonal), (cos, sin, offset x, offset y, pitch, row height)."""
+    return int(lattice.layout == "hexagonal"), [
+        math.cos(lattice.rotation),
+        math.sin(lattice.rotation),
+        lattice.offset[0] + decentre[0],
+        lattice.offset[1] + decentre[1],
+        lattice.pitch,
+        lattice.row_height,
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class CellsUnbend:
+    """Lenslets and prisms, each cell its own: slopes lose what the cells added to them."""
+
+    lattice: Lattice
+    decentre: tuple[float, float]
+    powers: Array
+    slopes: Array
+    words: str
+    code: ClassVar[int] = 2
+
+    def __call__(self, rays: Bundle) -> None:
+        """Undo the deflection of the cells that hold the rays."""
+        x, y = rays.x - self.decentre[0], rays.y - self.decentre[1]
+        row, column = self.lattice.cell_of(x, y)
+        centre_x, centre_y = self.lattice.centre_of(row, column)
+        kind = row % self.powers.shape[0], column % self.powers.shape[1]
+        rays.s = rays.s + self.powers[kind] * (x - centre_x) - self.slopes[(*kind, 0)]
+        rays.t = rays.t + self.powers[kind] * (y - centre_y) - self.slopes[(*kind, 1)]
+
+    def packed(self, packer: Packer) -> None:
+        """The lattice, and a table of (power, δs, δt) for each kind of cell."""
+        layout, numbers = _lattice_numbers(self.lattice, self.decentre)
+        table = packer.slopes(np.concatenate([self.powers[..., None], self.slopes], axis=-1))
+        packer.step(self.code, [layout, *self.powers.shape, table], numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class CellGaps:
+    """Opaque gaps between cells."""
+
+    lattice: Lattice
+    decentre: tuple[float, float]
+    half: float
+    circular: bool
+    words: str
+    code: ClassVar[int] = 3
+
+    def __call__(self, rays: Bundle) -> None:
+        """Stop rays outside the cells' openings."""
+        dx, dy = self.lattice.local(rays.x - self.decentre[0], rays.y - self.decentre[1])
+        dx, dy = np.abs(dx), np.abs(dy)
+        if self.circular:
+            inside = dx * dx + dy * dy <= self.half**2
+        elif self.lattice.layout == "square":
+            inside = np.maximum(dx, dy) <= self.half
+        else:
+            inside = np.maximum(dx, dx / 2 + math.sqrt(3) / 2 * dy) <= self.half
+        rays.share = rays.share * inside
+
+    def packed(self, packer: Packer) -> None:
+        """The lattice, the openings' shape and half size."""
+        layout, numbers = _lattice_numbers(self.lattice, self.decentre)
+        packer.step(self.code, [layout, int(self.circular)], [*numbers, self.half])
+
+
+@dataclass(frozen=True, eq=False)
+class BlockOfCells:
+    """A block of cells of a lattice, from cell (0, 0) on, opaque outside it."""
+
+    lattice: Lattice
+    decentre: tuple[float, float]
+    rows: int
+    columns: int
+    words: str
+    code: ClassVar[int] = 11
+
+    def __call__(self, rays: Bundle) -> None:
+        """Stop rays outside the block."""
+        row, column = self.lattice.cell_of(rays.x - self.decentre[0], rays.y - self.decentre[1])
+        rays.share = rays.share * ((row >= 0) & (row < self.rows) & (column >= 0) & (column < self.columns))
+
+    def packed(self, packer: Packer) -> None:
+        """The lattice, rows and columns of the block."""
+        layout, numbers = _lattice_numbers(self.lattice, self.decentre)
+        packer.step(self.code, [layout, self.rows, self.columns], numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class FacetsUnbend:
+    """Plane facets that meet in the middle: slopes lose what the facets added to them."""
+
+    directions: Array
+    slopes: Array
+    decentre: tuple[float, float]
+    words: str
+    code: ClassVar[int] = 4
+
+    def __call__(self, rays: Bundle) -> None:
+        """Undo the deflection of the facet that each ray meets."""
+        x, y = rays.x - self.decentre[0], rays.y - self.decentre[1]
+        facet = np.argmax(x[..., None] * self.directions[:, 0] + y[..., None] * self.directions[:, 1], axis=-1)
+        rays.s = rays.s - self.slopes[facet, 0]
+        rays.t = rays.t - self.slopes[facet, 1]
+
+    def packed(self, packer: Packer) -> None:
+        """A table of (direction, slopes) for each facet."""
+        table = packer.slopes(np.concatenate([self.directions, self.slopes], axis=1))
+        packer.step(self.code, [len(self.directions), table], list(self.decentre))
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """Numbers at regular points of a plane, interpolated linearly and held beyond the border.
+
+    Args:
+        values: (rows, columns, numbers).
+        start: place (x, y) of the first point, metres.
+        spacing: distance (x, y) between points, metres.
+    """
+
+    values: NDArray[np.floating]
+    start: tuple[float, float]
+    spacing: tuple[float, float]
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """The numbers at places x, y: (..., numbers)."""
+        rows, columns = self.values.shape[:2]
+        column = np.clip((x - self.start[0]) / self.spacing[0], 0, columns - 1)
+        row = np.clip((y - self.start[1]) / self.spacing[1], 0, rows - 1)
+        c = np.minimum(column.astype(np.int64), max(columns - 2, 0))
+        r = np.minimum(row.astype(np.int64), max(rows - 2, 0))
+        c1, r1 = np.minimum(c + 1, columns - 1), np.minimum(r + 1, rows - 1)
+        fc, fr = (column - c)[..., None], (row - r)[..., None]
+        above = self.values[r, c] * (1 - fc) + self.values[r, c1] * fc
+        below = self.values[r1, c] * (1 - fc) + self.values[r1, c1] * fc
+        return np.asarray(above * (1 - fr) + below * fr, dtype=np.float64)
+
+    @property
+    def whole(self) -> list[int]:
+        """(rows, columns)."""
+        return [int(n) for n in self.values.shape[:2]]
+
+    @property
+    def real(self) -> list[float]:
+        """(start x, start y, points per metre x, y)."""
+        return [*self.start, 1 / self.spacing[0], 1 / self.spacing[1]]
+
+
+@dataclass(frozen=True, eq=False)
+class TextureUnbend:
+    """A phase plate or any function of position, as a texture: slopes lose what it added to them."""
+
+    texture: Texture
+    words: str
+    code: ClassVar[int] = 5
+
+    def __call__(self, rays: Bundle) -> None:
+        """Undo the deflection."""
+        slopes = self.texture(rays.x, rays.y)
+        rays.s, rays.t = rays.s - slopes[..., 0], rays.t - slopes[..., 1]
+
+    def packed(self, packer: Packer) -> None:
+        """The texture, two float64 numbers a point."""
+        table = packer.slopes(np.asarray(self.texture.values, dtype=np.float64))
+        packer.step(self.code, [*self.texture.whole, table], self.texture.real)
+
+
+@dataclass(frozen=True, eq=False)
+class Disc:
+    """A round hole."""
+
+    middle: tuple[float, float]
+    radius: float
+    words: str
+    code: ClassVar[int] = 6
+
+    def __call__(self, rays: Bundle) -> None:
+        """Stop rays outside."""
+        inside = (rays.x - self.middle[0]) ** 2 + (rays.y - self.middle[1]) ** 2 <= self.radius**2
+        rays.share = rays.share * inside
+
+    def packed(self, packer: Packer) -> None:
+        """Middle and square of the radius."""
+        packer.step(self.code, [], [*self.middle, self.radius**2])
+
+
+@dataclass(frozen=True, eq=False)
+class Rectangle:
+    """A rectangular hole."""
+
+    middle: tuple[float, float]
+    half: tuple[float, float]
+    words: str
+    code: ClassVar[int] = 7
+
+    def __call__(self, rays: Bundle) -> None:
+        """Stop rays outside."""
+        inside = np.abs(rays.x - self.middle[0]) <= self.half[0]
+        rays.share = rays.share * (inside & (np.abs(rays.y - self.middle[1]) <= self.half[1]))
+
+    def packed(self, packer: Packer) -> None:
+        """Middle and half sizes."""
+        packer.step(self.code, [], [*self.middle, *self.half])
+
+
+@dataclass(frozen=True, eq=False)
+class CellShares:
+    """A mask of uniform rectangular cells, opaque outside them, with its sharp edges."""
+
+    values: NDArray[np.float32]
+    corner: tuple[float, float]
+    size: tuple[float, float]
+    words: str
+    code: ClassVar[int] = 8
+
+    def __call__(self, rays: Bundle) -> None:
+        """Weigh rays by the cell that they meet."""
+        rows, columns = self.values.shape
+        column = np.floor((rays.x - self.corner[0]) / self.size[0]).astype(np.int64)
+        row = np.floor((rays.y - self.corner[1]) / self.size[1]).astype(np.int64)
+        inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        value = self.values[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+        rays.share = rays.share * np.where(inside, value, 0.0)
+
+    def packed(self, packer: Packer) -> None:
+        """The cells, where the first begins and how large they are."""
+        table = packer.shares(self.values)
+        packer.step(self.code, [*self.values.shape, table], [*self.corner, 1 / self.size[0], 1 / self.size[1]])
+
+
+@dataclass(frozen=True)
+class Cosines:
+    """A mask of sums of cosines along both axes, in closed form (`vcc.patterns.CosineSum`).
+
+    Args:
+        middle: place (x, y) of the mask, metres.
+        frequency: (x, y) of the first cosines, radians per metre; 0 along an axis without any.
+        phase: of the first cosines, radians.
+        harmonics: how many cosines.
+        words: for people.
+    """
+
+    middle: tuple[float, float]
+    frequency: tuple[float, float]
+    phase: float
+    harmonics: int
+    words: str
+    code: ClassVar[int] = 12
+
+    def __call__(self, rays: Bundle) -> None:
+        """Weigh rays by ½ + Σ cos(nθ)/2h along each axis."""
+        orders = np.arange(1, self.harmonics + 1)
+        for place, middle, frequency in zip((rays.x, rays.y), self.middle, self.frequency, strict=True):
+            if frequency > 0:
+                angle = frequency * (place - middle) + self.phase
+                total = np.cos(angle[..., None] * orders).sum(axis=-1)
+                rays.share = rays.share * (0.5 + total / (2 * self.harmonics))
+
+    def packed(self, packer: Packer) -> None:
+        """Middle, frequencies, phase, and how many cosines."""
+        packer.step(self.code, [self.harmonics], [*self.middle, *self.frequency, self.phase])
+
+
+@dataclass(frozen=True, eq=False)
+class TextureShares:
+    """A mask of any other form, as a texture of means over its own points."""
+
+    texture: Texture
+    words: str
+    code: ClassVar[int] = 9
+
+    def __call__(self, rays: Bundle) -> None:
+        """Weigh rays by the mask."""
+        rays.share = rays.share * self.texture(rays.x, rays.y)[..., 0]
+
+    def packed(self, packer: Packer) -> None:
+        """The texture, one float32 number a point."""
+        table = packer.shares(np.asarray(self.texture.values, dtype=np.float32))
+        packer.step(self.code, [*self.texture.whole, table], self.texture.real)
+
+
+@dataclass(frozen=True, eq=False)
+class Unscatter:
+    """A diffuser: each ray came in along one of the ways that its kernel allows, evenly picked.
+
+    Args:
+        column: of the table, where the first kernel's (δs, δt) stand; the others follow.
+        kernels: how many kernels there are.
+        pick: column of the number, 0 to 1, that picks the kernel; −1 where there is one.
+        cumulative: running sums of the kernels' shares over the surface, (rows, columns, kernels), or None.
+        width: factor by which kernels are stretched over the surface, (rows, columns, 1), or None.
+        words: for people.
+    """
+
+    column: int
+    kernels: int
+    pick: int
+    cumulative: Texture | None
+    width: Texture | None
+    words: str
+    code: ClassVar[int] = 10
+
+    def __call__(self, rays: Bundle) -> None:
+        """Take from each ray's slopes what the diffuser added to it."""
+        kernel = np.zeros(rays.x.shape, dtype=np.int64)
+        if self.cumulative is not None:
+            picked = rays.points[..., self.pick, None] >= self.cumulative(rays.x, rays.y)[..., :-1]
+            kernel = picked.sum(axis=-1)
+        place = self.column + 2 * kernel
+        stretch = 1.0 if self.width is None else self.width(rays.x, rays.y)[..., 0]
+        rays.s = rays.s - stretch * np.take_along_axis(rays.points, place[..., None], -1)[..., 0]
+        rays.t = rays.t - stretch * np.take_along_axis(rays.points, place[..., None] + 1, -1)[..., 0]
+
+    def packed(self, packer: Packer) -> None:
+        """Columns of the table, and the two textures, of no points where there is none."""
+        whole: list[int] = [self.column, self.kernels, self.pick]
+        real: list[float] = []
+        for texture in (self.cumulative, self.width):
+            if texture is None:
+                whole, real = [*whole, 0, 0, 0], [*real, 0.0, 0.0, 0.0, 0.0]
+                continue
+            table = packer.shares(np.asarray(texture.values, dtype=np.float32))
+            whole, real = [*whole, *texture.whole, table], [*real, *texture.real]
+        packer.step(self.code, whole, real)

@@ -1,0 +1,253 @@
+"""The paper's operators on a light field itself, for those who want the field and not only the picture.
+
+𝕋 (`LightField.transformed`) is exact and lazy. The others here make new samples: `resampled` puts the field
+on another grid, `masked` is the dot product (·), `scattered` the convolution (⊗), `projected` the sensor (S). A
+camera's picture needs none of them; they cost what 4-D data cost, so the size is computed first and refused
+above a limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.memory import check_samples
+from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
+from vcc.plan.footprints.planes import Plane, depends_on_view_only, mask_lookup
+from vcc.shapes.patterns import Pattern
+
+if TYPE_CHECKING:
+    from vcc.camera import Camera
+    from vcc.image import Image
+    from vcc.light_field import LightField
+    from vcc.optics import Element, Mask, Scatter
+    from vcc.optics.sensor import Sensor
+    from vcc.optics.train import Stage
+
+SPLINE_ORDER = {"nearest": 0, "linear": 1, "cubic": 3}
+
+
+def masked_at(
+    light_field: LightField,
+    planes: list[tuple[Pattern, tuple[float, float], Affine]],
+    memory_limit: int | None = None,
+) -> LightField:
+    """The light field times what patterns at several planes let pass; its own plane and frame stay.
+
+    Args:
+        light_field: at some plane.
+        planes: for each pattern: the pattern, the place (x, y) of its middle in metres, and the map of rays
+            from the light field's plane to the pattern's.
+        memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
+
+    Raises:
+        InputError: more memory needed than allowed.
+    """
+    if not planes:
+        return light_field
+    check_samples(light_field.shape, memory_limit, "the masked light field")
+    values = to_numpy(light_field.values)
+    result = np.empty(values.shape, dtype=np.float32)
+    tables = [_weight_table(light_field, *plane) for plane in planes]
+    nv, nu, nt, ns = values.shape[:4]
+    k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
+    for j, i in np.ndindex(nv, nu):
+        weight: Any = 1.0 / light_field.full_scale
+        for table in tables:
+            # A texture that makes up for being looked up linearly may pass 0 beside an edge; light does not.
+            weight = weight * (
+                table[j, i] if isinstance(table, np.ndarray) else np.maximum(table.weights(j, i, k, l), 0.0)
+            )
+        if values.ndim == 5 and np.ndim(weight):
+            weight = weight[..., None]
+        result[j, i] = values[j, i] * weight
+    return light_field.replaced(result)
+
+
+def carried_to(
+    camera: Camera, light_field: LightField, z: float, before: bool, memory_limit: int | None = None
+) -> LightField:
+    """The light field at a plane inside a camera; see `vcc.Camera.light_field_at`."""
+    here = Affine.identity()
+    planes: list[tuple[Pattern, tuple[float, float], Affine]] = []
+    for stage in camera.stages:
+        if stage.element.z > z or (before and stage.element.z == z):
+            break
+        here = stage.approach @ here
+        if stage.faces.pattern is not None:
+            planes.append((stage.faces.pattern, stage.element.decentre, here))
+        if stage.faces.spread is not None:
+            arriving = masked_at(light_field, planes, memory_limit).transformed(here)
+            planes = []
+            light_field = scattered_by(arriving, stage, memory_limit).transformed(here.inverse())
+        if stage.centred is not None:
+            here = stage.centred @ here
+    behind = masked_at(light_field, planes, memory_limit)
+    return behind.transformed(camera.rays_at(z, before=before))
+
+
+def _weight_table(light_field: LightField, pattern: Pattern, decentre: tuple[float, float], rays: Affine) -> Any:
+    """One weight for each view where the pattern tells views apart only, else a lookup for samples."""
+    nv, nu, nt, ns = light_field.shape[:4]
+    plane = Plane.met_by(light_field.frame, rays, pattern, decentre, "pattern")
+    index = np.stack(np.meshgrid(np.arange(float(nu)), np.arange(float(nv))), axis=-1)
+    still = np.zeros((2, 2))
+    if depends_on_view_only(plane, (nt, ns), still):
+        return plane.view_weights(index, np.zeros_like(index), still, (nt, ns))
+    return mask_lookup(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
+
+
+def masked(light_field: LightField, mask: Mask, memory_limit: int | None = None) -> LightField:
+    """The paper's dot product L · K; see `vcc.LightField.masked`."""
+    pattern = mask.faces().pattern
+    assert pattern is not None
+    return masked_at(light_field, [(pattern, mask.decentre, Affine.identity())], memory_limit)
+
+
+def scattered(light_field: LightField, diffuser: Element, memory_limit: int | None = None) -> LightField:
+    """The paper's convolution L ⊗ D; see `vcc.LightField.scattered`."""
+    from vcc.optics.train import Stage
+
+    faces = diffuser.faces()
+    if faces.spread is None:
+        raise InputError(f"{diffuser.label} does not scatter light: its faces have no kernel")
+    if faces.deflection is not None:
+        raise InputError(
+            f"{diffuser.label} also bends rays: scatter with an element that only scatters, and use "
+            "lf.transformed() for the bending, or put it in a vcc.Camera"
+        )
+    if faces.pattern is not None:  # places are left alone, so that it does not matter which comes first
+        plane = (faces.pattern, diffuser.decentre, Affine.identity())
+        light_field = masked_at(light_field, [plane], memory_limit)
+    return scattered_by(light_field, Stage(diffuser, 0.0, Affine.identity(), faces), memory_limit)
+
+
+def scattered_by(light_field: LightField, stage: Stage, memory_limit: int | None = None) -> LightField:
+    """The light field just behind a stage that lies in its plane, scattered; what else it does is left out.
+
+    Args:
+        light_field: at the stage's plane.
+        stage: with a scatter face.
+        memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
+
+    Raises:
+        InputError: places of rays that depend on the pixel, not on the view alone; a kernel over too many samples;
+            more memory needed than allowed.
+    """
+    from scipy.signal import oaconvolve
+
+    scatter, label = stage.faces.spread, stage.element.label
+    assert scatter is not None
+    nv, nu, nt, ns = light_field.shape[:4]
+    frame = light_field.frame
+    travel = np.abs(frame.linear[:2, 2:]) @ np.array([ns, nt])
+    if (travel > 1e-6 * np.abs(frame.linear[:2, :2]).sum(axis=1)).any():
+        raise InputError(
+            f"{label} cannot scatter this light field within its views: the places of its rays depend on the "
+            "pixel, not on the view alone, so that a change of slope leads from one view to others. Resample it "
+            "first, to a frame whose places depend on (i, j) only: lf.resampled(frame, shape)"
+        )
+    with stage.named():
+        weights = _view_weights(scatter, light_field, stage.element.decentre)
+    high, wide = (max(one.shape[axis] // 2 for row in weights for one in row) for axis in (0, 1))
+    shape = (nv, nu, nt + 2 * high, ns + 2 * wide, *light_field.shape[4:])
+    check_samples(shape, memory_limit, f"the light field behind {label}")
+    values = to_numpy(light_field.values)
+    result = np.zeros(shape, dtype=np.float32)
+    for j, i in np.ndindex(nv, nu):
+        rows, columns = (size // 2 for size in weights[j][i].shape)
+        inside = result[j, i, high - rows : high + nt + rows, wide - columns : wide + ns + columns]
+        kernel = weights[j][i] if values.ndim == 4 else weights[j][i][:, :, None]
+        # In double precision: what Fourier transforms round to in the dark would else add up over a view.
+        view = values[j, i].astype(np.float64) / light_field.full_scale
+        np.maximum(oaconvolve(view, kernel, axes=(0, 1)), 0.0, out=inside, casting="same_kind")
+    grown = frame @ Affine.translation(0, 0, -wide, -high)
+    return replace(light_field, values=result, frame=grown, disparity=None)
+
+
+def _view_weights(
+    scatter: Scatter, light_field: LightField, decentre: tuple[float, float]
+) -> list[list[NDArray[np.float64]]]:
+    """The kernel in the middle of each view's cell, as weights on the lattice of a view's samples."""
+    nv, nu = light_field.shape[:2]
+    steps_from_slopes = light_field.frame.inverse().linear[2:, 2:]
+    if scatter.uniform:
+        return [[scatter.kernels[0].weights(steps_from_slopes)] * nu] * nv
+    index = np.zeros((nv, nu, 4))
+    index[..., 0], index[..., 1] = np.meshgrid(np.arange(nu), np.arange(nv))
+    place = light_field.frame(index)[..., :2] - decentre
+    shares, widths = scatter.at(place[..., 0], place[..., 1])
+    found: dict[tuple[int, float], NDArray[np.float64]] = {}  # many views have the same width
+
+    def mixed(share: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+        parts = []
+        for n in np.flatnonzero(share).tolist():
+            if (n, width) not in found:
+                found[n, width] = scatter.kernels[n].weights(width * steps_from_slopes)
+            parts.append(share[n] * found[n, width])
+        rows, columns = (max(part.shape[axis] for part in parts) for axis in (0, 1))
+        total = np.zeros((rows, columns))
+        for part in parts:
+            top, left = (rows - part.shape[0]) // 2, (columns - part.shape[1]) // 2
+            total[top : top + part.shape[0], left : left + part.shape[1]] += part
+        return total
+
+    return [[mixed(shares[j, i], float(widths[j, i])) for i in range(nu)] for j in range(nv)]
+
+
+def resampled(
+    light_field: LightField,
+    frame: Affine,
+    shape: tuple[int, int, int, int],
+    interpolation: str = "linear",
+    memory_limit: int | None = None,
+) -> LightField:
+    """The light field on another grid; see `vcc.LightField.resampled`."""
+    from scipy.ndimage import affine_transform
+
+    if interpolation not in SPLINE_ORDER:
+        raise InputError(f"interpolation is one of {', '.join(map(repr, SPLINE_ORDER))}, not {interpolation!r}")
+    if len(shape) != 4 or min(shape) < 1:
+        raise InputError(f"a grid has the shape (v, u, t, s), each at least 1, not {shape}")
+    check_samples((*shape, light_field.channels or 1), memory_limit, "the resampled light field")
+    old_from_new = light_field.frame.inverse() @ frame
+    axes = list(np.argsort(LIGHT_FIELD_AXES))
+    matrix, offset = old_from_new.linear[np.ix_(axes, axes)], old_from_new.offset[axes]
+    values = to_numpy(light_field.values)
+    values = values.reshape(*values.shape[:4], -1)
+    result = np.empty((*shape, values.shape[4]), dtype=np.float32)
+    for channel in range(values.shape[4]):
+        samples = values[..., channel].astype(np.float32) / np.float32(light_field.full_scale)
+        result[..., channel] = affine_transform(
+            samples,
+            matrix,
+            offset,
+            output_shape=shape,
+            order=SPLINE_ORDER[interpolation],
+            mode="grid-constant",  # zero beyond the border, and interpolated towards it
+            output=np.float32,
+        )
+    np.maximum(result, 0, out=result)  # a spline may undershoot; radiance does not
+    final: NDArray[np.float32] = result if light_field.channels is not None else result[..., 0]
+    return replace(
+        light_field,
+        values=final,
+        frame=frame,
+        disparity_range=None,
+        disparity=None,
+        _shared_disparity=None,
+        _disparity_factor=1.0,
+        _whole_views=None,
+    )
+
+
+def projected(light_field: LightField, sensor: Sensor) -> Image:
+    """The picture on a sensor that lies in the light field's own plane; see `vcc.LightField.projected`."""
+    from vcc.camera import Camera
+
+    return Camera([], replace(sensor, z=0.0)).capture(light_field)

@@ -1,0 +1,1 @@
+"""Functions of position: what masks let through, how diffusers scatter, what plates add, where cells lie."""

@@ -1,0 +1,545 @@
+"""Transmission patterns: what a mask lets through, as a function of position.
+
+A pattern is called with positions (x, y) in metres from its own middle (x right, y down) and returns the
+transmitted share, 0 to 1. Light fields are sampled in cells, so what a camera needs is a pattern's *mean*
+over a rectangle, never its value at a point: patterns with a closed form give it exactly, the others
+through a fine raster. Any function of (x, y) can be used as a pattern through `as_pattern`.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+
+Array = NDArray[np.float64]
+
+RASTER_PER_CELL = 16
+"""Raster points across a rectangle for patterns without a closed form: edges are right to 1/16² of it."""
+FEWEST_PER_CELL = 4
+"""Raster points across a rectangle with which to make do where there are many rectangles side by side."""
+RASTER_LIMIT = 4096
+"""Largest square raster, points a side: 128 MiB of float64 while a plan is being made."""
+LONGEST_RASTER = 4 * RASTER_LIMIT
+"""Points along the longer side of a raster that is no square."""
+
+
+class Pattern(abc.ABC):
+    """What a flat element transmits, by position. Final classes are frozen dataclasses of SI numbers."""
+
+    @abc.abstractmethod
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Transmission, 0 to 1, at positions x, y in metres (arrays that broadcast against each other)."""
+
+    def described(self) -> str:
+        """The pattern in words, such as ``"circle (diameter 3 mm)"``."""
+        from vcc.base.describe import parameters_in_words
+
+        name = re.sub(r"(?<!^)(?=[A-Z])", " ", type(self).__name__).lower()
+        parameters = parameters_in_words(self)
+        return f"{name} ({parameters})" if parameters else name
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """(width, height) in metres outside which nothing passes; infinite where there is no such bound."""
+        return math.inf, math.inf
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """Mean transmission over rectangles centred at x, y (metres, broadcast against each other).
+
+        Args:
+            x: centres, metres.
+            y: centres, metres.
+            width: of every rectangle, metres.
+            height: of every rectangle, metres.
+        """
+        found = mean_by_raster(lambda a, b, _: self(a, b), self.size, x, y, width, height, FEWEST_PER_CELL)
+        return (
+            self._mean_of_points(np.asarray(x, float), np.asarray(y, float), width, height)
+            if found is None
+            else found
+        )
+
+    def _mean_of_points(self, x: Array, y: Array, width: float, height: float) -> Array:
+        steps = (np.arange(4) + 0.5) / 4 - 0.5
+        points = [self(x + a * width, y + b * height) for a in steps for b in steps]
+        return np.asarray(np.mean(np.broadcast_arrays(*points), axis=0))
+
+
+def mean_by_raster(
+    values: Callable[[Array, Array, tuple[float, float]], ArrayLike],
+    size: tuple[float, float],
+    x: ArrayLike,
+    y: ArrayLike,
+    width: float,
+    height: float,
+    fewest: int,
+) -> Array | None:
+    """Means over rectangles by way of a raster, whose points lie the same whichever rectangles are asked for.
+
+    Args:
+        values: of raster points at (x, y), whose own size (x, y) is the third argument, metres.
+        size: (width, height) around the origin outside which nothing passes, metres.
+        x: centres of the rectangles, metres.
+        y: likewise.
+        width: of every rectangle, metres.
+        height: of every rectangle, metres.
+        fewest: points across a rectangle with which to make do where `RASTER_PER_CELL` would be too many.
+
+    Returns:
+        The means; None where even the fewest points across each rectangle are too many.
+    """
+    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    places: list[Array] = []
+    points: list[tuple[float, float]] = []
+    steps: list[float] = []
+    for centre, length, bound in ((x, width, size[0]), (y, height, size[1])):
+        low = max(float(centre.min()) - length / 2, -bound / 2)
+        high = max(min(float(centre.max()) + length / 2, bound / 2), low)
+        across = RASTER_PER_CELL
+        # By the pattern's own size where it has one, so that pieces of a light field see the same raster.
+        extent = bound if math.isfinite(bound) else high - low
+        while across > fewest and length > 0 and extent / length * across > RASTER_LIMIT:
+            across //= 2
+        step = length / across
+        if step <= 0 or (high - low) / step > LONGEST_RASTER:
+            return None
+        first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
+        places.append(np.asarray((np.arange(first, last) + 0.5) * step, dtype=np.float64))
+        points.append((first * step, last * step))
+        steps.append(step)
+    rows, columns = places[1].size, places[0].size
+    if rows * columns > RASTER_LIMIT**2:
+        return None
+    found = np.asarray(values(places[0][None, :], places[1][:, None], (steps[0], steps[1])), dtype=np.float64)
+    (left, right), (top, bottom) = points
+    middle = (left + right) / 2, (top + bottom) / 2
+    raster = Cells(np.broadcast_to(found, (rows, columns)), right - left, bottom - top, middle)
+    return raster.mean(x, y, width, height)
+
+
+def _mean_from_integral(
+    integral: Callable[[Array, Array], Array], x: Array, y: Array, width: float, height: float
+) -> Array:
+    """The mean over rectangles of a function whose integral over (−∞, x] × (−∞, y] is known."""
+    right, left, bottom, top = x + width / 2, x - width / 2, y + height / 2, y - height / 2
+    content = integral(right, bottom) - integral(left, bottom) - integral(right, top) + integral(left, top)
+    # What passes is a share: rounding of differences of integrals must not leave it.
+    return np.clip(content / (width * height), 0.0, None)
+
+
+@dataclass(frozen=True)
+class Open(Pattern):
+    """Lets everything through."""
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """One everywhere."""
+        return np.ones(np.broadcast_shapes(np.shape(x), np.shape(y)))
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """One everywhere."""
+        return self(x, y)
+
+
+@dataclass(frozen=True)
+class Circle(Pattern):
+    """A round hole.
+
+    Args:
+        diameter: metres.
+    """
+
+    diameter: float = field(metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        _positive(self, "diameter", self.diameter)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """(width, height) of the hole, metres."""
+        return self.diameter, self.diameter
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """One inside the circle, zero outside."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        return np.asarray(x * x + y * y <= self.diameter**2 / 4, dtype=np.float64)
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """The share of each rectangle that lies inside the circle, in closed form."""
+        floor = self.diameter * 1e-5
+        return _mean_from_integral(
+            self._integral,
+            np.asarray(x, float),
+            np.asarray(y, float),
+            max(width, floor),
+            max(height, floor),
+        )
+
+    def _integral(self, x: Array, y: Array) -> Array:
+        """Area of the circle left of x and above y."""
+        radius = self.diameter / 2
+        x, y = np.clip(x, -radius, radius), np.clip(y, -radius, radius)
+        reach = np.sqrt(radius**2 - y * y)  # |x| below which the line at y runs inside the circle
+
+        def area_below_arc(a: Array) -> Array:
+            # ∫₀ᵃ √(R² − x²) dx
+            return (a * np.sqrt(np.maximum(radius**2 - a * a, 0)) + radius**2 * np.arcsin(a / radius)) / 2
+
+        inner = np.clip(x, -reach, reach)
+        cut = y * (inner + reach) + area_below_arc(inner) - area_below_arc(-reach)
+        full = area_below_arc(np.minimum(x, -reach)) - area_below_arc(np.asarray(-radius))
+        full = full + np.where(x > reach, area_below_arc(x) - area_below_arc(reach), 0.0)
+        return cut + np.where(y >= 0, 2 * full, 0.0)
+
+
+@dataclass(frozen=True)
+class Polygon(Pattern):
+    """A regular polygon, as the blades of an iris form it.
+
+    Args:
+        sides: how many, 3 or more.
+        diameter: of the circle through the corners, metres.
+        rotation: radians, clockwise as seen looking at the scene; at 0 a corner points right.
+    """
+
+    sides: int
+    diameter: float = field(metadata={"unit": "length"})
+    rotation: float = field(default=0.0, metadata={"unit": "angle"})
+
+    def __post_init__(self) -> None:
+        _positive(self, "diameter", self.diameter)
+        if self.sides < 3:
+            raise InputError(f"a polygon has 3 sides or more, not {self.sides}")
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """(width, height) of the circle through the corners, metres."""
+        return self.diameter, self.diameter
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """One inside the polygon, zero outside."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        apothem = self.diameter / 2 * math.cos(math.pi / self.sides)
+        inside = np.ones(np.broadcast_shapes(x.shape, y.shape), dtype=bool)
+        for side in range(self.sides):
+            normal = self.rotation + (2 * side + 1) * math.pi / self.sides
+            inside &= x * math.cos(normal) + y * math.sin(normal) <= apothem
+        return inside.astype(np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Cells(Pattern):
+    """A transmission array, values and a frame: uniform rectangular cells side by side, opaque outside.
+
+    Args:
+        values: transmission of each cell, 0 to 1, shape (rows, columns), row 0 at the top.
+        width: of the whole array, metres.
+        height: metres; None makes the cells square.
+        middle: place (x, y) of the array's middle, metres.
+
+    Raises:
+        InputError: not 2-D, empty, outside 0 to 1, not finite, opaque throughout, or a size of zero or less.
+    """
+
+    values: NDArray[np.float64]
+    width: float = field(metadata={"unit": "length"})
+    height: float | None = field(default=None, metadata={"unit": "length"})
+    middle: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        values = np.asarray(self.values, dtype=np.float64)
+        if values.ndim != 2:
+            raise InputError(f"a transmission array has (rows, columns), not shape {values.shape}")
+        if values.size == 0:
+            raise InputError(f"a transmission array of shape {values.shape} is empty")
+        if not np.isfinite(values).all():
+            raise InputError("a transmission array needs finite numbers")
+        if values.min() < 0 or values.max() > 1:
+            raise InputError(
+                f"transmission lies between 0 and 1; this array goes from {values.min():g} to {values.max():g}: "
+                "divide it by its full scale (255 for 8-bit values)"
+            )
+        object.__setattr__(self, "values", values)
+        _positive(self, "width", self.width)
+        if self.height is None:
+            object.__setattr__(self, "height", self.width * values.shape[0] / values.shape[1])
+        _positive(self, "height", self.size[1])
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """(width, height) of the array, metres."""
+        assert self.height is not None
+        # A bound around the axis, so that an array off the axis is not cut.
+        return self.width + 2 * abs(self.middle[0]), self.height + 2 * abs(self.middle[1])
+
+    @property
+    def frame(self) -> Affine:
+        """Maps (column, row, 1) to (x, y, 1) of the middle of a cell, metres."""
+        assert self.height is not None
+        rows, columns = self.values.shape
+        return (
+            Affine.translation(*self.middle)
+            @ Affine.scaling(self.width / columns, self.height / rows)
+            @ Affine.translation(-(columns - 1) / 2, -(rows - 1) / 2)
+        )
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The value of the cell that holds each position; zero outside the array."""
+        row, column = self._index(np.asarray(x, float), np.asarray(y, float))
+        rows, columns = self.values.shape
+        inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        r = np.clip(np.floor(row), 0, rows - 1).astype(int)
+        c = np.clip(np.floor(column), 0, columns - 1).astype(int)
+        return np.where(inside, self.values[r, c], 0.0)
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """Mean transmission over rectangles, exact (differences of the array's integral)."""
+        width, height = max(width, self.width * 1e-5), max(height, self.size[1] * 1e-5)
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        if _is_grid(x, y):  # then two small products do it
+            overlap_x = self._overlaps(x.reshape(-1), width, 1)
+            overlap_y = self._overlaps(y.reshape(-1), height, 0)
+            content = overlap_y @ self.values @ overlap_x.T
+            return np.asarray(content.reshape(np.broadcast_shapes(x.shape, y.shape)))
+        return _mean_from_integral(self._integral, x, y, width, height)
+
+    def _index(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """(row, column) counted from the array's top left corner, cells as units."""
+        place = self.frame.inverse()
+        return y * place.matrix[1, 1] + place.offset[1] + 0.5, x * place.matrix[0, 0] + place.offset[0] + 0.5
+
+    def _overlaps(self, centres: Array, length: float, axis: int) -> Any:
+        """Share of each interval that each cell along an axis fills: a sparse matrix (intervals, cells)."""
+        from scipy.sparse import csr_array
+
+        assert self.height is not None
+        cells = self.values.shape[axis]
+        pitch = (self.height, self.width)[axis] / cells
+        start = (centres - self.middle[1 - axis]) / pitch + cells / 2 - length / pitch / 2
+        reach = length / pitch
+        first = np.floor(start).astype(np.int64)
+        span = math.ceil(reach) + 1
+        index = first[:, None] + np.arange(span)
+        share = np.minimum(index + 1, start[:, None] + reach) - np.maximum(index, start[:, None])
+        keep = (share > 0) & (index >= 0) & (index < cells)
+        row = np.broadcast_to(np.arange(len(centres))[:, None], index.shape)
+        return csr_array((share[keep] / reach, (row[keep], index[keep])), shape=(len(centres), cells))
+
+    def _integral(self, x: Array, y: Array) -> Array:
+        from scipy.ndimage import map_coordinates
+
+        rows, columns = self.values.shape
+        total = np.zeros((rows + 1, columns + 1))
+        total[1:, 1:] = self.values.cumsum(0).cumsum(1)
+        row, column = self._index(x, y)
+        row, column = np.broadcast_arrays(np.clip(row, 0, rows), np.clip(column, 0, columns))
+        shape = row.shape
+        content = map_coordinates(total, [np.ravel(row), np.ravel(column)], order=1, mode="nearest").reshape(shape)
+        assert self.height is not None
+        return np.asarray(content * (self.width / columns) * (self.height / rows))
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Cells)
+            and np.array_equal(self.values, other.values)
+            and (self.width, self.height, self.middle) == (other.width, other.height, other.middle)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.values.tobytes(), self.width, self.height, self.middle))
+
+    def described(self) -> str:
+        """The number of cells and the size of the array in words."""
+        from vcc.base.units import text
+
+        rows, columns = self.values.shape
+        return f"{rows}×{columns} cells ({text(self.width)} wide)"
+
+    def __repr__(self) -> str:
+        rows, columns = self.values.shape
+        return f"Cells({rows}×{columns}, width={self.width!r}, height={self.height!r})"
+
+
+@dataclass(frozen=True)
+class CosineSum(Pattern):
+    """A sum of cosines, raised to stay between 0 and 1: the carrier of heterodyne light-field cameras.
+
+    T(x, y) = ∏ over the axes of ½ + (1/2h)·Σₙ cos(2πn·x/period), n = 1 … h (Veeraraghavan et al. 2007,
+    section 3, in the separable form that a printed transparency can have).
+
+    Args:
+        period: of the first harmonic, metres: one number, or (x, y), where infinity leaves an axis flat.
+        harmonics: h, how many equal cosines along each axis.
+        phase: radians, added to every first harmonic (n times to the n-th).
+    """
+
+    period: float | tuple[float, float] = field(metadata={"unit": "length"})
+    harmonics: int = 1
+    phase: float = field(default=0.0, metadata={"unit": "angle"})
+
+    def __post_init__(self) -> None:
+        for period in self.periods:
+            _positive(self, "period", period, finite=False)
+        if self.harmonics < 1:
+            raise InputError(f"a sum of cosines has 1 harmonic or more, not {self.harmonics}")
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The product of the two axes' sums."""
+        return self.mean(x, y, 0.0, 0.0)
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """The mean over rectangles in closed form: each cosine shrinks by sinc(n·width/period)."""
+        return self._axis(np.asarray(x, float), self.periods[0], width) * self._axis(
+            np.asarray(y, float), self.periods[1], height
+        )
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """The period along (x, y), metres."""
+        if isinstance(self.period, tuple | list):
+            return float(self.period[0]), float(self.period[1])
+        return float(self.period), float(self.period)
+
+    def _axis(self, x: Array, period: float, width: float) -> Array:
+        if math.isinf(period):
+            return np.ones_like(x)
+        total = np.zeros_like(x)
+        for n in range(1, self.harmonics + 1):
+            total += np.cos(n * (2 * math.pi * x / period + self.phase)) * np.sinc(n * width / period)
+        return 0.5 + total / (2 * self.harmonics)
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionPattern(Pattern):
+    """A pattern from any function of position; see `as_pattern`.
+
+    Args:
+        function: called with x and y in metres (arrays that broadcast); returns transmission, 0 to 1.
+        owner: the element whose pattern it is, named when the function returns something else.
+    """
+
+    function: Callable[[Array, Array], ArrayLike]
+    owner: str = ""
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """What the function returns, checked."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        # As whole arrays: a function of x alone then returns one number for each place, too.
+        x, y = np.broadcast_arrays(x, y)
+        shape = x.shape
+        name = f"pattern {getattr(self.function, '__name__', repr(self.function))}"
+        name = f"{self.owner}: {name}" if self.owner else name
+        values = np.asarray(self.function(x, y), dtype=np.float64)
+        if values.shape not in (shape, ()):
+            raise InputError(f"{name} returned shape {values.shape} for positions of shape {shape}")
+        if not np.isfinite(values).all():
+            raise InputError(f"{name} returned numbers that are not finite")
+        if values.min() < 0 or values.max() > 1:
+            raise InputError(
+                f"{name} returned transmission from {values.min():g} to {values.max():g}; it lies between 0 and 1"
+            )
+        return np.broadcast_to(values, shape)
+
+
+def owned(pattern: Pattern, owner: str) -> Pattern:
+    """The pattern, whose functions name their owner when they return something else than transmissions."""
+    if isinstance(pattern, FunctionPattern):
+        return replace(pattern, owner=owner)
+    if isinstance(pattern, Bounded):
+        return replace(pattern, pattern=owned(pattern.pattern, owner))
+    return pattern
+
+
+def as_pattern(pattern: Pattern | Callable[[Array, Array], ArrayLike]) -> Pattern:
+    """A pattern from a pattern or from any function of (x, y) in metres.
+
+    Raises:
+        InputError: neither.
+    """
+    if isinstance(pattern, Pattern):
+        return pattern
+    if callable(pattern):
+        return FunctionPattern(pattern)
+    raise InputError(f"a pattern is a vcc.patterns.Pattern or a function of (x, y), not {type(pattern).__name__}")
+
+
+@dataclass(frozen=True)
+class Bounded(Pattern):
+    """Another pattern on a sheet of limited size, opaque outside it.
+
+    Args:
+        pattern: what the sheet carries.
+        width: of the sheet, metres.
+        height: of the sheet, metres.
+    """
+
+    pattern: Pattern
+    width: float = field(metadata={"unit": "length"})
+    height: float = field(metadata={"unit": "length"})
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """(width, height) of what passes, metres."""
+        return min(self.width, self.pattern.size[0]), min(self.height, self.pattern.size[1])
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The pattern on the sheet, zero outside."""
+        x, y = np.asarray(x, float), np.asarray(y, float)
+        inside = (np.abs(x) <= self.width / 2) & (np.abs(y) <= self.height / 2)
+        return np.where(inside, self.pattern(x, y), 0.0)
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """The pattern's mean times the share of each rectangle that lies on the sheet.
+
+        Exact where no rectangle crosses the border of the sheet, or the pattern is even across it.
+        """
+        x, y = np.asarray(x, float), np.asarray(y, float)
+        share_x = _overlap_share(x, max(width, self.width * 1e-5), self.width)
+        share_y = _overlap_share(y, max(height, self.height * 1e-5), self.height)
+        return self.pattern.mean(x, y, width, height) * share_x * share_y
+
+
+def _overlap_share(centre: Array, length: float, sheet: float) -> Array:
+    covered = np.minimum(centre + length / 2, sheet / 2) - np.maximum(centre - length / 2, -sheet / 2)
+    return np.clip(covered / length, 0.0, 1.0)
+
+
+def mura(prime: int) -> NDArray[np.float64]:
+    """A modified uniformly redundant array: prime × prime cells of 0 and 1, half of them open.
+
+    Cell (i, j) is open if j = 0 and i ≠ 0, or if i and j are both or neither quadratic residues modulo
+    the prime (Gottesman and Fenimore 1989, eq. 13).
+
+    Args:
+        prime: a prime number of cells a side, 5 or more.
+
+    Raises:
+        InputError: not a prime of 5 or more.
+    """
+    if prime < 5 or any(prime % divisor == 0 for divisor in range(2, math.isqrt(prime) + 1)):
+        raise InputError(f"a MURA has a prime number of cells a side, 5 or more, not {prime}")
+    residues = {n * n % prime for n in range(1, prime)}
+    sign = np.array([1 if n in residues else -1 for n in range(prime)])
+    cells = (sign[:, None] * sign[None, :] == 1).astype(np.float64)
+    cells[0, :] = 0.0
+    cells[1:, 0] = 1.0
+    return np.asarray(cells)
+
+
+def _is_grid(x: Array, y: Array) -> bool:
+    """Whether x varies along the last axis only and y along the one before only."""
+    return x.ndim == y.ndim == 2 and x.shape[0] == 1 and y.shape[1] == 1
+
+
+def _positive(thing: object, name: str, value: float, finite: bool = True) -> None:
+    if not value > 0 or (finite and not math.isfinite(value)):
+        raise InputError(f"{name} of {type(thing).__name__.lower()} must be greater than 0 m, not {value}")

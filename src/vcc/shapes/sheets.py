@@ -1,0 +1,308 @@
+"""Several patterns in one plane: light passes what all of them let pass, place by place.
+
+The mean of a product is not the product of the means: a checkerboard and its negative pass nothing together, and
+half of the light each. So patterns of one plane are multiplied first and averaged then. Those made of rectangles
+are multiplied exactly, rectangle by rectangle; what is left is multiplied on a fine raster.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property, reduce
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.base.errors import InputError
+from vcc.shapes.patterns import (
+    FEWEST_PER_CELL,
+    Bounded,
+    Cells,
+    Circle,
+    FunctionPattern,
+    Open,
+    Pattern,
+    Polygon,
+    mean_by_raster,
+)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shifted(Pattern):
+    """A pattern whose middle stands elsewhere.
+
+    Args:
+        pattern: what is shifted.
+        middle: place (x, y) of its middle, metres.
+    """
+
+    pattern: Pattern
+    middle: tuple[float, float]
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """(width, height) around the origin outside which nothing passes, metres."""
+        width, height = self.pattern.size
+        return width + 2 * abs(self.middle[0]), height + 2 * abs(self.middle[1])
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The pattern's transmission at places counted from its middle."""
+        return self.pattern(np.asarray(x, float) - self.middle[0], np.asarray(y, float) - self.middle[1])
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """The pattern's mean over rectangles counted from its middle."""
+        x, y = np.asarray(x, float) - self.middle[0], np.asarray(y, float) - self.middle[1]
+        return self.pattern.mean(x, y, width, height)
+
+
+@dataclass(frozen=True, eq=False)
+class Tiles(Pattern):
+    """Uniform rectangles of any sizes side by side, opaque outside them: what `Cells` multiply to.
+
+    Args:
+        columns: x of the rectangles' borders, rising, metres, (n + 1,).
+        rows: y of their borders, rising, metres, (m + 1,).
+        values: transmission of each, (m, n).
+    """
+
+    columns: Array
+    rows: Array
+    values: Array
+
+    @classmethod
+    def of(cls, cells: Cells) -> Tiles:
+        """The same pattern as an array of cells."""
+        rows, columns = cells.values.shape
+        width, height = cells.width, float(cells.height or 0.0)
+        x, y = cells.middle
+        return cls(
+            x + width * (np.arange(columns + 1) / columns - 0.5),
+            y + height * (np.arange(rows + 1) / rows - 0.5),
+            cells.values,
+        )
+
+    @classmethod
+    def sheet(cls, width: float, height: float) -> Tiles:
+        """A clear rectangle around the origin, metres."""
+        return cls(np.array([-width, width]) / 2, np.array([-height, height]) / 2, np.ones((1, 1)))
+
+    def moved(self, x: float, y: float) -> Tiles:
+        """The same rectangles elsewhere."""
+        return Tiles(self.columns + x, self.rows + y, self.values)
+
+    def times(self, other: Tiles) -> Tiles:
+        """What both together let pass, exactly."""
+        columns, rows = _common(self.columns, other.columns), _common(self.rows, other.rows)
+        if columns.size < 2 or rows.size < 2:  # they do not overlap: nothing passes
+            return Tiles(self.columns[[0, -1]], self.rows[[0, -1]], np.zeros((1, 1)))
+        x, y = (columns[1:] + columns[:-1]) / 2, (rows[1:] + rows[:-1]) / 2
+        return Tiles(columns, rows, self(x[None, :], y[:, None]) * other(x[None, :], y[:, None]))
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """(width, height) around the origin outside which nothing passes, metres."""
+        return 2 * float(np.abs(self.columns).max()), 2 * float(np.abs(self.rows).max())
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The value of the rectangle that holds each place, zero outside."""
+        x, y = np.asarray(x, float), np.asarray(y, float)
+        column = np.searchsorted(self.columns, x, side="right") - 1
+        row = np.searchsorted(self.rows, y, side="right") - 1
+        rows, columns = self.values.shape
+        inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        return np.where(inside, self.values[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)], 0.0)
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """Mean transmission over rectangles, exact (differences of the integral)."""
+        x, y = np.asarray(x, float), np.asarray(y, float)
+        width = max(width, float(np.ptp(self.columns)) * 1e-5)
+        height = max(height, float(np.ptp(self.rows)) * 1e-5)
+        left, right = (self._place(self.columns, x + side * width / 2) for side in (-1, 1))
+        top, bottom = (self._place(self.rows, y + side * height / 2) for side in (-1, 1))
+        if x.ndim == y.ndim == 2 and x.shape[0] == 1 and y.shape[1] == 1:  # a grid: along one axis after the other
+            across = _between(self._integral, right, axis=1) - _between(self._integral, left, axis=1)
+            content = _between(across, bottom, axis=0) - _between(across, top, axis=0)
+        else:
+            content = self._at(bottom, right) - self._at(bottom, left) - self._at(top, right) + self._at(top, left)
+        return np.clip(content / (width * height), 0.0, None)
+
+    @cached_property
+    def _integral(self) -> Array:
+        """The integral over (−∞, x] × (−∞, y] at the borders, m²."""
+        total = np.zeros((len(self.rows), len(self.columns)))
+        area = np.diff(self.rows)[:, None] * np.diff(self.columns)[None, :]
+        total[1:, 1:] = (self.values * area).cumsum(0).cumsum(1)
+        return total
+
+    @staticmethod
+    def _place(borders: Array, at: Array) -> Array:
+        """Places as numbers of borders, fractions between them."""
+        return np.asarray(np.interp(at, borders, np.arange(len(borders), dtype=np.float64)))
+
+    def _at(self, row: Array, column: Array) -> Array:
+        row, column = np.broadcast_arrays(row, column)
+        r = np.minimum(row.astype(int), len(self.rows) - 2)
+        c = np.minimum(column.astype(int), len(self.columns) - 2)
+        down, right = row - r, column - c
+        total = self._integral
+        above = total[r, c] * (1 - right) + total[r, c + 1] * right
+        below = total[r + 1, c] * (1 - right) + total[r + 1, c + 1] * right
+        return np.asarray(above * (1 - down) + below * down)
+
+
+def _between(table: Array, place: Array, axis: int) -> Array:
+    """Rows or columns of a table, interpolated linearly at places in numbers of rows or columns."""
+    place = place.reshape(-1)
+    first = np.minimum(place.astype(int), table.shape[axis] - 2)
+    after = np.expand_dims(place - first, 1 - axis)
+    return np.asarray(
+        np.take(table, first, axis=axis) * (1 - after) + np.take(table, first + 1, axis=axis) * after
+    )
+
+
+def _common(one: Array, other: Array) -> Array:
+    """The borders of both within what both cover; borders that rounding keeps apart become one."""
+    low, high = max(one[0], other[0]), min(one[-1], other[-1])
+    borders = np.unique(np.concatenate([one, other]))
+    borders = borders[(borders >= low) & (borders <= high)]
+    apart = np.ones(borders.size, dtype=bool)
+    apart[1:] = np.diff(borders) > 1e-9 * (one[-1] - one[0])
+    return np.asarray(borders[apart])
+
+
+@dataclass(frozen=True)
+class Product(Pattern):
+    """Several patterns on one sheet: light passes what all of them let pass.
+
+    Args:
+        patterns: one or more.
+
+    Raises:
+        InputError: no pattern at all.
+    """
+
+    patterns: tuple[Pattern, ...]
+
+    def __post_init__(self) -> None:
+        if not self.patterns:
+            raise InputError("a product of patterns has one or more, not none")
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """(width, height) of the smallest, metres."""
+        width, height = zip(*(pattern.size for pattern in self.patterns), strict=True)
+        return min(width), min(height)
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The product of the transmissions."""
+        return math.prod((pattern(x, y) for pattern in self.patterns), start=np.asarray(1.0))
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """Mean of the product over rectangles.
+
+        Exact where all patterns are cells or clear sheets, or but one are clear. Else on a raster of 16 points
+        across a rectangle (4 at least): each point holds the product of the patterns' means around it.
+        """
+        factors = self.factors
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        if not factors:
+            return np.ones(np.broadcast_shapes(x.shape, y.shape))
+        if len(factors) == 1:
+            return factors[0].mean(x, y, width, height)
+
+        def values(px: Array, py: Array, point: tuple[float, float]) -> Array:
+            return np.clip(_product(factors, px, py, *point), 0.0, 1.0)
+
+        found = mean_by_raster(values, self.size, x, y, width, height, FEWEST_PER_CELL)
+        if found is None:  # few small rectangles far apart: look inside each
+            steps = (np.arange(FEWEST_PER_CELL) + 0.5) / FEWEST_PER_CELL - 0.5
+            part = width / FEWEST_PER_CELL, height / FEWEST_PER_CELL
+            inside = [_product(factors, x + a * width, y + b * height, *part) for a in steps for b in steps]
+            return np.asarray(np.mean(np.broadcast_arrays(*inside), axis=0))
+        return found
+
+    @cached_property
+    def factors(self) -> tuple[Pattern, ...]:
+        """The patterns, all that are made of rectangles multiplied to one, and what is clear left out."""
+        # What is open or opaque is the same twice: two equal rims in one plane are one.
+        simple: list[Pattern] = []
+        holes: list[tuple[Pattern, tuple[float, float]]] = []
+        for part in _parts(self.patterns, (0.0, 0.0)):
+            hole = (part.pattern, part.middle) if isinstance(part, Shifted) else (part, (0.0, 0.0))
+            if not isinstance(hole[0], Circle | Polygon):
+                simple.append(part)
+            elif hole not in holes:
+                holes.append(hole)
+                simple.append(part)
+        tiles = [one for one in simple if isinstance(one, Tiles)]
+        rest = tuple(one for one in simple if not isinstance(one, Tiles))
+        return (reduce(Tiles.times, tiles), *rest) if tiles else rest
+
+
+def _parts(patterns: Iterable[Pattern], middle: tuple[float, float]) -> Iterable[Pattern]:
+    """The simple patterns that these are products of, around places on one sheet."""
+    x, y = middle
+    for pattern in patterns:
+        if isinstance(pattern, Open):
+            continue
+        if isinstance(pattern, Shifted):
+            yield from _parts([pattern.pattern], (x + pattern.middle[0], y + pattern.middle[1]))
+        elif isinstance(pattern, Product):
+            yield from _parts(pattern.patterns, middle)
+        elif isinstance(pattern, Bounded):
+            yield Tiles.sheet(pattern.width, pattern.height).moved(x, y)
+            yield from _parts([pattern.pattern], middle)
+        elif isinstance(pattern, Cells):
+            yield Tiles.of(pattern).moved(x, y)
+        elif isinstance(pattern, Tiles):
+            yield pattern.moved(x, y)
+        else:
+            yield Shifted(pattern, middle) if x or y else pattern
+
+
+def _product(factors: tuple[Pattern, ...], x: Array, y: Array, width: float, height: float) -> Array:
+    """The product of means over small rectangles; functions, whose means are rasters again, at a point."""
+    total: Array = np.ones(1)
+    for factor in factors:
+        plain = factor.pattern if isinstance(factor, Shifted) else factor
+        pointwise = isinstance(plain, FunctionPattern) or type(plain).mean is Pattern.mean
+        total = total * (factor(x, y) if pointwise else factor.mean(x, y, width, height))
+    return np.asarray(total)
+
+
+def clear_over(pattern: Pattern, low: Array, high: Array) -> bool:
+    """Whether a pattern lets all light pass in a rectangle, as far as that can be told from what it is.
+
+    Args:
+        pattern: any.
+        low: (x, y) of the rectangle's corner, metres from the pattern's middle.
+        high: (x, y) of the opposite corner.
+    """
+    for part in _parts([pattern], (0.0, 0.0)):
+        if isinstance(part, Circle):
+            if np.hypot(*np.maximum(np.abs(low), np.abs(high))) > part.diameter / 2:
+                return False
+        elif isinstance(part, Tiles):
+            inside = part.columns[0] <= low[0] and high[0] <= part.columns[-1]
+            if not (inside and part.rows[0] <= low[1] and high[1] <= part.rows[-1] and (part.values == 1).all()):
+                return False
+        else:
+            return False
+    return True
+
+
+def in_one_plane(patterns: list[tuple[Pattern, tuple[float, float]]]) -> Pattern:
+    """Patterns with their middles in one plane, multiplied: a pattern about the plane's own origin.
+
+    Args:
+        patterns: each with the place (x, y) of its middle, metres.
+    """
+    placed = tuple(Shifted(pattern, middle) if any(middle) else pattern for pattern, middle in patterns)
+    if len(placed) == 1:
+        return placed[0]
+    product = Product(placed)
+    return product.factors[0] if len(product.factors) == 1 else product

@@ -1,0 +1,274 @@
+"""The demo's optical bench: a light field, and the cameras that look at it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.units import mm, um
+from vcc.camera import Camera
+from vcc.light_field import LightField
+from vcc.optics import Lens, Mask
+from vcc.optics.sensor import Sensor
+from vcc.shapes import patterns
+from vcc.showcase.scene import FAR, MIDDLE, NEAR, demo_scene
+from vcc.sources import PlanesScene
+
+APERTURE = 20 * mm
+"""How wide the grid of views is; light fields of other widths are scaled to it."""
+RIM = 0.9
+"""The lens's diameter as a share of that: a round rim inside a square grid of views."""
+FOCAL_LENGTH = 50 * mm
+INSIDE = 0.15
+"""How far inside a light field's range of disparities near and far lie, as a share of the range."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A light field at a lens, three distances to focus on, and the cameras of the demo.
+
+    Args:
+        light_field: at the entrance plane.
+        scene: where the light field comes from, if its closed form is known.
+        near: the nearest distance to focus on, metres; likewise the next two.
+        middle: between them.
+        far: the farthest; may be infinite.
+        focal_length: of the lens, metres.
+        diameter: of the lens, metres.
+        pitch: (vertical, horizontal) of the sensor's pixels, metres.
+        scale: by what the light field's world was multiplied.
+        assumed: what had to be assumed about it, a sentence for people; empty if nothing.
+    """
+
+    light_field: LightField
+    scene: PlanesScene | None
+    near: float
+    middle: float
+    far: float
+    focal_length: float
+    diameter: float
+    pitch: tuple[float, float]
+    scale: float = 1.0
+    assumed: str = ""
+
+    def image_distance(self, distance: float) -> float:
+        """Where the lens makes a sharp image of what is ``distance`` metres away: 1/d = 1/f − 1/Z."""
+        return 1 / (1 / self.focal_length - 1 / distance)
+
+    @property
+    def lens(self) -> Lens:
+        """The lens, at the entrance plane."""
+        return Lens(focal_length=self.focal_length, diameter=self.diameter)
+
+    def sensor(self, distance: float) -> Sensor:
+        """The sensor at the image of what is ``distance`` metres away."""
+        rows, columns = self.light_field.shape[2:4]
+        return Sensor(z=self.image_distance(distance), shape=(rows, columns), pitch=self.pitch)
+
+    def conventional(self, distance: float) -> Camera:
+        """The paper's Example 1: a lens, and a sensor focused on a distance in metres."""
+        return Camera([self.lens], self.sensor(distance))
+
+    @property
+    def masked_focus(self) -> float:
+        """What the cameras with masks are focused on, metres.
+
+        Near in the built-in scene, so that the lamps behind blur widely. In the middle of someone's own, whose
+        views are often too few for more.
+        """
+        return self.middle if self.scene is None else self.near
+
+    def cosine(self) -> Camera:
+        """The paper's Example 2 as Veeraraghavan built it: a cosine mask just before the sensor."""
+        sensor = self.sensor(self.masked_focus)
+        carrier = 2 * sensor.size[1] / 30
+        mask = Mask(patterns.CosineSum((carrier, carrier)), z=sensor.z * (1 - 0.04), name="cosine")
+        return Camera([self.lens, mask], sensor)
+
+    def coded(self) -> Camera:
+        """The paper's Example 2 with a mask half-way: a MURA of 13×13 cells."""
+        sensor = self.sensor(self.masked_focus)
+        # As wide as the cone of light that reaches any part of the sensor, there.
+        width = (self.diameter + max(sensor.size)) / 2
+        return Camera([self.lens, Mask(patterns.mura(13), z=sensor.z / 2, width=width, name="MURA")], sensor)
+
+    @property
+    def pinhole_view(self) -> tuple[int, int]:
+        """(row, column) of the view next to the axis at which the pinhole is put."""
+        return self.light_field.shape[0] // 2, self.light_field.shape[1] // 2
+
+    @property
+    def pinhole_place(self) -> tuple[float, float]:
+        """(u, v) of that view's middle, metres."""
+        nt, ns = self.light_field.shape[2:4]
+        row, column = self.pinhole_view
+        u, v = self.light_field.frame([column, row, (ns - 1) / 2, (nt - 1) / 2])[:2]
+        return float(u), float(v)
+
+    @property
+    def pinhole_diameter(self) -> float:
+        """Half the spacing of views: the hole lies inside one view's cell, metres."""
+        return 0.5 * abs(float(self.light_field.frame.linear[0, 0]))
+
+    def pinhole(self) -> Camera:
+        """The paper's own check: the lens closed down to a pinhole at one view, focused near."""
+        hole = Mask(patterns.Circle(self.pinhole_diameter), decentre=self.pinhole_place, name="pinhole")
+        return Camera([self.lens, hole], self.sensor(self.near))
+
+    def exposure(self, camera: Camera, diameter: float, transmitted: float = 1.0) -> float:
+        """The factor that shows radiance 1 through a round aperture as white: 1 / (π/4·D²/d² · T).
+
+        Args:
+            camera: whose sensor's distance d counts.
+            diameter: D of the aperture, metres.
+            transmitted: T, mean transmission of a mask on the way.
+        """
+        return camera.sensor.z**2 / (math.pi / 4 * diameter**2 * transmitted)
+
+
+def built_in(small: bool, progress: Callable[[int, int], None] | None = None) -> Bench:
+    """The bench with the demo's own scene.
+
+    20×20 views 1 mm apart converge at 1.3 m; a view is 500×500 pixels of 50 um at a distance of 52 mm, a
+    little wider than the sensor's 500×500 pixels of 48 um, so that moving the sensor never looks past the
+    views. Neighbouring views of the scene differ by at most half a pixel.
+
+    Args:
+        small: 8×8 views of 160×160 pixels of the same scene instead, for a quick look.
+        progress: called with (done, total) in rows of views.
+    """
+    views, pixels = (8, 160) if small else (20, 500)
+    scene = demo_scene()
+    light_field = scene.light_field(
+        (views, views),
+        (pixels, pixels),
+        spacing=APERTURE / views,
+        slope_per_pixel=25 * mm / pixels / (52 * mm),
+        focus_distance=MIDDLE,
+        progress=progress,
+    )
+    pitch = 24 * mm / pixels
+    return Bench(light_field, scene, NEAR, MIDDLE, FAR, FOCAL_LENGTH, RIM * APERTURE, (pitch, pitch))
+
+
+def from_someone(
+    given: Path | LightField, small: bool, progress: Callable[[int, int], None] | None = None
+) -> Bench:
+    """The bench with someone's own light field.
+
+    Its world is scaled so that the grid of views is 20 mm wide, a lens's width. The lens has f = 50 mm, or less
+    where the scaled scene is nearer than four times that. The distances to focus on come from the range of
+    disparities; where these lie beyond infinity, the views are taken to converge such that the farthest thing
+    is 3 m away. The sensor's pixels are the views' at the middle distance, and a little smaller where the sensor
+    would otherwise look past the views.
+
+    Args:
+        given: a light field, or a folder that `vcc.open_light_field` reads.
+        small: keep every second view and pixel only, for a quick look.
+        progress: called with (done, total) in pictures read.
+
+    Raises:
+        InputError: what the reader refuses, views that are not on an upright grid or in a single row, or views
+            without parallax.
+    """
+    from vcc.formats import open_light_field
+
+    light_field = given if isinstance(given, LightField) else open_light_field(given, progress=progress)
+    if small:
+        light_field = light_field[::2, ::2, ::2, ::2]
+    if min(light_field.shape[:2]) < 2:
+        raise InputError(
+            f"the demo needs two rows and two columns of views or more, not {light_field.shape[0]} and "
+            f"{light_field.shape[1]}"
+        )
+    if light_field.channels not in (None, 1, 3):
+        raise InputError(
+            f"the demo shows light fields of 1 or 3 channels, not {light_field.channels}: choose, e.g. lf[..., :3]"
+        )
+    _check_upright(light_field)
+    scale = APERTURE / _aperture(light_field)
+    scaled, assumed = _before_the_lens(light_field.scaled(scale))
+    return _fitted(scaled, scale, assumed)
+
+
+def _check_upright(light_field: LightField) -> None:
+    """The close-ups and the true picture rely on u and s running along columns, v and t along rows."""
+    linear = light_field.frame.linear
+    mixed = linear[[0, 0, 0, 1, 1, 1, 2, 2, 3, 3], [1, 2, 3, 0, 2, 3, 1, 3, 0, 2]]
+    if not np.allclose(mixed, 0):
+        raise InputError("the demo needs a light field of views on an upright grid; this one has another frame")
+
+
+def _aperture(light_field: LightField) -> float:
+    """The width of the grid of views, the narrower way, cells included, metres."""
+    spacing = np.abs(light_field.frame.linear[[1, 0], [1, 0]])
+    return float(min(light_field.shape[0] * spacing[0], light_field.shape[1] * spacing[1]))
+
+
+def _before_the_lens(light_field: LightField) -> tuple[LightField, str]:
+    """The light field with all of its scene at real distances, and what was assumed for that."""
+    disparities = light_field.measured_disparity_range()
+    if disparities is None:
+        raise InputError("the views show no parallax: there is nothing to focus on")
+    low, high = (1 / light_field.distance_of(d) for d in disparities)
+    # A little beyond infinity is the measurement's error; more is a wrong or unknown convergence.
+    if low >= -0.05 * (high - low):
+        return light_field, ""
+    assumed = (
+        f"Its disparities, {disparities[0]:.2g} to {disparities[1]:.2g} pixels per view, would put part of the "
+        f"scene beyond infinity: the views were taken to converge such that the farthest thing is {FAR:g} m away"
+    )
+    if disparities[1] < 0:
+        assumed += (
+            " (if near and far look exchanged, the views run the wrong way: open it with another orientation)"
+        )
+    # Views that converge at F are parallel ones behind a lens of focal length −F.
+    return light_field.transformed(Affine.lens(-1 / (1 / FAR - low))), assumed
+
+
+def _fitted(light_field: LightField, scale: float, assumed: str) -> Bench:
+    """A lens and a sensor for a light field whose disparities are known."""
+    low, high = light_field.measured_disparity_range() or (0.0, 0.0)
+    # What the measurement puts beyond infinity counts as very far.
+    # A measured range reaches a little beyond the scene: focus inside it.
+    inside = INSIDE * (high - low)
+    chosen = (high - inside, (low + high) / 2, low + inside)
+    vergences = [max(1 / light_field.distance_of(d), 1e-6) for d in chosen]
+    near, middle, far = (1 / v if v > 1e-6 else math.inf for v in vergences)
+    bench = Bench(
+        light_field,
+        None,
+        near,
+        middle,
+        far,
+        min(FOCAL_LENGTH, near / 4),
+        RIM * APERTURE,
+        (1.0, 1.0),
+        scale,
+        assumed,
+    )
+    return replace(bench, pitch=(_pitch(bench, 0), _pitch(bench, 1)))
+
+
+def _pitch(bench: Bench, axis: int) -> float:
+    """The pitch along an axis (0: vertical) with which the sensor never looks past the views, metres."""
+    linear = bench.light_field.frame.linear
+    pixels = bench.light_field.shape[2 + axis]
+    slope = abs(float(linear[3 - axis, 3 - axis]))
+    convergence = float(linear[3 - axis, 1 - axis] / linear[1 - axis, 1 - axis])
+    pitches = []
+    for distance in (bench.near, bench.middle, bench.far):
+        # At the rim of the lens, a sensor focused on Z sees slopes displaced by D/2·(1/F − 1/Z).
+        displaced = bench.diameter / 2 * abs(convergence - 1 / distance)
+        pitches.append(bench.image_distance(distance) * (slope - 2 * displaced / pixels))
+    # Views that overlap little would leave next to nothing: then the capture says what share it misses.
+    widest = max(min(pitches), 0.5 * slope * bench.focal_length)
+    # No more digits than a person would write.
+    step = 0.1 * um
+    return max(math.floor(widest / step), 1) * step

@@ -1,0 +1,265 @@
+"""The demo's drawings: close-ups side by side, phase space, cameras, the contact sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.fields.sampled import to_numpy
+from vcc.files import transfer
+from vcc.files.atomic import atomic_path
+from vcc.image import Image
+from vcc.light_field import LightField
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Shown = NDArray[np.float32]
+
+INK, QUIET, ACCENT = "#222222", "#666666", "#D55E00"
+LABEL = 9
+"""Points."""
+SHEET_WIDTH, HIGHEST_ROW = 15.0, 6.8
+"""Of the contact sheet, inches."""
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A square of the upright picture.
+
+    Args:
+        row: of its first pixel; may lie outside by rounding, `of` keeps it inside.
+        column: likewise.
+        size: pixels a side.
+    """
+
+    row: int
+    column: int
+    size: int
+
+    def of(self, shown: Shown) -> Shown:
+        """The square cut out of a picture (rows, columns, ...)."""
+        row = min(max(self.row, 0), shown.shape[0] - self.size)
+        column = min(max(self.column, 0), shown.shape[1] - self.size)
+        return shown[row : row + self.size, column : column + self.size]
+
+
+def shown(image: Image, exposure: float) -> Shown:
+    """A picture as screens want it: upright, exposed, sRGB, (rows, columns, 3), 0 to 1."""
+    return values_shown(image.upright().to_numpy(), 1 / exposure)
+
+
+def values_shown(upright: NDArray[Any], white: float = 1.0) -> Shown:
+    """Upright values of linear light as screens want them: (rows, columns, 3), 0 to 1, sRGB.
+
+    Args:
+        upright: (rows, columns[, channels]).
+        white: the value that is shown white.
+    """
+    values = np.asarray(upright, dtype=np.float32) * np.float32(1 / white)
+    coded = np.clip(transfer.from_linear(np.clip(values, 0, 1)), 0, 1)
+    if coded.ndim == 2 or coded.shape[2] == 1:
+        coded = np.repeat(coded.reshape(*coded.shape[:2], 1), 3, axis=2)
+    return np.asarray(coded[..., :3], dtype=np.float32)
+
+
+def view_shown(light_field: LightField, row: int, column: int) -> Shown:
+    """One view as screens want it; radiance 1 is white."""
+    return shown(light_field.view(row, column), 1.0)
+
+
+def slice_shown(light_field: LightField, view_row: int, pixel_row: int) -> Shown:
+    """The slice of all views of a row and one row of pixels, as screens want it: (views, columns, 3)."""
+    values = to_numpy(light_field.values[view_row, :, pixel_row]).astype(np.float32)
+    return values_shown(values, light_field.full_scale)
+
+
+def detailed_crops(pictures: Sequence[Shown], size: int) -> list[Crop]:
+    """For each picture, the square that is sharp in it and not in the others.
+
+    Args:
+        pictures: of the same scene, each focused elsewhere, all of one shape.
+        size: of the squares, pixels.
+    """
+    from scipy.ndimage import uniform_filter
+
+    detail = [_detail(picture, uniform_filter, size) for picture in pictures]
+    crops = []
+    for number, energy in enumerate(detail):
+        others = [other for n, other in enumerate(detail) if n != number] or [np.zeros_like(energy)]
+        row, column = np.unravel_index(np.argmax(energy - np.max(others, axis=0)), energy.shape)
+        crops.append(Crop(int(row) - size // 2, int(column) - size // 2, size))
+    return crops
+
+
+def _detail(picture: Shown, smooth: Any, size: int) -> Any:
+    """How much fine structure the square around each pixel holds; none near the border."""
+    grey = picture.mean(axis=2)
+    fine = (grey - smooth(grey, 5)) ** 2
+    energy = np.sqrt(smooth(fine, size))
+    half = size // 2 + 1
+    inside = np.zeros_like(energy)
+    inside[half:-half, half:-half] = energy[half:-half, half:-half]
+    return inside
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """A figure, inches, that no global state knows of."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=110, layout="constrained", facecolor="white")
+
+
+def write_figure(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG, whole or not at all."""
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, facecolor="white")
+
+
+def close_ups(columns: Sequence[tuple[str, Shown]], crops: Sequence[Crop], rows: Sequence[str]) -> Figure:
+    """Squares of several pictures, magnified without smoothing: a column a picture, a row a place.
+
+    Args:
+        columns: title and picture.
+        crops: the places.
+        rows: what is to be seen at each.
+    """
+    figure = new_figure(2.3 * len(columns) + 0.3, 2.3 * len(crops) + 0.35)
+    grid = figure.subplots(len(crops), len(columns), squeeze=False)
+    for row, (crop, name) in enumerate(zip(crops, rows, strict=True)):
+        for axes, (title, picture) in zip(grid[row], columns, strict=True):
+            put(axes, crop.of(picture), title if row == 0 else "")
+        grid[row, 0].set_ylabel(name, fontsize=LABEL, color=INK)
+    return figure
+
+
+def put(axes: Any, picture: Shown, title: str = "", **options: Any) -> Any:
+    """A picture on axes without ticks, pixels kept square and sharp."""
+    image = axes.imshow(picture, interpolation="nearest", **options)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    if title:
+        axes.set_title(title, fontsize=LABEL, color=INK)
+    return image
+
+
+def views_figure(light_field: LightField) -> Figure:
+    """The outermost and the middle view of a row, and the slice through all views along one row of pixels."""
+    nv, nu, nt, ns = light_field.shape[:4]
+    row, pixel_row = nv // 2, round(0.46 * nt)
+    height = 3.3 * nt / ns
+    figure = new_figure(10, height + 1.7)
+    grid = figure.add_gridspec(2, 3, height_ratios=(height, 1.0))
+    for place, (column, name) in enumerate(((0, "leftmost"), (nu // 2, "middle"), (nu - 1, "rightmost"))):
+        axes = figure.add_subplot(grid[0, place])
+        put(axes, view_shown(light_field, row, column), f"{name} view of row {row + 1}")
+        axes.axhline(pixel_row, color=ACCENT, linewidth=0.9, linestyle=(0, (6, 4)))
+    axes = figure.add_subplot(grid[1, :])
+    put(axes, slice_shown(light_field, row, pixel_row), aspect="auto")
+    axes.set_ylabel(f"view 1 … {nu}", fontsize=LABEL, color=INK)
+    axes.set_xlabel(
+        "pixels along the dashed line: each thing leaves a straight trace, and its slope tells its distance",
+        fontsize=LABEL,
+        color=INK,
+    )
+    return figure
+
+
+def points_field(focal_length: float, width: float) -> LightField:
+    """Two points of light as 41 views in a row see them: one infinitely far and off the axis, one near on it.
+
+    The near one is four focal lengths away and orange, the far one blue: the paper's parallel light.
+
+    Args:
+        focal_length: of the lens before which it is to stand, metres.
+        width: of the row of views, metres.
+    """
+    views, pixels, distance = 41, 301, 4 * focal_length
+    slope = 1.15 * width / distance / pixels
+    i, k = np.arange(views) - (views - 1) / 2, np.arange(pixels) - (pixels - 1) / 2
+    parallel = np.broadcast_to(k + round(0.36 * pixels), (views, pixels))
+    near = k + width / views * i[:, None] / distance / slope
+    values = np.zeros((1, views, 1, pixels, 3), dtype=np.float32)
+    for offset, colour in ((parallel, (0.1, 0.5, 1.0)), (near, (1.0, 0.4, 0.05))):
+        values[0, :, 0][np.abs(offset) <= 4] = colour
+    return LightField.from_views(values, width / views, slope, disparity_range=(0.0, 0.0))
+
+
+def mask_figure(masks: Sequence[tuple[str, Any]], width: float) -> Figure:
+    """What masks transmit, on the part that light on its way to the sensor crosses.
+
+    Args:
+        masks: title and mask.
+        width: of the square shown, metres.
+    """
+    figure = new_figure(3.4 * len(masks), 3.5)
+    for axes, (title, mask) in zip(np.atleast_1d(figure.subplots(1, len(masks))), masks, strict=True):
+        places = (np.arange(480) + 0.5) / 480 * width - width / 2
+        transmission = mask.faces().pattern.mean(places[None, :], places[:, None], width / 480, width / 480)
+        half = width / 2e-3
+        axes.imshow(transmission, cmap="gray", vmin=0, vmax=1, extent=(-half, half, half, -half))
+        axes.set_title(title, fontsize=LABEL, color=INK)
+        axes.set_ylabel("y [mm]", fontsize=LABEL, color=INK)
+        axes.set_xlabel("x [mm]", fontsize=LABEL, color=INK)
+        axes.tick_params(labelsize=LABEL - 1)
+    return figure
+
+
+def error_shown(image: Image, truth: Image, exposure: float, gain: float = 3.0) -> Shown:
+    """The difference from the truth in linear light, times ``gain``, on mid-grey; upright."""
+    difference = (image.upright().to_numpy() - truth.upright().to_numpy()) * np.float32(exposure * gain)
+    grey = np.clip(0.5 + difference / 2, 0, 1)
+    if grey.ndim == 2:
+        grey = grey[..., None]
+    return np.asarray(np.broadcast_to(grey[..., :3], (*grey.shape[:2], 3)), dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class SheetRow:
+    """A row of the contact sheet.
+
+    Args:
+        title: a line above it.
+        text: a line below that, smaller.
+        pictures: title and file of each.
+        heights: of the row, inches.
+    """
+
+    title: str
+    text: str
+    pictures: Sequence[tuple[str, Path]]
+
+
+def contact_sheet(title: str, rows: Sequence[SheetRow]) -> Figure:
+    """All pictures on one sheet, read from their files.
+
+    Args:
+        title: of the sheet.
+        rows: what it shows.
+    """
+    pictures = [[_read(path) for _, path in row.pictures] for row in rows]
+    ratios = [[picture.shape[1] / picture.shape[0] for picture in row] for row in pictures]
+    heights = [min(SHEET_WIDTH / sum(row), HIGHEST_ROW) + 0.9 for row in ratios]
+    figure = new_figure(SHEET_WIDTH, 0.6 + sum(heights))
+    figure.suptitle(title, fontsize=17, color=INK, x=0.01, ha="left", fontweight="bold")
+    parts = figure.subfigures(len(rows), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for part, row, row_pictures, row_ratios in zip(parts, rows, pictures, ratios, strict=True):
+        part.suptitle(f"{row.title}\n{row.text}", fontsize=11.5, color=INK, x=0.01, ha="left")
+        places = part.subplots(1, len(row_pictures), width_ratios=row_ratios, squeeze=False)[0]
+        for axes, (name, _), picture in zip(places, row.pictures, row_pictures, strict=True):
+            put(axes, picture, name).set_interpolation("antialiased")
+    return figure
+
+
+def _read(path: Path) -> Any:
+    from vcc.files.pictures import read_picture
+
+    picture = read_picture(path)[0][..., :3]
+    return np.repeat(picture[..., None], 3, axis=2) if picture.ndim == 2 else picture
