@@ -61,7 +61,7 @@ LATE = {
     "numba",
     "scipy",
     "matplotlib",
-    "typer",
+    "cyclopts",
     "rich",
     "pint",
     "tifffile",

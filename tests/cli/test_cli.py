@@ -68,9 +68,9 @@ def test_capture_takes_all_options(folder):
 
 
 def test_progress_is_asked_for_where_work_is_long(folder, monkeypatch):
-    from vcc.cli import commands
+    from vcc.cli import camera_verbs
 
-    monkeypatch.setattr(commands, "SAMPLES_WORTH_A_BAR", 0)
+    monkeypatch.setattr(camera_verbs, "SAMPLES_WORTH_A_BAR", 0)
     assert run("capture", "camera.toml", "views", "-o", "picture.npy", *KNOWN).exit_code == 0
 
 
