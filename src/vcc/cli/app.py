@@ -6,8 +6,8 @@ import difflib
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App, CycloptsError, Parameter
-from cyclopts.exceptions import MissingArgumentError, UnknownCommandError
+from cyclopts import App, CycloptsError, Group, Parameter
+from cyclopts.exceptions import MissingArgumentError, UnknownCommandError, UnusedCliTokensError
 
 from vcc import __version__
 from vcc.base.errors import InputError
@@ -132,7 +132,7 @@ def _commands(
         help=help,
         help_epilogue=epilogue,
         version=f"vcc {__version__}",
-        group_parameters="Options",
+        group_parameters=Group("Options", sort_key=1),
         version_flags=["--version"] if name == "vcc" else [],
         default_parameter=Parameter(negative=(), show_default=_worth_showing),
         suppress_keyboard_interrupt=False,
@@ -225,6 +225,8 @@ def _in_words(error: CycloptsError) -> str:
         return f"Missing {kind} {' / '.join(error.argument.names)}"
     if isinstance(error, UnknownCommandError) and error.app is not None:  # its own words load every command
         return _no_such_command((error.unused_tokens or [""])[0], [each for each in error.app if each[0] != "-"])
+    if isinstance(error, UnusedCliTokensError):
+        return f"Unexpected {' '.join(error.unused_tokens or [])}"
     return str(error)
 
 

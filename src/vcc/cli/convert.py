@@ -11,7 +11,7 @@ from cyclopts import Group, Parameter
 from vcc import __version__
 from vcc.base.errors import InputError
 from vcc.cli.console import free_output, progress, show
-from vcc.cli.options import FolderNames, LightFieldFile, OutputFile, Overwrite, Reading, told
+from vcc.cli.options import Counts, FolderNames, LightFieldFile, OutputFile, Overwrite, Reading, Whole, told
 from vcc.cli.store_words import written
 from vcc.formats import read_geometry
 from vcc.formats.writing import save_light_field
@@ -32,9 +32,9 @@ class AnyReading(Reading):
         every: Of a video, take each so-many-th frame as a view. Default: all.
     """
 
-    views: Annotated[tuple[int, int] | None, Parameter(metavar="ROWS COLUMNS")] = None
+    views: Counts | None = None
     order: Literal["row-major", "column-major", "serpentine", "serpentine-columns"] | None = None
-    every: int | None = None
+    every: Whole | None = None
 
     @property
     def layout(self) -> dict[str, Any]:
@@ -60,10 +60,10 @@ class Storing:
 
     dtype: Literal["uint8", "uint16", "float16", "float32"] | None = None
     compression: Literal["zstd", "lz4"] | None = None
-    level: int | None = None
+    level: Whole | None = None
     lossy: Literal["jpegxl", "avif"] | None = None
-    quality: int | None = None
-    chunks: Annotated[int | None, Parameter(metavar="ROWS")] = None
+    quality: Whole | None = None
+    chunks: Annotated[Whole | None, Parameter(metavar="ROWS")] = None
 
     def packing(self) -> Lossless | Lossy:
         """What packs the samples.

@@ -6,14 +6,13 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from cyclopts import Group, Parameter
-from cyclopts.validators import Number
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.camera import Camera
 from vcc.cli.console import progress
 from vcc.cli.lenslet_centres import grid_of
-from vcc.cli.options import File
+from vcc.cli.options import File, Whole
 from vcc.cli.raw_recordings import RawRecording, Recorded, read_raw
 from vcc.light_field import LightField
 from vcc.recover import LensletGrid, decode_plenoptic, find_lenslets
@@ -40,9 +39,9 @@ class Lenslets:
     dark: File | None = None
     centres: File | None = None
     centres_order: Literal["x-y", "row-column"] | None = None
-    centres_from: Annotated[int, Parameter(metavar="0|1", validator=Number(gte=0, lte=1))] = 0
+    centres_from: Literal[0, 1] = 0
     color_filter: Annotated[str | None, Parameter(metavar="TILE")] = None
-    views: int | None = None
+    views: Whole | None = None
     view_step: Annotated[float, Parameter(metavar="PIXELS")] = 1.0
 
 

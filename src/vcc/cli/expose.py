@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from vcc.cli.camera_verbs import exposed
 from vcc.cli.console import check_output, show
-from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time
+from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time, Whole
 from vcc.files.camera_file import load_camera
 from vcc.files.pictures import RAW_ENDINGS, WRITE_ENDINGS
 from vcc.run.recording import electronics_of
@@ -20,7 +20,7 @@ def expose(
     *,
     output: Output,
     exposure: Time = "auto",
-    seed: int = 0,
+    seed: Whole = 0,
     radiance: float = 1.0,
     picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     how: Making = Making(),

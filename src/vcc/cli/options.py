@@ -28,11 +28,6 @@ READING = Group("Reading the light field", sort_key=3)
 # --- values ---
 
 
-def converter(read: Callable[[str, str], Any]) -> Callable[[Any, tuple[Token, ...]], Any]:
-    """What cyclopts calls for an option's value: ``read`` gets its text, and the option's name for messages."""
-    return lambda _, tokens: read(tokens[0].value, tokens[0].keyword or "")
-
-
 def length(text: str, option: str) -> float:
     """Metres of a length on the command line; "inf" is one.
 
@@ -71,63 +66,99 @@ def memory_size(text: str, option: str = "--memory-limit") -> int:
     return int(size)
 
 
-def factor(text: str, option: str) -> float | Literal["auto"]:
-    """ "auto" or a number above 0.
+def above_zero(text: str, option: str) -> float:
+    """A number above 0.
 
     Raises:
         InputError: anything else.
     """
-    if text == "auto":
-        return "auto"
     try:
         number = float(text)
     except ValueError:
         number = math.nan
     if not (number > 0 and math.isfinite(number)):
-        raise InputError(f'{option} is "{text}": it is auto or a number above 0, like 0.8')
+        raise InputError(f'{option} is "{text}": it is a number above 0, like 0.8')
     return number
 
 
-def time(text: str, option: str) -> float | Literal["auto"]:
-    """ "auto" or the seconds of a time on the command line.
+def whole_number(text: str, option: str) -> int:
+    """A whole number; one with a fraction is not rounded.
+
+    Raises:
+        InputError: anything else.
+    """
+    try:
+        return int(text)
+    except ValueError:
+        raise InputError(f'{option} is "{text}": it is a whole number, like 3') from None
+
+
+def duration(text: str, option: str) -> float:
+    """Seconds of a time on the command line.
 
     Raises:
         InputError: no unit, or not a time.
     """
-    return "auto" if text == "auto" else parse(text, "time", option)
+    return parse(text, "time", option)
 
 
-def whole_number(text: str, option: str) -> int | Literal["auto"]:
-    """ "auto" or a whole number, whose range is checked where it is used.
+Reader = Callable[[str, str], Any]
+"""A value from its text and the name of its option, for messages."""
 
-    Raises:
-        InputError: neither.
+
+def auto_or(read: Reader) -> Reader:
+    """What reads "auto" besides."""
+
+    def read_either(text: str, option: str) -> Any:
+        try:
+            return "auto" if text == "auto" else read(text, option)
+        except InputError as error:
+            raise InputError(f"{error}, or auto") from None
+
+    return read_either
+
+
+def quantity(
+    metavar: str,
+    read: Reader,
+    *,
+    tokens: int = 1,
+    repeated: bool = False,
+    written: Callable[[Any], str] = str,
+) -> Parameter:
+    """How an option is read, and its default shown; a minus in front is part of its value.
+
+    Args:
+        metavar: what stands for the value in help.
+        read: a token's value, or each token's where there are more.
+        tokens: how many words it takes.
+        repeated: whether it may be given more than once; the value is then a tuple.
+        written: a default as one would type it.
     """
-    if text == "auto":
-        return "auto"
-    try:
-        return int(text)
-    except ValueError:
-        raise InputError(f'{option} is "auto" or a whole number, not "{text}"') from None
 
+    def converter(_: Any, given: tuple[Token, ...]) -> Any:
+        values = tuple(read(token.value, token.keyword or "") for token in given)
+        return values if tokens > 1 or repeated else values[0]
 
-def quantity(metavar: str, read: Callable[[str, str], Any], written: Callable[[Any], str] = str) -> Parameter:
-    """How an option of a quantity is read, and its default shown; a minus in front is part of it."""
     return Parameter(
-        converter=converter(read),
+        converter=converter,
         metavar=metavar,
-        n_tokens=1,
+        n_tokens=tokens,
         allow_leading_hyphen=True,
         show_choices=False,
         show_default=lambda default: None if default is None else written(default),
     )
 
 
-Length = Annotated[float, quantity("LENGTH", length, short)]
-Lengths = Annotated[float | tuple[float, float], quantity("LENGTH", lengths, short)]
+Length = Annotated[float, quantity("LENGTH", length, written=short)]
+Lengths = Annotated[float | tuple[float, float], quantity("LENGTH", lengths, written=short)]
+Whole = Annotated[int, quantity("NUMBER", whole_number)]
+Counts = Annotated[
+    tuple[int, int], quantity("ROWS COLUMNS", whole_number, tokens=2, written=lambda two: "{} {}".format(*two))
+]
 Size = Annotated[int, quantity("SIZE", memory_size)]
-Factor = Annotated[float | Literal["auto"], quantity("auto|NUMBER", factor)]
-Time = Annotated[float | Literal["auto"], quantity("auto|TIME", time)]
+Factor = Annotated[float | Literal["auto"], quantity("auto|NUMBER", auto_or(above_zero))]
+Time = Annotated[float | Literal["auto"], quantity("auto|TIME", auto_or(duration))]
 
 CameraFile = Annotated[Path, Parameter(help="The camera file, .toml.")]
 LightFieldFile = Annotated[Path, Parameter(help="A folder of views, a file or a store.")]
@@ -215,8 +246,10 @@ class Making(How):
             "Default: what the light field states or shows."
         ),
     ] = None
-    refine: Annotated[int | Literal["auto"], quantity("auto|NUMBER", whole_number)] = "auto"
-    seed: Annotated[int, Parameter(name="--ray-seed")] = 0
+    refine: Annotated[int | Literal["auto"], quantity("auto|NUMBER", auto_or(whole_number))] = "auto"
+    samples: Whole | None = None
+    seed: Annotated[Whole, Parameter(name="--ray-seed")] = 0
+    threads: Whole | None = None
     memory_limit: Annotated[
         Size | None,
         Parameter(

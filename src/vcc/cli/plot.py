@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from vcc.base.errors import InputError
 from vcc.cli.console import DRAWINGS, check_output, save_figure
-from vcc.cli.options import CameraFile, Output, Reading, length
+from vcc.cli.options import CameraFile, Output, Reading, length, quantity
 from vcc.files.camera_file import load_camera
 from vcc.plot import plot_camera, plot_phase_space_stages
 
@@ -17,7 +17,7 @@ def plot(
     /,
     *,
     output: Output | None = None,
-    object_distance: Annotated[list[str] | None, Parameter(metavar="LENGTH", allow_leading_hyphen=True)] = None,
+    object_distance: Annotated[tuple[float, ...] | None, quantity("LENGTH", length, repeated=True)] = None,
     across: Literal["x", "y"] = "x",
     light_field: Annotated[Path | None, Parameter(metavar="LIGHT_FIELD")] = None,
     phase_space: bool = False,
@@ -42,7 +42,6 @@ def plot(
     if slice is not None and not phase_space:
         raise InputError("--slice chooses what --phase-space draws: give --phase-space too")
     target = check_output(output or Path(f"{camera.stem}.png"), DRAWINGS)
-    distances = [length(each, "--object-distance") for each in object_distance or []]
     optics = load_camera(camera)
     field = None if light_field is None else reading.in_memory(light_field)
     if phase_space and field is not None:
@@ -50,5 +49,5 @@ def plot(
             plot_phase_space_stages(optics, field, across=slice or ("us" if across == "x" else "vt")), target
         )
     else:
-        axes = plot_camera(optics, light_field=field, object_distances=distances or None, across=across)
+        axes = plot_camera(optics, light_field=field, object_distances=object_distance, across=across)
         save_figure(axes.figure, target)

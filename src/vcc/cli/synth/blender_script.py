@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from vcc.cli.console import check_output, show
-from vcc.cli.synth.rendering import Counts, ViewsAndPixels
+from vcc.cli.options import Counts, Whole
+from vcc.cli.synth.rendering import ViewsAndPixels
 from vcc.files.atomic import atomic_path
 from vcc.sources import blender_script as script_of
 
@@ -27,7 +28,7 @@ def blender_script(
     folder: Annotated[str, Parameter(metavar="FOLDER")] = "views",
     format: Literal["exr", "png"] = "exr",
     engine: Literal["as in the file", "cycles", "eevee"] = "as in the file",
-    samples: int | None = None,
+    samples: Whole | None = None,
     camera: Annotated[str | None, Parameter(metavar="NAME")] = None,
 ) -> None:
     """Write a script that renders the views in your own Blender, 3.6 to 5.x, and states their geometry.

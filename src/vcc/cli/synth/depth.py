@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.cli.console import show
-from vcc.cli.options import Length
-from vcc.cli.synth.rendering import Counts, SampleType, Store, Views, check_store, make
+from vcc.cli.options import Counts, Length
+from vcc.cli.synth.rendering import SampleType, Store, Views, check_store, make
 from vcc.files.pfm import read_pfm
 from vcc.files.pictures import read_picture
 from vcc.files.transfer import decode

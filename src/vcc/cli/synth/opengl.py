@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.cli.console import show
-from vcc.cli.options import Length, Lengths, quantity
+from vcc.cli.options import Length, Lengths, Whole, quantity
 from vcc.cli.synth.rendering import HOW, WHERE, SampleType, Store, Unit, ViewsAndPixels, check_store, make
 from vcc.sources import CameraArray
 from vcc.sources.opengl import OpenGLRenderer, Vector, Viewpoint
@@ -34,7 +34,8 @@ def _typed(three: Vector) -> str:
     return ", ".join(f"{each:g}" for each in three)
 
 
-Position = Annotated[Vector, quantity('"X, Y, Z"', vector, _typed)]
+Position = Annotated[Vector, quantity('"X, Y, Z"', vector, written=_typed)]
+Colour = Annotated[Vector, quantity('"R, G, B"', vector, written=_typed), Parameter(group=HOW)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,8 +101,8 @@ def opengl(
     output: Store,
     where: ViewsOfMeshes = ViewsOfMeshes(),
     looking: Looking = Looking(),
-    background: Annotated[Vector, quantity('"R, G, B"', vector, _typed), Parameter(group=HOW)] = (0.0, 0.0, 0.0),
-    supersampling: Annotated[int, Parameter(group=HOW)] = 1,
+    background: Colour = (0.0, 0.0, 0.0),
+    supersampling: Annotated[Whole, Parameter(group=HOW)] = 1,
     dtype: SampleType = "float16",
 ) -> None:
     """Draw meshes by OpenGL, textured and simply lit: quick, without shadows, mirrors and glass.

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from vcc.cli.options import Whole
 from vcc.cli.synth.rendering import HOW, SampleType, Seed, Store, Unit, ViewsAndPixels, check_store, make
 from vcc.sources.pbrt import PbrtRenderer
 
@@ -16,7 +17,7 @@ def pbrt(
     output: Store,
     where: ViewsAndPixels = ViewsAndPixels(),
     unit: Unit = 1.0,
-    samples: Annotated[int | None, Parameter(group=HOW)] = None,
+    samples: Annotated[Whole | None, Parameter(group=HOW)] = None,
     seed: Seed = 0,
     dtype: SampleType = "float16",
 ) -> None:

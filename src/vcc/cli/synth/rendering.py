@@ -13,7 +13,7 @@ from cyclopts import Group, Parameter
 from vcc.base.errors import InputError
 from vcc.base.units import deg, mm, parse, short
 from vcc.cli.console import progress, show
-from vcc.cli.options import Length, Lengths, quantity
+from vcc.cli.options import Counts, Length, Lengths, Whole, quantity
 from vcc.sources import CameraArray, Renderer, synthesize
 
 WHERE = Group("Where the views are", sort_key=2)
@@ -24,15 +24,10 @@ def _angle(text: str, option: str) -> float:
     return parse(text, "angle", option)
 
 
-def _typed(two: tuple[int, int]) -> str:
-    return "{} {}".format(*two)
-
-
 Angle = Annotated[
     float,
-    quantity("ANGLE", _angle, lambda angle: short(angle, "angle")),
+    quantity("ANGLE", _angle, written=lambda angle: short(angle, "angle")),
 ]
-Counts = Annotated[tuple[int, int], Parameter(metavar="ROWS COLUMNS", show_default=_typed)]
 Store = Annotated[Path, Parameter(alias="-o", metavar="STORE.zarr", help="The store to write, or to go on with.")]
 Unit = Annotated[Length, Parameter(group=WHERE, help='How long a unit of the scene is, "1 m", "1 cm".')]
 SampleType = Annotated[
@@ -43,8 +38,8 @@ SampleType = Annotated[
         "full scale is radiance 1, and what is brighter is cut off.",
     ),
 ]
-Samples = Annotated[int, Parameter(group=HOW, help="Paths per pixel.")]
-Seed = Annotated[int, Parameter(group=HOW, help="Of the noise: the same gives the same pictures.")]
+Samples = Annotated[Whole, Parameter(group=HOW, help="Paths per pixel.")]
+Seed = Annotated[Whole, Parameter(group=HOW, help="Of the noise: the same gives the same pictures.")]
 Variant = Annotated[
     str,
     Parameter(
