@@ -13,8 +13,6 @@ from vcc import __version__
 from vcc.base.errors import InputError
 from vcc.cli.console import notes, say
 
-_RUN_BLENDER = "blender scene.blend --background --python views.py"
-
 COMMANDS = {
     "capture": (
         "Make the picture that a camera records of a light field.",
@@ -106,7 +104,8 @@ RENDERERS = {
     ),
     "blender-script": (
         "Write a script that renders the views in your own Blender, 3.6 to 5.x, and states their geometry.",
-        f'vcc synth blender-script -o views.py --views 9 9 --aperture "40 mm"\n\nThen:  {_RUN_BLENDER}',
+        'vcc synth blender-script -o views.py --views 9 9 --aperture "40 mm"',
+        "blender scene.blend --background --python views.py",
     ),
     "depth": (
         "Make the views around a picture from its depth; what no picture shows is made up behind edges.",
