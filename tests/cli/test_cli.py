@@ -181,6 +181,24 @@ def test_the_way_to_help_is_named():
     assert refused("synth", "planes").endswith("Help:  vcc synth planes --help\n")
 
 
+def test_options_given_twice(folder):
+    """The last one counts; distances to draw are all drawn: a ray's colour for each."""
+    result = run("plot", "camera.toml", "-o", "one.svg", "-o", "other.svg", "--object-distance", "1.2 m")
+    assert result.stdout == "other.svg: written\n"
+    run("plot", "camera.toml", "-o", "two.svg", "--object-distance", "1.2 m", "--object-distance", "3 m")
+    one, two = ((folder / name).read_text() for name in ("other.svg", "two.svg"))
+    assert two.count("stroke:") > one.count("stroke:")
+
+
+def test_a_reader_who_has_seen_enough_is_no_fault(folder):
+    command = [sys.executable, "-m", "vcc", "plot", "camera.toml", "-o", "side.svg"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        running.stdout.close()
+        assert running.wait() == 1
+        assert not running.stderr.read()
+    assert (folder / "side.svg").exists()
+
+
 def test_faults_of_the_program_exit_with_1_and_a_traceback(tmp_path):
     code = (
         "import sys, types; stand_in = types.ModuleType('vcc.demo'); sys.modules['vcc.demo'] = "

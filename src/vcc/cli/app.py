@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import sys
 from collections.abc import Sequence
 
@@ -133,7 +134,7 @@ def _commands(
         version=f"vcc {__version__}",
         group_parameters=Group("Options", sort_key=1),
         version_flags=["--version"] if name == "vcc" else [],
-        default_parameter=Parameter(negative=(), show_default=_worth_showing),
+        default_parameter=Parameter(negative=(), show_default=_worth_showing, allow_repeating=True),
         suppress_keyboard_interrupt=False,
         sort_key=place,
     )
@@ -204,6 +205,9 @@ def run(arguments: Sequence[str]) -> int:
             return _refuse(_in_words(error), _help_on(error))
         except KeyboardInterrupt:
             say("Aborted.", "bold red", "")
+            return 1
+        except BrokenPipeError:  # who reads has seen enough; nothing more is to be written when Python ends
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 1
     return 0
 
