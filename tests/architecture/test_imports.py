@@ -1,6 +1,6 @@
-"""Imports run one way and in no circle, and importing is cheap. The oracle is the source itself, read with `ast`.
+"""Imports run one way and in no circle, and importing is cheap. The oracle is the source, read with `ast`.
 
-Every import of ours counts: those inside functions, those for types, and modules named in strings that are loaded by
+Every import of ours counts: those inside functions, those for types, and modules that strings name to load them by
 name. A room is a folder of src/vcc, or a file beside the folders; it may import from rooms before it in `ROOMS`.
 """
 
