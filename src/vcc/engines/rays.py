@@ -5,11 +5,9 @@ All three trace the same rays. The plain way is the plan's own (`RayPlan.looked_
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -17,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError, ResultWarning
+from vcc.engines.late import compiled
 from vcc.engines.sharpening import sharpened
-from vcc.fields.sampled import to_dtype
-from vcc.plan.rays.model import TABLE, CellWindows, RayPlan, Window
+from vcc.fields.sampled import known, to_dtype
+from vcc.plan.rays.model import TABLE, CellWindows, RayPlan
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
-TILE = 32
-"""Pixels a side that a thread works on at once: what they look up in the light field stays in its cache."""
 RAYS_AT_ONCE = 2**17
 """Rays that are traced at once in NumPy: some tens of MiB."""
 
@@ -56,6 +53,7 @@ def run(
     engine: str,
     tolerance: float | None = None,
     progress: Progress | None = None,
+    threads: int | None = None,
 ) -> Traced:
     """The picture of samples (v, u, t, s[, channels]) by a ray plan.
 
@@ -66,11 +64,11 @@ def run(
         tolerance: double the samples until the sampling error is at most this share of the picture's mean; None
             takes the plan's samples.
         progress: called with (done, total) in tiles or pieces; with a tolerance the total is that of a round.
+        threads: how many the compiled engine takes; None takes `vcc.plan.how.cores`. The picture is the same.
     """
-    once = {"numba": _compiled, "array_api": _in_library, "reference": _in_library}[engine]
-    kind = np.float64 if engine == "reference" else None
-    plan, values = sharpened(plan, values, engine)
-    traced = once(plan, values, 0, kind, progress)
+    once = _way(engine, threads)
+    plan, values = sharpened(plan, values, engine, threads)
+    traced = once(plan, values, 0, progress)
     round_number = 0
     while tolerance is not None and traced.sampling_error > tolerance * abs(_mean(traced.values)):
         if traced.samples * 2 > TABLE:
@@ -78,7 +76,7 @@ def run(
             break
         round_number += 1
         # As many rays again, from the block beside the ones taken: together they are one larger even set.
-        more = once(_doubled(plan, round_number), values, 1, kind, progress)
+        more = once(_doubled(plan, round_number), values, 1, progress)
         difference = traced.values - more.values
         traced = Traced(
             values=(traced.values + more.values) / 2,
@@ -114,111 +112,32 @@ def warn_of_error(error: float, samples: int, tolerance: float, stacklevel: int)
     )
 
 
-def _doubled(plan: RayPlan, round_number: int) -> RayPlan:
-    from dataclasses import replace
+def _way(engine: str, threads: int | None) -> Callable[..., Traced]:
+    """What traces one round of a plan's rays: a function of (plan, values, blocks beside, progress)."""
+    if engine == "numba":
+        return partial(compiled("rays_compiled").traced, threads=threads)
+    return partial(_in_library, double=engine == "reference")
 
+
+def _doubled(plan: RayPlan, round_number: int) -> RayPlan:
     return replace(plan, samples=plan.samples * 2 ** (round_number - 1))
 
 
 def _mean(values: Any) -> float:
-    from vcc.fields.sampled import known
-
     numbers = known(values)
     return float("nan") if numbers is None else float(np.mean(numbers, dtype=np.float64))
-
-
-# --- compiled ---
-
-
-def _compiled(plan: RayPlan, values: NDArray[Any], beside: int, _kind: Any, progress: Progress | None) -> Traced:
-    channels = values.shape[4] if values.ndim == 5 else 1
-    rows, columns = plan.sensor_shape
-    picture = np.empty((rows, columns, channels), dtype=np.float32)
-    tally = np.zeros(4)
-    add = _tile_adder(plan, values, channels, beside)
-    tiles = [(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        # Tallies are summed in the order of tiles: the same sums whatever the number of threads.
-        for done, part in enumerate(pool.map(partial(add, picture), tiles), start=1):
-            tally += part
-            if progress is not None:
-                progress(done, len(tiles))
-    error = float(np.sqrt(tally[2] / picture.size))
-    missing = float(tally[1] / tally[0]) if tally[0] > 0 else 0.0
-    return Traced(picture if values.ndim == 5 else picture[..., 0], error, missing, int(tally[3]), plan.samples)
-
-
-def _tile_adder(
-    plan: RayPlan, values: NDArray[Any], channels: int, beside: int
-) -> Callable[[NDArray[np.float32], tuple[int, int, int, int]], Array]:
-    """A function that traces one tile of the picture and returns its tally."""
-    from vcc.engines import ray_kernels as kernels
-
-    kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
-    flat = np.ascontiguousarray(values, dtype=kind).reshape(-1)
-    pixels = np.array([plan.first_pixel, plan.pitch, plan.sensitive]).T.copy()
-    window, scatter = np.zeros((3, 5)), np.zeros((0, 5))
-    cells, kinds, whole = np.zeros((0, 2)), np.zeros((0, 3)), np.zeros(5, dtype=np.int64)
-    borders = np.zeros((0, 2))
-    if isinstance(plan.aim, Window):
-        window[:2, :2], window[:2, 2:4] = plan.aim.slope_from_point, plan.aim.slope_from_sensor
-        window[:2, 4], window[2, :2] = plan.aim.offset, (plan.aim.solid_angle, plan.aim.disc)
-        terms = [[column, *matrix.reshape(-1)] for column, matrix in plan.aim.slope_from_scatter]
-        scatter = np.array(terms).reshape(-1, 5)
-    else:
-        cells, kinds, whole = _cell_tables(plan.aim)
-        borders = np.ascontiguousarray(plan.aim.borders)
-    steps = plan.packed().arrays()
-    points, seed = np.ascontiguousarray(plan.points.T), plan.seed & 0xFFFFFFFF  # the hash takes no more of it
-
-    def add(picture: NDArray[np.float32], tile: tuple[int, int, int, int]) -> Array:
-        tally = np.zeros(4)
-        kernels.add_tile(
-            flat, plan.views, channels, plan.scale, pixels, tile, plan.samples, beside, seed, points,
-            window, scatter, cells, kinds, whole, borders, *steps, plan.index_from_ray.matrix[:4].copy(),
-            plan.motion, plan.between_views, plan.views_may_end, picture, tally,
-        )  # fmt: skip
-        return tally
-
-    return add
-
-
-def _cell_tables(aim: CellWindows) -> tuple[Array, Array, NDArray[np.int64]]:
-    """The windows of cells as the kernel reads them: by axis, by kind, and whole numbers."""
-    lattice = aim.lattice
-    cells = np.array(
-        [
-            [np.cos(lattice.rotation), np.sin(lattice.rotation)],
-            lattice.offset,
-            [lattice.pitch, lattice.row_height],
-            aim.place_from_sensor,
-            aim.place_from_slope,
-            aim.offset,
-            aim.beyond,
-            aim.beyond_from_sensor,
-            aim.beyond_from_slope,
-            aim.beyond_offset,
-            aim.middle,
-            aim.half,
-            aim.cell_half,
-            [aim.opening_radius, aim.disc],
-        ]
-    )
-    kinds = np.concatenate([aim.powers[..., None], aim.slopes], axis=-1).reshape(-1, 3)
-    whole = np.array([lattice.layout == "hexagonal", *aim.powers.shape, *aim.reach], dtype=np.int64)
-    return cells, kinds, whole
 
 
 # --- plain, on arrays of any library ---
 
 
-def _in_library(plan: RayPlan, values: Any, beside: int, kind: Any, progress: Progress | None) -> Traced:
+def _in_library(plan: RayPlan, values: Any, beside: int, progress: Progress | None, *, double: bool) -> Traced:
     """The plan's own rays; places and weights are NumPy numbers, samples may be arrays of any library."""
     from array_api_compat import array_namespace
 
     xp = array_namespace(values)
     channels = values.shape[4] if values.ndim == 5 else 1
-    wide = kind == np.float64 or to_dtype(values) == np.float64
+    wide = double or to_dtype(values) == np.float64
     working = xp.float64 if wide else xp.float32
     samples = xp.reshape(xp.astype(values, working), (-1, channels))
     rows, columns = plan.sensor_shape

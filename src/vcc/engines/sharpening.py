@@ -13,14 +13,13 @@ Beyond a view's border its last samples go on, so that what is even stays even.
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.engines.late import compiled
 from vcc.fields.sampled import to_dtype
 from vcc.plan.rays.model import RayPlan
 from vcc.plan.rays.sharpening import DIGITS, REACH
@@ -30,13 +29,14 @@ KEPT_DIGITS = 5
 than they were rounded, with room for values 4 times the range (the filter's are at most 3.4 times)."""
 
 
-def sharpened(plan: RayPlan, values: Any, engine: str) -> tuple[RayPlan, Any]:
+def sharpened(plan: RayPlan, values: Any, engine: str, threads: int | None = None) -> tuple[RayPlan, Any]:
     """Samples as the plan wants them looked up, and the plan that looks those up as they are.
 
     Args:
         plan: with or without a filter of the views.
         values: samples (v, u, t, s[, channels]).
         engine: ``"numba"``, ``"array_api"`` or ``"reference"``.
+        threads: how many ``"numba"`` takes; None takes `vcc.plan.how.cores`. The samples are the same.
 
     Returns:
         The plan and the samples themselves where there is no filter; else new samples of type `kept_as`, with
@@ -46,7 +46,7 @@ def sharpened(plan: RayPlan, values: Any, engine: str) -> tuple[RayPlan, Any]:
         return plan, values
     once = replace(plan, sharpening=None, scale=plan.scale * (2.0**-KEPT_DIGITS if _is_small(values) else 1.0))
     if engine == "numba":
-        return once, _compiled(plan.sharpening, values)
+        return once, compiled("sharpening_kernels").filtered(plan.sharpening, values, threads)
     return once, _in_library(plan.sharpening, values, engine == "reference")
 
 
@@ -61,29 +61,6 @@ def kept_as(plan: RayPlan, kind: np.dtype[Any]) -> np.dtype[Any]:
 
 def _is_small(values: Any) -> bool:
     return bool(to_dtype(values) == np.uint8)
-
-
-def _compiled(weights: tuple[int, int, int], values: NDArray[Any]) -> NDArray[Any]:
-    from vcc.engines import sharpening_kernels as kernels
-
-    small = _is_small(values)
-    given = np.dtype(np.float32) if values.dtype == np.float16 else values.dtype
-    wide = np.float64 if values.dtype == np.float64 else np.float32
-    kept = np.empty(values.shape, dtype=np.int16 if small else wide)
-    factors = np.array(weights, dtype=np.int32) if small else (np.array(weights) * 2.0**-DIGITS).astype(wide)
-    rows, length = values.shape[2], int(np.prod(values.shape[3:]))
-    channels = values.shape[4] if values.ndim == 5 else 1
-    sharpen = kernels.sharpen_whole if small else kernels.sharpen_real
-
-    def sharpen_row(row: int) -> None:
-        lines = np.empty((2 * REACH + 2, length), dtype=factors.dtype)
-        for column in range(values.shape[1]):
-            view = np.ascontiguousarray(values[row, column], dtype=given).reshape(rows, length)
-            sharpen(view, kept[row, column].reshape(rows, length), channels, factors, lines)
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(sharpen_row, range(values.shape[0])))
-    return kept
 
 
 def _in_library(weights: tuple[int, int, int], values: Any, double: bool) -> Any:
