@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from numba import njit
 
 
@@ -19,3 +21,24 @@ def bilinear(above, above_next, below, below_next, right, down):  # type: ignore
     upper = above * (1 - right) + above_next * right
     lower = below * (1 - right) + below_next * right
     return upper * (1 - down) + lower * down
+
+
+@njit(nogil=True, inline="always")
+def _or_dark(values, row, column):  # type: ignore[no-untyped-def]
+    return values[row, column] if 0 <= row < values.shape[0] and 0 <= column < values.shape[1] else 0.0
+
+
+@njit(nogil=True, inline="always")
+def dark_outside(values, row, column):  # type: ignore[no-untyped-def]
+    """An array (rows, columns) at a place between its points, with zeros around it."""
+    if not (row > -1 and row < values.shape[0] and column > -1 and column < values.shape[1]):
+        return 0.0
+    r, c = math.floor(row), math.floor(column)
+    return bilinear(
+        _or_dark(values, r, c),
+        _or_dark(values, r, c + 1),
+        _or_dark(values, r + 1, c),
+        _or_dark(values, r + 1, c + 1),
+        column - c,
+        row - r,
+    )

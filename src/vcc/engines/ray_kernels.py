@@ -546,7 +546,7 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def add_tile(field, sensor, points, aim, steps, picture, tile):  # type: ignore[no-untyped-def]
-    """The pixels of a tile, into picture (rows, columns, channels); see `vcc.engines.ray_tables` for what is given.
+    """The pixels of a tile, into picture (rows, columns, channels); what is given: `vcc.engines.ray_tables`.
 
     Returns:
         (4,): weights of all rays, of missing rays, squared differences of the pixels' halves, how many rays.
