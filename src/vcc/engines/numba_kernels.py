@@ -46,15 +46,16 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
     samples, begin, pitch, jump = lines
     first, reach, advance = gathered.first, gathered.reach, gathered.advance
     start, stop = band
-    count, repeat = 0, 1
-    if masks is not None:  # told apart when compiled: without masks there is less to compile
-        count, repeat = masks.row_step.size, masks.repeat
     group = min(VIEWS, used.size)
     room = group * reach
+    repeat = 1
+    if masks is not None:  # told apart when compiled: without masks there is less to compile
+        repeat, count = masks.repeat, masks.row_step.size
+        weighed = EntryMasks(
+            masks.lines, np.empty((room, count, 2), np.int64), np.empty((room, count, 2), np.float32)
+        )
     order, places, ranges = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
     share = np.empty((room, ROWS), np.float32)
-    mask_places = np.empty((room, count, 2), np.int64)
-    mask_shares = np.empty((room, count, 2), np.float32)
     ends, highest, lowest = np.empty(10, np.int64), np.empty(reach, np.int64), np.empty(reach, np.int64)
     next_rows, first_rows = np.empty(group * max(advance, reach), np.int64), np.empty(group * reach, np.int64)
     per_line = 64 // samples.itemsize
@@ -77,7 +78,7 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
                     low = lowest[q]
                     ranges[entry] = -1 if low < 0 else low * ROWS - low * (low + 1) // 2 + highest[q]
                     if masks is not None:  # noqa: SIM102  (by itself, so that it can be told apart when compiled)
-                        if not _masks_at(masks, b, l, mask_places[entry], mask_shares[entry]):
+                        if not _masks_at(masks, b, l, entry, weighed):
                             ranges[entry] = -1
                 listed += rows
                 for l in range(top + rows, top + rows + advance):
@@ -96,12 +97,10 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
                 here = min(x, pitch - run)
                 if masks is None:
                     add_rows(samples, entries, None, here, x - here, sums, y - start)
+                elif repeat == 3:
+                    add_masked_rows_of_threes(samples, entries, weighed, here, x - here, sums, y - start)
                 else:
-                    weighed = EntryMasks(masks.lines, mask_places, mask_shares)
-                    if repeat == 3:
-                        add_masked_rows_of_threes(samples, entries, weighed, here, x - here, sums, y - start)
-                    else:
-                        add_masked_rows(samples, entries, weighed, here, x - here, sums, y - start)
+                    add_masked_rows(samples, entries, weighed, here, x - here, sums, y - start)
 
 
 @_inlined
@@ -132,12 +131,13 @@ def _rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # ty
 
 
 @_inlined
-def _masks_at(masks, b, l, places, shares):  # type: ignore[no-untyped-def]
+def _masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
     """Look up the masks' lines above and below row l of the samples of tap b; False if it is dark there.
 
-    places, shares: (masks, 2), see `vcc.engines.footprint_tables.EntryMasks`.
+    masks: `MaskLines`. weighed: `EntryMasks`, which is filled for the entry.
     """
     lines, begin, rows, row, row_step, _ = masks
+    _, places, shares = weighed
     line = lines.shape[1]
     for mask in range(row_step.size):
         place = row[mask, b] + row_step[mask] * l
@@ -146,10 +146,10 @@ def _masks_at(masks, b, l, places, shares):  # type: ignore[no-untyped-def]
         r = int(np.floor(place))
         after = np.float32(place - r)
         # Outside the texture there is no light: a weight of zero on any row that exists.
-        shares[mask, 0] = 0 if r < 0 else np.float32(1) - after
-        shares[mask, 1] = 0 if r + 1 >= rows[mask] else after
-        places[mask, 0] = (begin[mask, b] + max(r, 0)) * line
-        places[mask, 1] = (begin[mask, b] + min(r + 1, rows[mask] - 1)) * line
+        shares[entry, mask, 0] = 0 if r < 0 else np.float32(1) - after
+        shares[entry, mask, 1] = 0 if r + 1 >= rows[mask] else after
+        places[entry, mask, 0] = (begin[mask, b] + max(r, 0)) * line
+        places[entry, mask, 1] = (begin[mask, b] + min(r + 1, rows[mask] - 1)) * line
     return True
 
 
@@ -198,10 +198,9 @@ def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # typ
     The rows that raster rows gather, and the masks, are those of the finer samples.
     """
     weights, rows, (first_column, column_shares) = footprints
-    values, begin, further, sample_pitch, channels = samples
+    begin, channels = samples.begin, samples.channels
     sums, turned = _room(band, fine.pitch, column_shares.shape[2], channels)
     sums[:] = 0
-    source = np.zeros(sample_pitch + fine.column_shares.shape[1] * channels, np.float32)
     divided = np.zeros((0, fine.pitch), np.float32)
     here = np.zeros(begin.size, np.int64)
     for b in np.flatnonzero(weights[:, a]):
@@ -210,9 +209,7 @@ def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # typ
             continue
         if high - low > len(divided):
             divided = np.zeros((high - low, fine.pitch), np.float32)
-        for l in range(low, high):
-            at = begin[b] + further[a] + fine.first_row[l] * sample_pitch
-            _divided_row(values[at:], sample_pitch, fine.row_shares[l], fine, channels, source, divided[l - low])
+        _divide(samples, begin[b] + samples.further[a], fine, low, high, divided)
         here[b] = -low * fine.pitch
         lines = Lines(divided.reshape(-1), here, fine.pitch, 0)
         sum_rows(lines, np.array([b]), weights[:, a], rows, masks, band, sums)
@@ -222,11 +219,11 @@ def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # typ
 @_inlined
 def _rows_needed(gathered, b, band, low):  # type: ignore[no-untyped-def]
     """(first, after the last) of the rows of samples of tap b that fall on a band; first is ``low`` for none."""
-    high = 0
+    first, shares, high = gathered.first, gathered.shares, 0
     for y in range(band.start, band.stop):
-        for t in range(gathered.shares.shape[2]):
-            if gathered.shares[b, y, t] != 0:
-                low, high = min(low, gathered.first[b, y] + t), max(high, gathered.first[b, y] + t + 1)
+        for t in range(shares.shape[2]):
+            if shares[b, y, t] != 0:
+                low, high = min(low, first[b, y] + t), max(high, first[b, y] + t + 1)
     return low, high
 
 
@@ -239,35 +236,37 @@ def _room(band, pitch, width, channels):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def _divided_row(samples, pitch, row_shares, fine, channels, source, out):  # type: ignore[no-untyped-def]
-    """out = one row of finer samples, of rows that begin with ``samples`` and count ``row_shares``.
-
-    source is room for a row of the samples, zero beyond the last.
-    """
-    first_column, column_shares = fine.first_column, fine.column_shares
-    source[:pitch] = 0
-    for t in range(row_shares.size):
-        if row_shares[t] != 0:
-            line = samples[t * pitch : (t + 1) * pitch]
-            for x in range(pitch):
-                source[x] += row_shares[t] * np.float32(line[x])
-    for k in range(first_column.size):
-        at = np.uint64(first_column[k] * channels)
-        if channels == 3:
-            red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-            for t in range(column_shares.shape[1]):
-                share = column_shares[k, t]
-                red += share * source[at]
-                green += share * source[at + np.uint64(1)]
-                blue += share * source[at + np.uint64(2)]
-                at += np.uint64(3)
-            out[3 * k], out[3 * k + 1], out[3 * k + 2] = red, green, blue
-        else:
-            for c in range(channels):
-                total = np.float32(0)
+def _divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untyped-def]
+    """divided[l − low] = row l of a view's finer samples, from ``low`` to before ``high``; begin: of the view."""
+    values, _, _, pitch, channels = samples
+    first_row, row_shares, first_column, column_shares, _ = fine
+    source = np.zeros(pitch + column_shares.shape[1] * channels, np.float32)  # and zero beyond a row's last sample
+    for l in range(low, high):
+        source[:pitch] = 0
+        for t in range(row_shares.shape[1]):
+            if row_shares[l, t] != 0:
+                start = begin + (first_row[l] + t) * pitch
+                line, share = values[start : start + pitch], row_shares[l, t]
+                for x in range(pitch):
+                    source[x] += share * np.float32(line[x])
+        out = divided[l - low]
+        for k in range(first_column.size):
+            at = np.uint64(first_column[k] * channels)
+            if channels == 3:
+                red, green, blue = np.float32(0), np.float32(0), np.float32(0)
                 for t in range(column_shares.shape[1]):
-                    total += column_shares[k, t] * source[at + np.uint64(t * channels + c)]
-                out[k * channels + c] = total
+                    share = column_shares[k, t]
+                    red += share * source[at]
+                    green += share * source[at + np.uint64(1)]
+                    blue += share * source[at + np.uint64(2)]
+                    at += np.uint64(3)
+                out[3 * k], out[3 * k + 1], out[3 * k + 2] = red, green, blue
+            else:
+                for c in range(channels):
+                    total = np.float32(0)
+                    for t in range(column_shares.shape[1]):
+                        total += column_shares[k, t] * source[at + np.uint64(t * channels + c)]
+                    out[k * channels + c] = total
 
 
 @_compiled
@@ -398,26 +397,17 @@ def _farthest(footprint, size):  # type: ignore[no-untyped-def]
     return 1e-6 + (max(size, 1.0) / 2 if footprint.interpolation == 0 else footprint.reach * size + 0.5)
 
 
-@_inlined
-def _seen_through(masks, view, k, l):  # type: ignore[no-untyped-def]
-    """The product of what the masks let through at sample (k, l) of a view; masks: `Textures`."""
-    seen = 1.0
-    for mask in range(view.masks.shape[0]):
-        step = masks.step[mask]
-        column = view.masks[mask, 0] + step[0, 0] * k + step[0, 1] * l
-        row = view.masks[mask, 1] + step[1, 0] * k + step[1, 1] * l
-        seen *= dark_outside(masks.values[mask, : masks.size[mask, 0], : masks.size[mask, 1]], row, column)
-    return seen
-
-
 @_compiled
 def sheared_view(view, grid, footprint, masks, band, raster):  # type: ignore[no-untyped-def]
     """Add one view to a band's raster rows, (rows, columns, channels), where rows and columns of samples shear.
 
     view: `View`. grid: `Grid`. footprint: `Footprint`. masks: `Textures`.
     """
-    nt, ns, channels = view.samples.shape
-    row_step, column_step = grid.row_step / grid.refine, grid.column_step / grid.refine
+    samples, weight, x0, y0, place = view
+    textures, size, mask_step = masks
+    step, shear, coarse_row_step, coarse_column_step, refine, first_k, first_l = grid
+    nt, ns, channels = samples.shape
+    row_step, column_step = coarse_row_step / refine, coarse_column_step / refine
     height, width = abs(row_step), abs(column_step)
     reach_y, reach_x = _farthest(footprint, height), _farthest(footprint, width)
     line = np.empty((ns, channels))
@@ -425,22 +415,27 @@ def sheared_view(view, grid, footprint, masks, band, raster):  # type: ignore[no
         line[:] = 0
         lit = False
         for n in range(ns):
-            k = grid.first_k + n / grid.refine
-            y_start = view.y + grid.step[1, 0] * k + grid.row_step * grid.first_l
+            k = first_k + n / refine
+            y_start = y0 + step[1, 0] * k + coarse_row_step * first_l
             middle = (y - y_start) / row_step
             low = max(int(np.ceil(middle - reach_y / height)), 0)
             high = min(int(np.floor(middle + reach_y / height)), nt - 1)
             for m in range(low, high + 1):
-                share = view.weight * _share(footprint, y - y_start - row_step * m, height)
-                share *= _seen_through(masks, view, k, grid.first_l + m / grid.refine)
+                share = weight * _share(footprint, y - y_start - row_step * m, height)
+                l = first_l + m / refine
+                for mask in range(place.shape[0]):
+                    column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
+                    row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
+                    texture = textures[mask, : size[mask, 0], : size[mask, 1]]
+                    share *= dark_outside(texture, row, column)
                 if share != 0:
                     lit = True
                     for c in range(channels):
-                        line[n, c] += share * view.samples[m, n, c]
+                        line[n, c] += share * samples[m, n, c]
         if not lit:
             continue
         for n in range(ns):
-            x = view.x + grid.shear * (y - view.y) + grid.column_step * (grid.first_k + n / grid.refine)
+            x = x0 + shear * (y - y0) + coarse_column_step * (first_k + n / refine)
             low = max(int(np.ceil(x - reach_x)), 0)
             high = min(int(np.floor(x + reach_x)), raster.shape[1] - 1)
             for pixel in range(low, high + 1):
