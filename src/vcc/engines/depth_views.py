@@ -199,7 +199,7 @@ class DenserViews:
             if (found.seen < 0).any():
                 for other, distance, weight in others:
                     self._look(pool, other, distance, weight, True, found)
-        return out, int(compiled("depth_kernels").share_out(out, found.seen))
+        return out, int(compiled("vcc.engines.depth_kernels").share_out(out, found.seen))
 
     def _look(
         self,
@@ -210,7 +210,7 @@ class DenserViews:
         torn_only: bool,
         found: Found,
     ) -> None:
-        kernels, parallax, nearness = compiled("depth_kernels"), self._between.parallax, view.nearness
+        kernels, parallax, nearness = compiled("vcc.engines.depth_kernels"), self._between.parallax, view.nearness
         down, across = away
         way = Way(float(across), float(down), parallax.sign, parallax.along_v)
         bounds = kernels.march_bounds(view.ranges, way)
@@ -227,7 +227,7 @@ class DenserViews:
 
 def _seen_as(samples: NDArray[Any], nearness: Array) -> View:
     """A view (t, s, channels) of which the nearness (t, s) is known."""
-    return View(samples, nearness, compiled("depth_kernels").tile_ranges(nearness))
+    return View(samples, nearness, compiled("vcc.engines.depth_kernels").tile_ranges(nearness))
 
 
 def run(plan: Plan, values: Any, engine: EngineName, progress: Progress | None = None) -> Any:

@@ -1,11 +1,11 @@
-"""Compiled modules by name. Numba takes a moment to import: that is done when a picture first needs it."""
+"""Modules that need Numba, which takes a moment to import: that is done when a picture first needs one."""
 
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any, Literal
+from typing import Any
 
 
-def compiled(name: Literal["rays_compiled", "sharpening_kernels", "depth_kernels"]) -> Any:
-    """A module of this folder that needs Numba."""
-    return import_module(f"{__package__}.{name}")
+def compiled(module: str) -> Any:
+    """A module of compiled loops, by its full name."""
+    return import_module(module)

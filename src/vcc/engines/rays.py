@@ -115,7 +115,7 @@ def warn_of_error(error: float, samples: int, tolerance: float, stacklevel: int)
 def _way(engine: str, threads: int | None) -> Callable[..., Traced]:
     """What traces one round of a plan's rays: a function of (plan, values, blocks beside, progress)."""
     if engine == "numba":
-        return partial(compiled("rays_compiled").traced, threads=threads)
+        return partial(compiled("vcc.engines.rays_compiled").traced, threads=threads)
     return partial(_in_library, double=engine == "reference")
 
 

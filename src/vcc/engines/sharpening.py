@@ -46,7 +46,7 @@ def sharpened(plan: RayPlan, values: Any, engine: str, threads: int | None = Non
         return plan, values
     once = replace(plan, sharpening=None, scale=plan.scale * (2.0**-KEPT_DIGITS if _is_small(values) else 1.0))
     if engine == "numba":
-        return once, compiled("sharpening_kernels").filtered(plan.sharpening, values, threads)
+        return once, compiled("vcc.engines.sharpening_kernels").filtered(plan.sharpening, values, threads)
     return once, _in_library(plan.sharpening, values, engine == "reference")
 
 
