@@ -53,6 +53,9 @@ FACES = {"affine", "camera_file", "errors", "kernels", "operators", "patterns", 
 
 BY_NAME = {
     "": "names of `vcc` are loaded when they are first used",
+    "base.late": "what the others load with",
+    "sources.planes": "pictures of planes are mixed by compiled loops",
+    "sources.depth_map": "meshes are made by compiled loops",
     "engines": "an engine is loaded when it is first used: Numba takes a second",
     "run.drive": "views in between need Numba",
     "cli": "a command is loaded when it is called",

@@ -13,8 +13,10 @@ import pytest
 
 import vcc
 from vcc.base.units import mm
-from vcc.engines.depth_views import DenserViews, InMemory
+from vcc.engines.depth_views import DenserViews
 from vcc.fields.disparity import DisparityMaps
+from vcc.fields.grid import Block
+from vcc.fields.samples import InMemory
 from vcc.plan.depth_rule import Parallax, ViewsBetween
 from vcc.store import open_store, save_store
 
@@ -49,10 +51,8 @@ def between(times, disparity, frame=FRAME, source="given", full_scale=1.0):
 
 def made(values, rule):
     """All views in between, (v, u, t, s)."""
-    views = DenserViews(InMemory(values), rule)
-    rows, columns = rule.shape(values.shape)[:2]
-    pictures = [[views.linear_view(j, i, 0, values.shape[2]) for i in range(columns)] for j in range(rows)]
-    return np.array(pictures), views
+    views = DenserViews(InMemory(values, FRAME), rule, threads=2, memory_limit=2**28)
+    return views.read(Block.all_of(rule.shape(values.shape))), views
 
 
 @pytest.mark.parametrize("disparity", [0.0, 0.7, -1.6, 3.0])

@@ -8,11 +8,11 @@ setting.
 
 from __future__ import annotations
 
-import importlib
 from typing import Any, cast
 
 import numpy as np
 
+from vcc.base import late
 from vcc.base.errors import InputError
 from vcc.plan.how import EngineName
 from vcc.plan.protocol import Engine
@@ -47,4 +47,4 @@ def chosen(name: EngineName | None, values: Any) -> EngineName:
 
 def engine(name: EngineName) -> Engine:
     """The engine of a name."""
-    return cast(Engine, importlib.import_module(ENGINES[name]))
+    return cast(Engine, late.module(ENGINES[name]))

@@ -1,11 +1,16 @@
-"""Looking up a grid between its points, for all compiled kernels."""
+"""Looking up a grid between its points, for all compiled kernels.
+
+Inlined before compiling: an array that is handed on has its references counted, by all threads at once.
+"""
 
 from __future__ import annotations
 
 from numba import njit
 
+_inlined = njit(nogil=True, inline="always", error_model="numpy")
 
-@njit(nogil=True, inline="always")
+
+@_inlined
 def around(place, size):  # type: ignore[no-untyped-def]
     """(first point, next point, way from the one to the other) of a place on points 0 … size − 1; ends go on."""
     place = min(max(place, 0.0), size - 1.0)
@@ -13,9 +18,24 @@ def around(place, size):  # type: ignore[no-untyped-def]
     return first, min(first + 1, size - 1), place - first
 
 
-@njit(nogil=True, inline="always")
+@_inlined
 def bilinear(above, above_next, below, below_next, right, down):  # type: ignore[no-untyped-def]
     """What lies between four points, 0 … 1 of the way to the right and down."""
     upper = above * (1 - right) + above_next * right
     lower = below * (1 - right) + below_next * right
     return upper * (1 - down) + lower * down
+
+
+@_inlined
+def _held(place, size):  # type: ignore[no-untyped-def]
+    """1 between the ends, falling to 0 one step beyond them."""
+    return max(min(place + 1.0, size - place, 1.0), 0.0)
+
+
+@_inlined
+def dark_outside(values, row, column):  # type: ignore[no-untyped-def]
+    """An array (rows, columns) at a place between its points, with zeros around it."""
+    r, r_next, down = around(row, values.shape[0])
+    c, c_next, right = around(column, values.shape[1])
+    value = bilinear(values[r, c], values[r, c_next], values[r_next, c], values[r_next, c_next], right, down)
+    return value * _held(row, values.shape[0]) * _held(column, values.shape[1])

@@ -13,6 +13,8 @@ import math
 import numba
 import numpy as np
 
+from vcc.engines.bilinear import around, bilinear
+
 _compiled = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract", "nsz"})
 
 TILE = 8
@@ -30,21 +32,15 @@ HALVINGS = 6
 @_compiled
 def _surface(nearness, x, y, tear):  # type: ignore[no-untyped-def]
     """A map between its pixels: linear, but the nearest pixel's where it tears; ends go on."""
-    rows, columns = nearness.shape
-    x = min(max(x, 0.0), columns - 1.0)
-    y = min(max(y, 0.0), rows - 1.0)
-    c = min(int(x), max(columns - 2, 0))
-    r = min(int(y), max(rows - 2, 0))
-    d = min(c + 1, columns - 1)
-    q = min(r + 1, rows - 1)
+    c, d, fx = around(x, nearness.shape[1])
+    r, q, fy = around(y, nearness.shape[0])
     p00, p01, p10, p11 = nearness[r, c], nearness[r, d], nearness[q, c], nearness[q, d]
-    fx, fy = x - c, y - r
     if max(max(p00, p01), max(p10, p11)) - min(min(p00, p01), min(p10, p11)) > tear:
         # Half way between two pixels the nearer surface, so that mirrored maps are met alike.
         upper = p00 if fx < 0.5 - TIE else (p01 if fx > 0.5 + TIE else max(p00, p01))
         lower = p10 if fx < 0.5 - TIE else (p11 if fx > 0.5 + TIE else max(p10, p11))
         return upper if fy < 0.5 - TIE else (lower if fy > 0.5 + TIE else max(upper, lower))
-    return (p00 * (1 - fx) + p01 * fx) * (1 - fy) + (p10 * (1 - fx) + p11 * fx) * fy
+    return bilinear(p00, p01, p10, p11, fx, fy)
 
 
 @_compiled
@@ -91,13 +87,12 @@ def _add_colour(view, x, y, weight, out):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def _add_colour_beside_tear(view, nearness, x, y, here, tear, weight, out):  # type: ignore[no-untyped-def]
-    """`_add_colour` where nearer surfaces may be close: their pixels do not count."""
+def _add_colour_beside_tear(view, nearness, x, y, nearer, weight, out):  # type: ignore[no-untyped-def]
+    """`_add_colour` where other surfaces may be close: pixels nearer than ``nearer`` do not count."""
     rows, columns, channels = view.shape
     x = min(max(x, 0.0), columns - 1.0)
     y = min(max(y, 0.0), rows - 1.0)
     c, r = int(x), int(y)
-    nearer = here + SAME_SURFACE * tear
     alone = True
     for row in range(max(r - 1, 0), min(r + 3, rows)):
         for column in range(max(c - 1, 0), min(c + 3, columns)):
@@ -125,40 +120,41 @@ def _add_colour_beside_tear(view, nearness, x, y, here, tear, weight, out):  # t
 
 
 @_compiled
-def _beyond(nearness, k, l, w, way, tear):  # type: ignore[no-untyped-def]
-    """How much nearer than w a map is where a march that has come to w is."""
-    x, y = _place(k, l, w, way)
-    return _surface(nearness, x, y, tear) - w
+def _beyond(nearness, march, k, l, w):  # type: ignore[no-untyped-def]
+    """How much nearer than w a map is where a march from (k, l) that has come to w is."""
+    x, y = _place(march.way, k, l, w)
+    return _surface(nearness, x, y, march.tear) - w
 
 
 @_compiled
-def _place(k, l, w, way):  # type: ignore[no-untyped-def]
-    """Where what is seen at (k, l) and has the nearness w is in a view; ``way`` as of `look_from_between`."""
-    columns_before, rows_before, sign, n0, n1, m0, m1 = way
-    d = sign * w
-    return k + d * columns_before, l + (n0 + n1 * d) / (m0 + m1 * d) * rows_before
+def _place(way, k, l, w):  # type: ignore[no-untyped-def]
+    """Where what is seen at (k, l) and has the nearness w is in a view; way: `Way`."""
+    n0, n1, m0, m1 = way.along_v
+    d = way.sign * w
+    return k + d * way.columns, l + (n0 + n1 * d) / (m0 + m1 * d) * way.rows
 
 
 @_compiled
-def _march(nearness, k, l, low, high, reach, way, tear):  # type: ignore[no-untyped-def]
+def _march(nearness, march, k, l, low, high):  # type: ignore[no-untyped-def]
     """(whether a surface is met, how far the march came, the nearness of what is there, and beyond a tear).
 
-    At a tear no surface is met: the march stops on its far side, short of its near side.
+    The march from pixel (k, l) goes from the nearness ``high`` down to ``low``; march: `March`. At a tear no
+    surface is met: the march stops on its far side, short of its near side.
     """
-    if high - low < tear:
+    if high - low < march.tear:
         # One smooth surface is met once, and going where it would be if it were even leads there.
         w = 0.5 * (high + low)
-        w += _beyond(nearness, k, l, w, way, tear)
-        w += _beyond(nearness, k, l, w, way, tear)
+        w += _beyond(nearness, march, k, l, w)
+        w += _beyond(nearness, march, k, l, w)
         return True, w, w, w
-    f0 = _beyond(nearness, k, l, high, way, tear)
+    f0 = _beyond(nearness, march, k, l, high)
     if f0 >= 0:
         return True, high, high, high
-    steps = max(1, math.ceil((high - low) * reach))
+    steps = max(1, math.ceil((high - low) * march.reach))
     w0, w1, f1 = high, high, f0
     for n in range(steps):
         w1 = high + (low - high) * (n + 1) / steps
-        f1 = _beyond(nearness, k, l, w1, way, tear)
+        f1 = _beyond(nearness, march, k, l, w1)
         if f1 >= 0:
             break
         if n < steps - 1:
@@ -168,7 +164,7 @@ def _march(nearness, k, l, low, high, reach, way, tear):  # type: ignore[no-unty
     # Between the two the map is met: soon where it is smooth, at a tear never.
     for n in range(2 + HALVINGS):
         w = w0 + (w1 - w0) * (f0 / (f0 - f1) if n < 2 else 0.5)
-        f = _beyond(nearness, k, l, w, way, tear)
+        f = _beyond(nearness, march, k, l, w)
         if abs(f) < MET:
             return True, w + f, w + f, w + f
         if f > 0:
@@ -179,22 +175,19 @@ def _march(nearness, k, l, low, high, reach, way, tear):  # type: ignore[no-unty
 
 
 @_compiled
-def look_from_between(  # type: ignore[no-untyped-def]
-    view, nearness, bounds, way, reach, tear, weight, torn_only, first, out, seen, far, near
-):
+def look_from_between(view, bounds, march, weight, torn_only, found):  # type: ignore[no-untyped-def]
     """Rows of the picture from a place between views, as one view shows them.
 
-    view: (t, s, channels). nearness: (t, s), sign · disparity, larger is nearer. bounds: (tiles, tiles, 2), the
-    lowest and highest nearness that marches from the pixels of a tile may meet, see `march_bounds`.
-    way: (columns, rows) that the view lies before the place, sign, and the four numbers by which disparities along
-    u are those along v, see `vcc.plan.depth_rule.Parallax`.
-    reach: pixels of the view, at most, that a march goes for each pixel per view of disparity.
-    tear: steps of nearness from pixel to pixel that are borders. weight: of what is added.
-    torn_only: only pixels of ``seen`` below 0 are looked for, and only what fits their far side, else all.
-    first: row of the picture of the first row of out. out: (rows, s, channels), is added to.
-    seen: (rows, s), 1 where the view shows what is there, else −1; with ``torn_only`` the weights of what is found
-    are taken from −1. far, near: (rows, s), the nearness met, or of tears that of both sides.
+    Args:
+        view: `View`.
+        bounds: (tiles, tiles, 2), what marches from the pixels of a tile may meet, see `march_bounds`.
+        march: `March`.
+        weight: of what is added where ``torn_only``; else 1.
+        torn_only: only pixels that have not been seen are looked for, and only what fits their far side.
+        found: `Found`, is filled, or with ``torn_only`` added to.
     """
+    samples, nearness, _ = view
+    first, out, seen, far, near = found
     rows, columns = nearness.shape
     for row in range(out.shape[0]):
         l = first + row
@@ -202,22 +195,23 @@ def look_from_between(  # type: ignore[no-untyped-def]
             if torn_only and seen[row, k] > 0:
                 continue
             low, high = bounds[l // TILE, k // TILE, 0], bounds[l // TILE, k // TILE, 1]
-            met, w, here, beyond = _march(nearness, k, l, low, high, reach, way, tear)
-            x, y = _place(k, l, w, way)
+            met, w, here, beyond = _march(nearness, march, k, l, low, high)
+            x, y = _place(march.way, k, l, w)
             shown = met and -0.5 <= x <= columns - 0.5 and -0.5 <= y <= rows - 0.5
+            nearer = here + SAME_SURFACE * march.tear
             if not torn_only:
                 far[row, k], near[row, k] = here, beyond
                 seen[row, k] = 1 if shown else -1
-                if high - low < tear:
-                    _add_colour(view, x, y, np.float32(1), out[row, k])
+                if high - low < march.tear:
+                    _add_colour(samples, x, y, np.float32(1), out[row, k])
                 else:
-                    _add_colour_beside_tear(view, nearness, x, y, here, tear, np.float32(1), out[row, k])
+                    _add_colour_beside_tear(samples, nearness, x, y, nearer, np.float32(1), out[row, k])
             # Of what other views show, that which lies on the far side of the tear.
             elif shown and abs(here - far[row, k]) <= abs(here - near[row, k]):
                 if seen[row, k] == -1:
                     out[row, k, :] = 0
                 seen[row, k] -= weight
-                _add_colour_beside_tear(view, nearness, x, y, here, tear, np.float32(weight), out[row, k])
+                _add_colour_beside_tear(samples, nearness, x, y, nearer, np.float32(weight), out[row, k])
 
 
 @_compiled
@@ -239,7 +233,7 @@ def tile_ranges(nearness):  # type: ignore[no-untyped-def]
 
 @_compiled
 def march_bounds(ranges, way):  # type: ignore[no-untyped-def]
-    """The lowest and highest nearness that marches from the pixels of each tile may meet; shape of ``ranges``."""
+    """The lowest and highest nearness that marches from the pixels of each tile may meet, like ``ranges``."""
     down, across, _ = ranges.shape
     bounds = np.empty_like(ranges)
     lowest, highest = ranges[:, :, 0].min(), ranges[:, :, 1].max()
@@ -247,7 +241,7 @@ def march_bounds(ranges, way):  # type: ignore[no-untyped-def]
         for c in range(across):
             low, high = lowest, highest
             for _ in range(2):  # what they may meet bounds how far they go
-                (xa, ya), (xb, yb) = _place(0, 0, low, way), _place(0, 0, high, way)
+                (xa, ya), (xb, yb) = _place(way, 0, 0, low), _place(way, 0, 0, high)
                 x0, x1, y0, y1 = min(xa, xb), max(xa, xb), min(ya, yb), max(ya, yb)
                 first_c = min(max(math.floor(c + x0 / TILE), 0), across - 1)
                 last_c = min(max(math.floor(c + 1 + x1 / TILE), 0), across - 1)

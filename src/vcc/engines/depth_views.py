@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.engines.depth_kernels import look_from_between, march_bounds, share_out, tile_ranges
+from vcc.engines import depth_kernels as kernels
+from vcc.engines.depth_tables import Found, March, View, Way
 from vcc.fields.grid import Block, Grid
 from vcc.fields.samples import Samples
 from vcc.plan.depth_rule import ViewsBetween
@@ -40,12 +41,12 @@ HELD = 0.25
 class _Held:
     """The last few of what takes time to make, within some bytes."""
 
-    def __init__(self, make: Callable[[int, int], tuple[NDArray[Any], ...]], limit: float) -> None:
+    def __init__(self, make: Callable[[int, int], View], limit: float) -> None:
         self._make, self._limit = make, limit
-        self._there: OrderedDict[tuple[int, int], tuple[NDArray[Any], ...]] = OrderedDict()
+        self._there: OrderedDict[tuple[int, int], View] = OrderedDict()
         self._bytes = 0
 
-    def __call__(self, row: int, column: int) -> tuple[NDArray[Any], ...]:
+    def __call__(self, row: int, column: int) -> View:
         key = (row, column)
         if key in self._there:
             self._there.move_to_end(key)
@@ -109,9 +110,9 @@ class DenserViews:
         y, x = (row % down + 0.5) / down - 0.5, (column % across + 0.5) / across - 0.5
         channels = self._given[4:]
         scale = np.float32(1 / self._between.full_scale)
-        view, nearness, ranges = self._views(j, i)
+        view = self._views(j, i)
         if x == 0 and y == 0:
-            return np.asarray(view[first:stop].reshape(stop - first, -1, *channels) * scale, np.float32)
+            return np.asarray(view.samples[first:stop].reshape(stop - first, -1, *channels) * scale, np.float32)
         others = [
             (j + b, i + a, (1 - abs(y - b)) * (1 - abs(x - a)))
             for b in {0, int(np.sign(y))}
@@ -119,7 +120,7 @@ class DenserViews:
             if (a or b) and 0 <= j + b < self._given[0] and 0 <= i + a < self._given[1]
         ]
         picture, unseen = self._looked_from(
-            (view, nearness, ranges),
+            view,
             (y, x),
             (
                 (self._views(row, column), (y - (row - j), x - (column - i)), weight)
@@ -133,13 +134,12 @@ class DenserViews:
         picture *= scale
         return picture.reshape(stop - first, -1, *channels)
 
-    def _read(self, row: int, column: int) -> tuple[NDArray[Any], ...]:
-        """A view (t, s, channels), its nearness (t, s) and the nearness's ranges."""
+    def _read(self, row: int, column: int) -> View:
         whole = Block.all_of(self._given)
         view = self._source.read(replace(whole, rows=(row, row + 1), columns=(column, column + 1)))[0, 0]
         view = np.ascontiguousarray(view, dtype=np.float32 if view.dtype == np.float16 else view.dtype)
         nearness = self._nearness(row, column)
-        return view.reshape(*view.shape[:2], -1), nearness, tile_ranges(nearness)
+        return _seen_as(view.reshape(*view.shape[:2], -1), nearness)
 
     def _nearness(self, row: int, column: int) -> Array:
         """sign · disparity of a view: its own map's, or what the nearest map shows from there."""
@@ -150,49 +150,49 @@ class DenserViews:
         nearest = int(np.argmin(np.abs(places - (row, column)).sum(axis=1)))
         known = np.ascontiguousarray(sign * maps.values[nearest])
         away = (row - places[nearest, 0], column - places[nearest, 1])
-        shown, _ = self._looked_from((known[..., None], known, tile_ranges(known)), away, (), 0, len(known))
+        shown, _ = self._looked_from(_seen_as(known[..., None], known), away, (), 0, len(known))
         return shown[..., 0]
 
     def _looked_from(
-        self, view: tuple[NDArray[Any], ...], away: tuple[float, float], others: Any, first: int, stop: int
+        self, view: View, away: tuple[float, float], others: Any, first: int, stop: int
     ) -> tuple[Array, int]:
         """The picture (rows, s, channels) from a place (down, across) views away, and how many pixels are unseen.
 
         ``others``: more views, as far away as they are, and weights, for what the first one does not show.
         """
-        samples = view[0]
-        out = np.zeros((stop - first, *samples.shape[1:]), dtype=np.float32)
-        seen, far, near = np.empty((3, *out.shape[:2]), dtype=np.float32)
+        out = np.zeros((stop - first, *view.samples.shape[1:]), dtype=np.float32)
+        found = Found(first, out, *np.empty((3, *out.shape[:2]), dtype=np.float32))
         with ThreadPoolExecutor(self._threads) as pool:
-            self._look(pool, view, away, 1.0, False, first, (out, seen, far, near))
-            if (seen < 0).any():
+            self._look(pool, view, away, 1.0, False, found)
+            if (found.seen < 0).any():
                 for other, distance, weight in others:
-                    self._look(pool, other, distance, weight, True, first, (out, seen, far, near))
-        return out, int(share_out(out, seen))
+                    self._look(pool, other, distance, weight, True, found)
+        return out, int(kernels.share_out(out, found.seen))
 
     def _look(
         self,
         pool: ThreadPoolExecutor,
-        view: tuple[NDArray[Any], ...],
+        view: View,
         away: tuple[float, float],
         weight: float,
         torn_only: bool,
-        first: int,
-        into: tuple[Array, ...],
+        found: Found,
     ) -> None:
-        samples, nearness, ranges = view
-        parallax = self._between.parallax
+        parallax, nearness = self._between.parallax, view.nearness
         down, across = away
-        way = (float(across), float(down), parallax.sign, *parallax.along_v)
-        bounds = march_bounds(ranges, way)
+        way = Way(float(across), float(down), parallax.sign, parallax.along_v)
+        bounds = kernels.march_bounds(view.ranges, way)
         ends = np.linspace(parallax.sign * float(nearness.min()), parallax.sign * float(nearness.max()), 17)
         steps = np.abs(np.diff(parallax.down(ends))).max() / max(np.abs(np.diff(ends)).max(), 1e-30)
-        reach = max(abs(across), abs(down) * float(steps))
+        march = March(way, max(abs(across), abs(down) * float(steps)), TEAR)
 
         def band(start: int) -> None:
-            parts = [part[start : start + BAND] for part in into]
-            look_from_between(
-                samples, nearness, bounds, way, reach, TEAR, weight, torn_only, first + start, *parts
-            )
+            rows = (part[start : start + BAND] for part in found[1:])
+            kernels.look_from_between(view, bounds, march, weight, torn_only, Found(found.first + start, *rows))
 
-        list(pool.map(band, range(0, len(into[0]), BAND)))
+        list(pool.map(band, range(0, len(found.out), BAND)))
+
+
+def _seen_as(samples: NDArray[Any], nearness: Array) -> View:
+    """A view (t, s, channels) of which the nearness (t, s) is known."""
+    return View(samples, nearness, kernels.tile_ranges(nearness))

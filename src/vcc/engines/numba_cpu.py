@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import rays_compiled, sharpening_kernels
 from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
@@ -95,14 +95,10 @@ def _in_one_pass(
     picture = np.empty((rows, columns * channels), dtype=np.float32)
     transmission = np.zeros((0, 0)) if on.transmission is None else on.transmission
     weights = along.down.astype(np.float32), along.across.astype(np.float32)
+    filtering = tables.Finish(*weights, channels, on.guard, transmission)
     lines = raster.reshape(raster.shape[0], -1)
-
-    def filtered(start: int) -> None:
-        stop = min(start + BAND, rows)
-        kernels.filter_rows(lines, *weights, channels, on.guard, transmission, start, stop, picture)
-
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(filtered, range(0, rows, BAND)))
+        list(pool.map(lambda band: kernels.filter_rows(lines, filtering, band, picture), _bands(rows)))
     return picture.reshape(rows, columns, channels)
 
 
@@ -120,28 +116,14 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
     return threads * thread + 2 * raster + masks
 
 
+def _bands(rows: int, height: int = BAND) -> list[tables.Band]:
+    """The picture's rows in bands so high."""
+    return [tables.Band(start, min(start + height, rows)) for start in range(0, rows, height)]
+
+
 def _band(line: int) -> int:
     """How many rows of the picture make a band whose lines of sums take so many bytes: a multiple of eight."""
     return int(np.clip(BAND_BYTES // line, EIGHT, BAND)) // EIGHT * EIGHT
-
-
-@dataclass(frozen=True)
-class _Block:
-    """Samples that lie in memory row by row, and the columns of view taps that read them.
-
-    Args:
-        samples: flat.
-        begin: where in them each row of taps begins.
-        column_begin: how much further on each column of taps begins.
-        pitch: sample values from one row of samples to the next.
-        columns: (first, end) of the columns of taps.
-    """
-
-    samples: NDArray[Any]
-    begin: NDArray[np.int64]
-    column_begin: NDArray[np.int64]
-    pitch: int
-    columns: tuple[int, int]
 
 
 class _FineGrid:
@@ -152,14 +134,18 @@ class _FineGrid:
         self.rows, self.columns = core.samples
         self.first_row = self.first_column = 0.0
         self.divided_as: tuple[Division, Division] | None = None
-        self.tables: tuple[NDArray[Any], ...] = ()
         if core.refine > 1:
             down, across = (core.division(n) for n in core.samples)
             self.rows, self.columns = len(down.first), len(across.first)
             self.first_row, self.first_column = down.start, across.start
             self.divided_as = down, across
-            shares = (part.shares.astype(np.float32) for part in (down, across))
-            self.tables = (down.first, next(shares), across.first, next(shares))
+
+    def tables(self, pitch: int) -> tables.FineSamples:
+        """How kernels divide samples, into rows of so many values."""
+        assert self.divided_as is not None
+        down, across = self.divided_as
+        shares = down.shares.astype(np.float32), across.shares.astype(np.float32)
+        return tables.FineSamples(down.first, shares[0], across.first, shares[1], pitch)
 
     @cached_property
     def matrices(self) -> tuple[NDArray[np.float64], ...]:
@@ -176,8 +162,13 @@ class _FineGrid:
         return np.ascontiguousarray(fine, dtype=np.float32)
 
 
-def _blocks(core: Footprints, values: NDArray[Any], by_column: bool) -> Iterator[_Block]:
-    """The samples in pieces that kernels can read, without ever copying more than a column of views."""
+def _blocks(
+    core: Footprints, values: NDArray[Any], by_column: bool
+) -> Iterator[tuple[tables.Samples, tuple[int, int]]]:
+    """The samples in pieces that kernels can read, without ever copying more than a column of views.
+
+    With each, (first, end) of the columns of view taps that read it.
+    """
     nv, nu, nt, ns = values.shape[:4]
     channels = values.shape[4] if values.ndim == 5 else 1
     taps = len(core.view_columns)
@@ -185,9 +176,9 @@ def _blocks(core: Footprints, values: NDArray[Any], by_column: bool) -> Iterator
     if values.flags.c_contiguous and values.dtype != np.float16 and n >= SHORTEST:
         view = nt * n
         flat = values.reshape(-1)
-        begin, column_begin = core.view_rows * (nu * view), core.view_columns * view
+        samples = tables.Samples(flat, core.view_rows * (nu * view), core.view_columns * view, n, channels)
         for a in range(taps) if by_column else (0,):
-            yield _Block(flat, begin, column_begin, n, (a, a + 1) if by_column else (0, taps))
+            yield samples, (a, a + 1) if by_column else (0, taps)
         return
     kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
     missing = max(math.ceil(SHORTEST / channels) - ns, 0)
@@ -198,7 +189,7 @@ def _blocks(core: Footprints, values: NDArray[Any], by_column: bool) -> Iterator
         column = np.ascontiguousarray(column, dtype=kind).reshape(nv, nt, -1)
         pitch = column.shape[2]
         begin, none = core.view_rows * (nt * pitch), np.zeros(taps, dtype=np.int64)
-        yield _Block(column.reshape(-1), begin, none, pitch, (a, a + 1))
+        yield tables.Samples(column.reshape(-1), begin, none, pitch, channels), (a, a + 1)
 
 
 class _ByColumns:
@@ -211,16 +202,20 @@ class _ByColumns:
         start_y = core.y[:, 0] + core.row_step * fine.first_row
         start_x = core.x[0] + core.column_step * fine.first_column
         row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
-        self.down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
-        self.across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
+        down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
+        across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
         # How many rows of samples four rows of the raster gather, and how many the next four need anew.
-        ends = np.pad(self.down.first, [(0, 0), (0, -rows % ROWS)], mode="edge").reshape(len(start_y), -1, ROWS)
-        self.reach = int(np.ptp(ends, axis=2).max(initial=0)) + self.down.weights.shape[2]
-        self.advance = min(math.ceil(ROWS / abs(row_step)), self.reach)
+        ends = np.pad(down.first, [(0, 0), (0, -rows % ROWS)], mode="edge").reshape(len(start_y), -1, ROWS)
+        reach = int(np.ptp(ends, axis=2).max(initial=0)) + down.weights.shape[2]
+        advance = min(math.ceil(ROWS / abs(row_step)), reach) if core.refine == 1 else 0
         self.mirrored = column_step < 0
         if self.mirrored:
-            self.across = self.across.mirrored()
-        self.weights = (core.weights * core.scale).astype(np.float32)
+            across = across.mirrored()
+        self.footprints = tables.Footprints(
+            (core.weights * core.scale).astype(np.float32),
+            tables.Rows(down.first, down.weights, reach, advance),
+            tables.Columns(across.first, across.weights),
+        )
         # A mask's weight counts for all channels of a sample: for three of them as it is looked up, for other
         # numbers by being repeated.
         self.shared, self.repeated = (3, 1) if channels == 3 else (1, channels)
@@ -233,48 +228,45 @@ class _ByColumns:
         core, fine, done = self.core, self.fine, 0
         rows, columns = core.raster_shape
         tiles = np.zeros((-(-rows // EIGHT), columns * self.channels, EIGHT), dtype=np.float32)
-        for block in _blocks(core, values, bool(core.masks) or core.refine > 1 or progress is not None):
-            first, end = block.columns
-            if not self.weights[:, first:end].any():
+        # Values in a row of samples: as many as kernels add at once, at least.
+        pitch = max(fine.columns, -(-SHORTEST // self.channels)) * self.channels
+        divided = fine.tables(pitch) if core.refine > 1 else None
+        weights = self.footprints.weights
+        for samples, taken in _blocks(core, values, bool(core.masks) or core.refine > 1 or progress is not None):
+            used = int(np.count_nonzero(weights[:, slice(*taken)]))
+            if used == 0:
                 continue
-            pitch = max(fine.columns, -(-SHORTEST // self.channels)) * self.channels
-            add = partial(self.add, block, pitch, self.mask_columns(first, pitch), tiles)
-            list(self.pool.map(add, range(0, rows, _band(4 * pitch))))
+            add = partial(self.add, samples, taken, divided, self.mask_columns(taken[0], pitch), tiles)
+            list(self.pool.map(add, _bands(rows, _band(4 * pitch))))
             if progress is not None:
-                done += int(np.count_nonzero(self.weights[:, first:end]))
+                done += used
                 progress(done, core.taps_used)
         raster = np.empty((rows, columns * self.channels), dtype=np.float32)
 
-        def untiled(start: int) -> None:
-            stop = min(start + BAND, rows)
+        def untiled(band: tables.Band) -> None:
             # A real image runs against its samples: the raster is then in mirror writing.
-            kernels.raster_of(tiles, self.channels, self.mirrored, start, stop, raster)
+            kernels.raster_of(tiles, self.channels, self.mirrored, band, raster)
 
-        list(self.pool.map(untiled, range(0, rows, BAND)))
+        list(self.pool.map(untiled, _bands(rows)))
         return raster
 
     def add(
-        self, block: _Block, pitch: int, masks: tuple[Any, ...] | None, tiles: NDArray[np.float32], start: int
+        self,
+        samples: tables.Samples,
+        columns: tuple[int, int],
+        divided: tables.FineSamples | None,
+        masks: tables.MaskLines | None,
+        tiles: NDArray[np.float32],
+        band: tables.Band,
     ) -> None:
-        """Add one block's samples to the band of raster rows that begins at ``start``."""
-        stop = min(start + _band(4 * pitch), self.core.raster_shape[0])
-        first, end = block.columns
-        rows = self.down.first, self.down.weights, self.reach, self.advance
-        across = self.across.first, self.across.weights
-        if self.core.refine > 1:
-            for a in range(first, end):
-                begin = block.begin + block.column_begin[a]
-                kernels.add_divided_column(
-                    block.samples, begin, block.pitch, pitch, self.weights[:, a], *rows, self.fine.tables, masks,
-                    self.shared, across[0][a], across[1][a], self.channels, start, stop, tiles,
-                )  # fmt: skip
-        else:
-            kernels.add_columns(
-                block.samples, block.begin, block.column_begin, first, end, pitch, self.weights, *rows, masks,
-                self.shared, *across, self.channels, start, stop, tiles,
-            )  # fmt: skip
+        """Add columns of view taps to a band of raster rows."""
+        if divided is None:
+            kernels.add_columns(samples, columns, self.footprints, masks, band, tiles)
+            return
+        for a in range(*columns):
+            kernels.add_divided_column(samples, a, self.footprints, divided, masks, band, tiles)
 
-    def mask_columns(self, a: int, pitch: int) -> tuple[Any, ...] | None:
+    def mask_columns(self, a: int, pitch: int) -> tables.MaskLines | None:
         """The masks' lines that taps of column ``a`` look up, at the columns of their samples; see the kernels.
 
         Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: each group of taps
@@ -283,7 +275,7 @@ class _ByColumns:
         core, fine = self.core, self.fine
         if not core.masks:
             return None
-        used = np.flatnonzero(self.weights[:, a])
+        used = np.flatnonzero(self.footprints.weights[:, a])
         begin = np.zeros((len(core.masks), len(core.view_rows)), dtype=np.int64)
         row = np.zeros(begin.shape)
         total = 0
@@ -315,7 +307,7 @@ class _ByColumns:
             kernels.sample_mask_columns(texture, columns, self.repeated, self.lines[to : to + len(texture)])
 
         list(self.pool.map(sample, pieces))
-        return self.lines, begin, self.mask_rows, row, self.mask_row_step
+        return tables.MaskLines(self.lines, begin, self.mask_rows, row, self.mask_row_step, self.shared)
 
 
 def _sheared(
@@ -324,29 +316,34 @@ def _sheared(
     """The raster (rows, columns × channels) where rows and columns do not part."""
     raster = np.zeros((*core.raster_shape, channels), dtype=np.float32)
     fine = _FineGrid(core)
+    grid = tables.Grid(
+        core.step,
+        core.shear,
+        core.row_step,
+        core.column_step,
+        core.refine,
+        fine.first_column,
+        fine.first_row,
+    )
+    footprint = tables.Footprint(list(REACH).index(core.interpolation), REACH[core.interpolation], core.opening)
+    masks = _textures(core)
+    for done, (b, a) in enumerate(zip(*np.nonzero(core.weights), strict=True)):
+        if progress is not None:
+            progress(done, core.taps_used)
+        place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
+        samples = fine.divided(values[core.view_rows[b], core.view_columns[a]].reshape(*core.samples, -1))
+        view = tables.View(samples, core.weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
+        add = partial(kernels.sheared_view, view, grid, footprint, masks)
+        list(pool.map(lambda band, add=add: add(band, raster), _bands(len(raster))))
+    if progress is not None:
+        progress(core.taps_used, core.taps_used)
+    return raster.reshape(len(raster), -1)
+
+
+def _textures(core: Footprints) -> tables.Textures:
+    """The masks' textures in one array."""
     size = np.array([mask.texture.shape for mask in core.masks], dtype=np.int64).reshape(-1, 2)
     textures = np.zeros((len(core.masks), *size.max(axis=0, initial=1)), dtype=np.float32)
     for texture, mask in zip(textures, core.masks, strict=True):
         texture[: mask.texture.shape[0], : mask.texture.shape[1]] = mask.texture
-    mask_step = np.array([mask.step for mask in core.masks]).reshape(-1, 2, 2)
-    row_step, column_step = core.row_step, core.column_step
-    code = list(REACH).index(core.interpolation)
-    for done, (b, a) in enumerate(zip(*np.nonzero(core.weights), strict=True)):
-        if progress is not None:
-            progress(done, core.taps_used)
-        view = fine.divided(values[core.view_rows[b], core.view_columns[a]].reshape(*core.samples, -1))
-        place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
-
-        def band(start: int, view=view, place=place, b=b, a=a) -> None:  # type: ignore[no-untyped-def]
-            kernels.sheared_view(
-                view, core.weights[b, a] * core.scale, code, REACH[core.interpolation],
-                core.x[b, a], core.y[b, a], core.step, core.shear, row_step, column_step,
-                row_step / core.refine, column_step / core.refine, fine.first_column, fine.first_row,
-                core.refine, textures, size, place, mask_step, start, min(start + BAND, len(raster)), core.opening,
-                raster,
-            )  # fmt: skip
-
-        list(pool.map(band, range(0, len(raster), BAND)))
-    if progress is not None:
-        progress(core.taps_used, core.taps_used)
-    return raster.reshape(len(raster), -1)
+    return tables.Textures(textures, size, np.array([mask.step for mask in core.masks]).reshape(-1, 2, 2))

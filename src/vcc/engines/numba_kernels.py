@@ -9,6 +9,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from vcc.engines.bilinear import dark_outside
+from vcc.engines.footprint_tables import Entries, EntryMasks, Lines
 from vcc.engines.vector_sums import (
     EIGHT,
     ROWS,
@@ -31,55 +33,54 @@ _inlined = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy
 
 
 @_compiled
-def sum_rows(  # type: ignore[no-untyped-def]
-    samples, begin, pitch, used, weights, first, shares, reach, advance, jump, start, stop, masks, repeat, sums,
-):  # fmt: skip
-    """sums[y − start] += the rows of all views of one column that fall on raster row y, times their masks.
+def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore[no-untyped-def]
+    """sums[y − band.start] += the rows of all views of one column that fall on raster row y, times their masks.
 
-    samples: flat; row l of tap b is samples[begin[b] + l · pitch : … + pitch]. used: the taps that are added;
-    weights: (taps,); first: (taps, rows), shares: (taps, rows, width), the rows of samples that a raster row
-    gathers. reach: the most rows of samples that four raster rows gather. masks: see `_masks_at`, or None. repeat:
-    3 where a weight of a mask counts for three channels, else 1.
+    lines: `Lines`. used: the taps that are added; weights: (taps,). gathered: `Rows`. masks: `MaskLines`, or None.
 
     Four raster rows are summed at a time, so that each sample is converted and weighed once for all of them. The
     raster is walked along so that samples are read in the order in which they lie in memory (a real image runs
     against its samples), and what is needed next is asked for beforehand, since many short runs are more than a
-    processor foresees by itself. advance: rows of samples that the next four raster rows need anew; jump: from
-    here to the samples of the next column of views.
+    processor foresees by itself.
     """
-    width, count = shares.shape[2], 0
-    if masks is not None:  # told apart when compiled: without masks there is less to compile
-        count = masks[4].size
+    samples, begin, pitch, jump = lines
+    first, reach, advance = gathered.first, gathered.reach, gathered.advance
+    start, stop = band
     group = min(VIEWS, used.size)
     room = group * reach
+    repeat = 1
+    if masks is not None:  # told apart when compiled: without masks there is less to compile
+        repeat, count = masks.repeat, masks.row_step.size
+        weighed = EntryMasks(
+            masks.lines, np.empty((room, count, 2), np.int64), np.empty((room, count, 2), np.float32)
+        )
     order, places, ranges = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
     share = np.empty((room, ROWS), np.float32)
-    mask_places = np.empty((room, count, 2), np.int64)
-    mask_shares = np.empty((room, count, 2), np.float32)
     ends, highest, lowest = np.empty(10, np.int64), np.empty(reach, np.int64), np.empty(reach, np.int64)
     next_rows, first_rows = np.empty(group * max(advance, reach), np.int64), np.empty(group * reach, np.int64)
     per_line = 64 // samples.itemsize
-    run = RUN if masks is None or repeat == 1 else RUN_OF_THREES
+    run = RUN if repeat == 1 else RUN_OF_THREES
     tiles = (stop - start + ROWS - 1) // ROWS
+    entries = Entries(order, ends, places, share)
     for begin_group in range(0, used.size, group):
         views = used[begin_group : begin_group + group]
         downwards = first[views[0], stop - 1] >= first[views[0], start]
         first_count = 0
         for step in range(tiles):
             y = start + ROWS * (step if downwards else tiles - 1 - step)
-            entries, next_count = 0, 0
+            listed, next_count = 0, 0
             for b in views:
-                top, rows = _rows_of(b, y, stop, weights[b], first, shares, width, share, entries, lowest, highest)
+                top, rows = _rows_of(b, y, stop, weights[b], gathered, share, listed, lowest, highest)
                 for q in range(rows):
-                    entry, l = entries + q, top + q
+                    entry, l = listed + q, top + q
                     places[entry] = begin[b] + l * pitch
                     # Ranges are numbered 00 01 02 03 11 12 13 22 23 33; −1: nothing is added.
                     low = lowest[q]
                     ranges[entry] = -1 if low < 0 else low * ROWS - low * (low + 1) // 2 + highest[q]
                     if masks is not None:  # noqa: SIM102  (by itself, so that it can be told apart when compiled)
-                        if not _masks_at(masks, b, l, entry, mask_places, mask_shares):
+                        if not _masks_at(masks, b, l, entry, weighed):
                             ranges[entry] = -1
-                entries += rows
+                listed += rows
                 for l in range(top + rows, top + rows + advance):
                     next_rows[next_count] = begin[b] + l * pitch
                     next_count += 1
@@ -87,7 +88,7 @@ def sum_rows(  # type: ignore[no-untyped-def]
                     for l in range(top, top + rows):
                         first_rows[first_count] = begin[b] + l * pitch + jump
                         first_count += 1
-            _sort(ranges, entries, ends, order)
+            _sort(ranges, listed, ends, order)
             following, following_count = (next_rows, next_count) if step < tiles - 1 else (first_rows, first_count)
             for x in range(0, pitch, run):
                 for near in range((x + per_line - 1) // per_line * per_line, min(x + run, pitch), per_line):
@@ -95,26 +96,21 @@ def sum_rows(  # type: ignore[no-untyped-def]
                         fetch(samples, following[n] + near)
                 here = min(x, pitch - run)
                 if masks is None:
-                    add_rows(samples, order, places, share, ends, here, x - here, sums, y - start)
+                    add_rows(samples, entries, None, here, x - here, sums, y - start)
                 elif repeat == 3:
-                    add_masked_rows_of_threes(
-                        samples, order, places, share, ends, here, x - here, sums, y - start,
-                        masks[0], mask_places, mask_shares,
-                    )  # fmt: skip
+                    add_masked_rows_of_threes(samples, entries, weighed, here, x - here, sums, y - start)
                 else:
-                    add_masked_rows(
-                        samples, order, places, share, ends, here, x - here, sums, y - start,
-                        masks[0], mask_places, mask_shares,
-                    )  # fmt: skip
+                    add_masked_rows(samples, entries, weighed, here, x - here, sums, y - start)
 
 
 @_inlined
-def _rows_of(b, y, stop, weight, first, shares, width, share, entry, lowest, highest):  # type: ignore[no-untyped-def]
+def _rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # type: ignore[no-untyped-def]
     """List the rows of samples of tap b that fall on four raster rows from y on: the first, and how many.
 
     Row ``first + q`` counts ``share[entry + q]`` there, and reaches raster rows y + lowest[q] … y + highest[q];
     lowest[q] is −1 if it reaches none.
     """
+    first, shares = gathered.first, gathered.shares
     rows = min(ROWS, stop - y)
     top = first[b, y]
     for r in range(1, rows):
@@ -122,7 +118,7 @@ def _rows_of(b, y, stop, weight, first, shares, width, share, entry, lowest, hig
     count = 0
     lowest[:] = -1
     for r in range(rows):
-        for t in range(width):
+        for t in range(shares.shape[2]):
             if shares[b, y + r, t] != 0:
                 q = first[b, y + r] - top + t
                 if lowest[q] < 0:
@@ -135,14 +131,13 @@ def _rows_of(b, y, stop, weight, first, shares, width, share, entry, lowest, hig
 
 
 @_inlined
-def _masks_at(masks, b, l, entry, places, shares):  # type: ignore[no-untyped-def]
+def _masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
     """Look up the masks' lines above and below row l of the samples of tap b; False if it is dark there.
 
-    masks: (lines, begin, rows, row, row_step). lines: flat, masks' weights at the columns of the samples. begin:
-    (masks, taps), where in them a mask's row 0 begins, or would begin; rows: (masks,), how many a mask has, each
-    ``line`` long; row: (masks, taps), mask row of sample row 0; row_step: (masks,).
+    masks: `MaskLines`. weighed: `EntryMasks`, which is filled for the entry.
     """
-    lines, begin, rows, row, row_step = masks
+    lines, begin, rows, row, row_step, _ = masks
+    _, places, shares = weighed
     line = lines.shape[1]
     for mask in range(row_step.size):
         place = row[mask, b] + row_step[mask] * l
@@ -177,103 +172,101 @@ def _sort(ranges, entries, ends, order):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def add_columns(  # type: ignore[no-untyped-def]
-    samples, begin, column_begin, first, end, pitch, weights, first_row, row_shares, reach, advance, masks, repeat,
-    first_column, column_shares, channels, start, stop, tiles,
-):  # fmt: skip
-    """Add the columns of view taps ``first`` … ``end`` to raster rows start … stop, one after the other.
+def add_columns(samples, columns, footprints, masks, band, tiles):  # type: ignore[no-untyped-def]
+    """Add columns of view taps, one after the other, to the raster rows of a band.
 
-    samples: flat; row l of view tap (b, a) begins at begin[b] + column_begin[a] + l · pitch. weights: (rows of
-    taps, columns of taps); first_row: (rows of taps, raster rows), first_column: (columns of taps, raster
-    columns), shares with one axis more; tiles: the raster, (rows / 8, columns · channels, 8).
+    samples: `Samples`. columns: (first, end). footprints: `Footprints`. masks: `MaskLines`, or None. tiles: the
+    raster, (rows / 8, columns · channels, 8).
     """
-    sums, turned = _room(stop - start, pitch, column_shares.shape[2], channels)
-    for a in range(first, end):
+    weights, rows, (first_column, column_shares) = footprints
+    values, begin, further, pitch, channels = samples
+    sums, turned = _room(band, pitch, column_shares.shape[2], channels)
+    for a in range(columns[0], columns[1]):
         used = np.flatnonzero(weights[:, a])
         if used.size > 0:
             sums[:] = 0
-            jump = column_begin[a + 1] - column_begin[a] if a + 1 < column_begin.size else 0
-            sum_rows(
-                samples, begin + column_begin[a], pitch, used, weights[:, a], first_row, row_shares, reach,
-                advance, jump, start, stop, masks, repeat, sums,
-            )  # fmt: skip
-            mix_columns(sums, pitch, first_column[a], column_shares[a], channels, turned, tiles[start // EIGHT :])
+            jump = further[a + 1] - further[a] if a + 1 < further.size else 0
+            lines = Lines(values, begin + further[a], pitch, jump)
+            sum_rows(lines, used, weights[:, a], rows, masks, band, sums)
+            mix_columns(sums, first_column[a], column_shares[a], channels, turned, tiles[band.start // EIGHT :])
 
 
 @_compiled
-def add_divided_column(  # type: ignore[no-untyped-def]
-    samples, begin, sample_pitch, pitch, weights, first_row, row_shares, reach, advance, fine, masks, repeat,
-    first_column, column_shares, channels, start, stop, tiles,
-):  # fmt: skip
-    """As `add_columns` for one column of views, whose samples are divided into finer ones, view by view.
+def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # type: ignore[no-untyped-def]
+    """As `add_columns` for column a, whose samples are divided into finer ones, view by view; fine: `FineSamples`.
 
-    samples: flat; row l of tap b begins at begin[b] + l · sample_pitch. pitch: values of a row of finer samples;
-    fine: (first_row, row_shares, first_column, column_shares), by which they are made.
+    The rows that raster rows gather, and the masks, are those of the finer samples.
     """
-    fine_first_row, fine_row_shares, fine_first_column, fine_column_shares = fine
-    sums, turned = _room(stop - start, pitch, column_shares.shape[1], channels)
+    weights, rows, (first_column, column_shares) = footprints
+    begin, channels = samples.begin, samples.channels
+    sums, turned = _room(band, fine.pitch, column_shares.shape[2], channels)
     sums[:] = 0
-    source = np.zeros(sample_pitch + fine_column_shares.shape[1] * channels, np.float32)
-    rows = np.zeros((0, pitch), np.float32)
-    here = np.zeros(weights.size, np.int64)
-    for b in np.flatnonzero(weights):
-        low, high = fine_first_row.size, 0
-        for y in range(start, stop):
-            for t in range(row_shares.shape[2]):
-                if row_shares[b, y, t] != 0:
-                    low, high = min(low, first_row[b, y] + t), max(high, first_row[b, y] + t + 1)
+    divided = np.zeros((0, fine.pitch), np.float32)
+    here = np.zeros(begin.size, np.int64)
+    for b in np.flatnonzero(weights[:, a]):
+        low, high = _rows_needed(rows, b, band, fine.first_row.size)
         if high <= low:
             continue
-        if high - low > len(rows):
-            rows = np.zeros((high - low, pitch), np.float32)
-        for l in range(low, high):
-            _divided_row(
-                samples, begin[b] + fine_first_row[l] * sample_pitch, sample_pitch, fine_row_shares[l],
-                fine_first_column, fine_column_shares, channels, source, rows[l - low],
-            )  # fmt: skip
-        here[b] = -low * pitch
-        sum_rows(
-            rows.reshape(-1), here, pitch, np.array([b]), weights, first_row, row_shares, reach, advance, 0, start,
-            stop, masks, repeat, sums,
-        )  # fmt: skip
-    mix_columns(sums, pitch, first_column, column_shares, channels, turned, tiles[start // EIGHT :])
+        if high - low > len(divided):
+            divided = np.zeros((high - low, fine.pitch), np.float32)
+        _divide(samples, begin[b] + samples.further[a], fine, low, high, divided)
+        here[b] = -low * fine.pitch
+        lines = Lines(divided.reshape(-1), here, fine.pitch, 0)
+        sum_rows(lines, np.array([b]), weights[:, a], rows, masks, band, sums)
+    mix_columns(sums, first_column[a], column_shares[a], channels, turned, tiles[band.start // EIGHT :])
 
 
 @_inlined
-def _room(rows, pitch, width, channels):  # type: ignore[no-untyped-def]
+def _rows_needed(gathered, b, band, low):  # type: ignore[no-untyped-def]
+    """(first, after the last) of the rows of samples of tap b that fall on a band; first is ``low`` for none."""
+    first, shares, high = gathered.first, gathered.shares, 0
+    for y in range(band.start, band.stop):
+        for t in range(shares.shape[2]):
+            if shares[b, y, t] != 0:
+                low, high = min(low, first[b, y] + t), max(high, first[b, y] + t + 1)
+    return low, high
+
+
+@_inlined
+def _room(band, pitch, width, channels):  # type: ignore[no-untyped-def]
     """Sums of a band's rows, to be set to zero, and eight of them turned, with zeros beyond the last sample."""
+    rows = band.stop - band.start
     sums = np.empty(((rows + EIGHT - 1) // EIGHT * EIGHT, pitch), np.float32)
     return sums, np.zeros(((pitch + width * channels) * EIGHT), np.float32)
 
 
 @_compiled
-def _divided_row(  # type: ignore[no-untyped-def]
-    samples, begin, pitch, row_shares, first_column, column_shares, channels, source, fine
-):
-    """fine = one row of finer samples; source is room for a row of the samples, zero beyond the last."""
-    source[:pitch] = 0
-    for t in range(row_shares.size):
-        if row_shares[t] != 0:
-            line = samples[begin + t * pitch : begin + (t + 1) * pitch]
-            for x in range(pitch):
-                source[x] += row_shares[t] * np.float32(line[x])
-    for k in range(first_column.size):
-        at = np.uint64(first_column[k] * channels)
-        if channels == 3:
-            red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-            for t in range(column_shares.shape[1]):
-                share = column_shares[k, t]
-                red += share * source[at]
-                green += share * source[at + np.uint64(1)]
-                blue += share * source[at + np.uint64(2)]
-                at += np.uint64(3)
-            fine[3 * k], fine[3 * k + 1], fine[3 * k + 2] = red, green, blue
-        else:
-            for c in range(channels):
-                total = np.float32(0)
+def _divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untyped-def]
+    """divided[l − low] = row l of a view's finer samples, from ``low`` to before ``high``; begin: of the view."""
+    values, _, _, pitch, channels = samples
+    first_row, row_shares, first_column, column_shares, _ = fine
+    source = np.zeros(pitch + column_shares.shape[1] * channels, np.float32)  # and zero beyond a row's last sample
+    for l in range(low, high):
+        source[:pitch] = 0
+        for t in range(row_shares.shape[1]):
+            if row_shares[l, t] != 0:
+                start = begin + (first_row[l] + t) * pitch
+                line, share = values[start : start + pitch], row_shares[l, t]
+                for x in range(pitch):
+                    source[x] += share * np.float32(line[x])
+        out = divided[l - low]
+        for k in range(first_column.size):
+            at = np.uint64(first_column[k] * channels)
+            if channels == 3:
+                red, green, blue = np.float32(0), np.float32(0), np.float32(0)
                 for t in range(column_shares.shape[1]):
-                    total += column_shares[k, t] * source[at + np.uint64(t * channels + c)]
-                fine[k * channels + c] = total
+                    share = column_shares[k, t]
+                    red += share * source[at]
+                    green += share * source[at + np.uint64(1)]
+                    blue += share * source[at + np.uint64(2)]
+                    at += np.uint64(3)
+                out[3 * k], out[3 * k + 1], out[3 * k + 2] = red, green, blue
+            else:
+                for c in range(channels):
+                    total = np.float32(0)
+                    for t in range(column_shares.shape[1]):
+                        total += column_shares[k, t] * source[at + np.uint64(t * channels + c)]
+                    out[k * channels + c] = total
 
 
 @_compiled
@@ -302,14 +295,14 @@ def sample_mask_columns(texture, column, repeat, out):  # type: ignore[no-untype
 
 
 @_compiled
-def mix_columns(sums, pitch, first, shares, channels, turned, tiles):  # type: ignore[no-untyped-def]
+def mix_columns(sums, first, shares, channels, turned, tiles):  # type: ignore[no-untyped-def]
     """tiles[i, x · channels + c, y] += Σ share · sums[8i + y, k · channels + c] over samples k that reach x.
 
     sums: (rows, pitch), a multiple of 8 of them. Eight rows are turned to stand side by side, so that they are
     mixed alike wherever a column's samples begin; turned is the room for it, zero beyond the last sample. first:
     (columns,), shares: (columns, width).
     """
-    step = EIGHT * channels
+    step, pitch = EIGHT * channels, sums.shape[1]
     for tile in range(len(sums) // EIGHT):
         rows = sums[EIGHT * tile : EIGHT * (tile + 1)]
         a, b, c, d, e, f, g, h = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7]
@@ -323,8 +316,9 @@ def mix_columns(sums, pitch, first, shares, channels, turned, tiles):  # type: i
 
 
 @_compiled
-def raster_of(tiles, channels, mirrored, start, stop, raster):  # type: ignore[no-untyped-def]
-    """Rows start … stop of the raster, (rows, columns · channels), from its tiles as `mix_columns` has them."""
+def raster_of(tiles, channels, mirrored, band, raster):  # type: ignore[no-untyped-def]
+    """A band's rows of the raster, (rows, columns · channels), from its tiles as `mix_columns` has them."""
+    start, stop = band
     columns = raster.shape[1] // channels
     for tile in range(start // EIGHT, (stop + EIGHT - 1) // EIGHT):
         rows = min(EIGHT, stop - EIGHT * tile)
@@ -336,20 +330,19 @@ def raster_of(tiles, channels, mirrored, start, stop, raster):  # type: ignore[n
 
 
 @_compiled
-def filter_rows(  # type: ignore[no-untyped-def]
-    raster, down, across, channels, guard, transmission, start, stop, picture
-):
-    """Rows start … stop of the picture: the raster convolved down and across, less its guard, times transmission.
+def filter_rows(raster, finish, band, picture):  # type: ignore[no-untyped-def]
+    """A band's rows of the picture: the raster convolved down and across, less its guard, times transmission.
 
-    raster: (rows, columns · channels), dark beyond its border; down, across: odd numbers of float32 weights;
-    transmission: (rows, columns), or empty; picture: (rows, columns · channels), each side by guard smaller.
+    raster: (rows, columns · channels), dark beyond its border. finish: `Finish`. picture: (rows, columns ·
+    channels), each side by its guard smaller.
     """
+    down, across, channels, guard, transmission = finish
     rows, n = raster.shape
     wide = picture.shape[1]
     reach_down, reach = down.size // 2, channels * (across.size // 2)
     line = np.zeros(n + 2 * reach, np.float32)
     middle = line[reach : reach + n]
-    for y in range(start, stop):
+    for y in range(band.start, band.stop):
         middle[:] = 0
         for i in range(down.size):
             source = y + guard + reach_down - i
@@ -388,7 +381,9 @@ def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
 
 
 @_inlined
-def _share(interpolation, offset, size, opening):  # type: ignore[no-untyped-def]
+def _share(footprint, offset, size):  # type: ignore[no-untyped-def]
+    """What a pixel holds of a sample's light that falls so far from it, the samples so far apart."""
+    interpolation, _, opening = footprint
     if interpolation == 0:
         reach = max(size, 1.0) / 2
         return 1.0 / max(size, 1.0) if -reach - 1e-9 <= offset < reach - 1e-9 else 0.0
@@ -397,64 +392,53 @@ def _share(interpolation, offset, size, opening):  # type: ignore[no-untyped-def
 
 
 @_inlined
-def _looked_up(texture, row, column):  # type: ignore[no-untyped-def]
-    rows, columns = texture.shape
-    if not (row > -1 and row < rows and column > -1 and column < columns):
-        return 0.0
-    r, c = int(np.floor(row)), int(np.floor(column))
-    value = 0.0
-    for dr in range(2):
-        for dc in range(2):
-            if 0 <= r + dr < rows and 0 <= c + dc < columns:
-                share = (row - r if dr else 1 - (row - r)) * (column - c if dc else 1 - (column - c))
-                value += share * texture[r + dr, c + dc]
-    return value
+def _farthest(footprint, size):  # type: ignore[no-untyped-def]
+    """How far from a pixel a sample may fall that counts there, in pixels."""
+    return 1e-6 + (max(size, 1.0) / 2 if footprint.interpolation == 0 else footprint.reach * size + 0.5)
 
 
 @_compiled
-def sheared_view(  # type: ignore[no-untyped-def]
-    view, weight, interpolation, reach, x0, y0, step, shear, row_step, column_step, fine_row_step,
-    fine_column_step, first_k, first_l, refine, textures, texture_size, mask_place, mask_step, start, stop,
-    opening, raster,
-):  # fmt: skip
-    """Add one view to raster rows start … stop where rows and columns of samples shear on the sensor.
+def sheared_view(view, grid, footprint, masks, band, raster):  # type: ignore[no-untyped-def]
+    """Add one view to a band's raster rows, (rows, columns, channels), where rows and columns of samples shear.
 
-    view: (t, s, channels); textures: (masks, rows, columns), each filling texture_size[mask] of it;
-    mask_place: (masks, 2) as (column, row) of sample (0, 0); mask_step: (masks, 2, 2).
+    view: `View`. grid: `Grid`. footprint: `Footprint`. masks: `Textures`.
     """
-    nt, ns, channels = view.shape
-    height, width = abs(fine_row_step), abs(fine_column_step)
-    reach_y = 1e-6 + (max(height, 1.0) / 2 if interpolation == 0 else reach * height + 0.5)
-    reach_x = 1e-6 + (max(width, 1.0) / 2 if interpolation == 0 else reach * width + 0.5)
+    samples, weight, x0, y0, place = view
+    textures, size, mask_step = masks
+    step, shear, coarse_row_step, coarse_column_step, refine, first_k, first_l = grid
+    nt, ns, channels = samples.shape
+    row_step, column_step = coarse_row_step / refine, coarse_column_step / refine
+    height, width = abs(row_step), abs(column_step)
+    reach_y, reach_x = _farthest(footprint, height), _farthest(footprint, width)
     line = np.empty((ns, channels))
-    for y in range(start, stop):
+    for y in range(band.start, band.stop):
         line[:] = 0
         lit = False
         for n in range(ns):
             k = first_k + n / refine
-            y_start = y0 + step[1, 0] * k + row_step * first_l
-            middle = (y - y_start) / fine_row_step
+            y_start = y0 + step[1, 0] * k + coarse_row_step * first_l
+            middle = (y - y_start) / row_step
             low = max(int(np.ceil(middle - reach_y / height)), 0)
             high = min(int(np.floor(middle + reach_y / height)), nt - 1)
             for m in range(low, high + 1):
-                share = weight * _share(interpolation, y - y_start - fine_row_step * m, height, opening)
+                share = weight * _share(footprint, y - y_start - row_step * m, height)
                 l = first_l + m / refine
-                for mask in range(mask_place.shape[0]):
-                    column = mask_place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
-                    row = mask_place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
-                    texture = textures[mask, : texture_size[mask, 0], : texture_size[mask, 1]]
-                    share *= _looked_up(texture, row, column)
+                for mask in range(place.shape[0]):
+                    column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
+                    row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
+                    texture = textures[mask, : size[mask, 0], : size[mask, 1]]
+                    share *= dark_outside(texture, row, column)
                 if share != 0:
                     lit = True
                     for c in range(channels):
-                        line[n, c] += share * view[m, n, c]
+                        line[n, c] += share * samples[m, n, c]
         if not lit:
             continue
         for n in range(ns):
-            x = x0 + shear * (y - y0) + column_step * (first_k + n / refine)
+            x = x0 + shear * (y - y0) + coarse_column_step * (first_k + n / refine)
             low = max(int(np.ceil(x - reach_x)), 0)
             high = min(int(np.floor(x + reach_x)), raster.shape[1] - 1)
             for pixel in range(low, high + 1):
-                share = _share(interpolation, pixel - x, width, opening)
+                share = _share(footprint, pixel - x, width)
                 for c in range(channels):
                     raster[y, pixel, c] += share * line[n, c]

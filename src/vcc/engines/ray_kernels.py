@@ -270,10 +270,10 @@ def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-de
     Rays from ``second`` on belong to the second half. ``tally`` collects the weights of all rays and of those that
     the light field does not hold. Places are replaced by indices.
     """
-    samples, _, index, motion, between, ends = field
+    samples, _, index_from_ray, motion, between, ends = field
     values, (nv, nu, nt, ns), channels = samples
     x, y, s, t, share = rays
-    to_indices(index, rays, n)
+    to_indices(index_from_ray, rays, n)
     flat = sums.reshape(-1)
     # Where x and y do not mix, the pixels looked at in four views are two columns and two rows.
     parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
@@ -503,8 +503,8 @@ def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
 def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays through what of a cell the stop is seen through; see `CellWindows.aimed`.
 
-    ``images``: (2, 5), see `set_image`. Until the last loop, s holds places across, t and share the ends of what is
-    seen there.
+    ``images``: (2, 5), see `set_image`. Until the last loop, s holds places across, t and share the ends of what
+    is seen there.
     """
     points, start, n, flipped = drawn
     x, y, s, t, share = rays
@@ -546,9 +546,9 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def add_tile(field, sensor, points, aim, steps, pictures, tile):  # type: ignore[no-untyped-def]
-    """The pixels of a tile, into pictures (2, rows, columns, channels); arguments as `vcc.engines.ray_tables` has them.
+    """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
 
-    The first picture is the mean of what the two halves of a pixel's rays find, the second their difference.
+    The first picture is what all of a pixel's rays find, the second what its two halves differ by.
 
     Returns:
         (3,): weights of all rays, of missing rays, how many rays.

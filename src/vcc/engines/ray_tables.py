@@ -35,7 +35,7 @@ class LightField(NamedTuple):
     Args:
         samples: its numbers.
         scale: turns them into radiance.
-        index: 4×5, indices (i, j, k, l) from rays (x, y, s, t, 1).
+        index_from_ray: 4×5, indices (i, j, k, l) from rays (x, y, s, t, 1).
         motion: 2×2; a point of the scene is seen in view (i, j) at pixel (k, l) − motion · (i, j).
         between: whether views are interpolated.
         ends: whether rays outside the grid of views are missing.
@@ -43,7 +43,7 @@ class LightField(NamedTuple):
 
     samples: Samples
     scale: float
-    index: Array
+    index_from_ray: Array
     motion: Array
     between: bool
     ends: bool

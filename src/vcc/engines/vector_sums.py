@@ -81,15 +81,12 @@ class _Masks:
     A mask's weight is interpolated between two lines of it that were sampled at the columns of the samples.
     """
 
-    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Sequence[Any], repeat: int) -> None:
-        lines, places, shares = (
-            context.make_array(kind)(context, builder, argument)
-            for kind, argument in zip(signature.args, arguments, strict=True)
-        )
-        self.builder, self.repeat, self.vectors = builder, repeat, 3 if repeat == 3 else VECTORS
+    def __init__(self, context: Any, builder: Any, kinds: Any, masks: Any, repeat: int) -> None:
+        lines, places, shares = _arrays(context, builder, kinds, masks)
+        self.builder, self.repeat = builder, repeat
         self.lines, self.places, self.shares = lines.data, places.data, shares.data
         self.count = cgutils.unpack_tuple(builder, shares.shape)[1]
-        self.narrow = 1 if repeat == 3 else self.vectors
+        self.narrow = 1 if repeat == 3 else VECTORS
         self.weights = [cgutils.alloca_once(builder, _WIDE) for _ in range(self.narrow)]
 
     def along(self, entry: Any, x: Any) -> list[Any]:
@@ -121,14 +118,55 @@ class _Masks:
         return weights
 
 
+def _arrays(context: Any, builder: Any, kinds: Any, arrays: Any) -> list[Any]:
+    """The arrays of a named tuple."""
+    parts = cgutils.unpack_tuple(builder, arrays)
+    return [context.make_array(kind)(context, builder, part) for kind, part in zip(kinds, parts, strict=True)]
+
+
+def _rows_adder(vectors: int, repeat: int | None = None) -> Any:
+    @intrinsic
+    def add_rows(typing_context, values, entries, masks, x, skip, sums, line):  # type: ignore[no-untyped-def]
+        """sums[line + r, x : x + RUN] += Σ shares[e, r] · values[places[e] + x : … + RUN], for r = 0 … 3.
+
+        With masks each sample counts times its weight from them; ``RUN_OF_THREES`` sample values are added where a
+        weight counts for three channels.
+
+        Args:
+            typing_context: Numba's.
+            values: samples of any type, flat.
+            entries: `vcc.engines.footprint_tables.Entries`.
+            masks: `vcc.engines.footprint_tables.EntryMasks`, or None for `add_rows`.
+            x: int64, where in the rows; a multiple of 3 where a weight counts for three channels.
+            skip: int64, how many sample values from ``x`` on are not added: a row's last run may begin before the
+                end of the one before it.
+            sums: float32 (rows, sample values).
+            line: int64, the first of the four rows.
+        """
+        place = types.int64
+        signature = types.void(values, entries, masks, place, place, sums, place)
+
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            found = None
+            if repeat is not None:
+                found = _Masks(context, builder, signature.args[2], arguments[2], repeat)
+            return _add_rows(context, builder, signature, arguments, vectors, found)
+
+        return signature, generate
+
+    return add_rows
+
+
 def _add_rows(
     context: Any, builder: Any, signature: Any, arguments: Sequence[Any], vectors: int, masks: _Masks | None
 ) -> Any:
     """The body of `add_rows` and its kin: see there for the arguments."""
-    array = {n: context.make_array(signature.args[n])(context, builder, arguments[n]) for n in (0, 1, 2, 3, 4, 7)}
-    values, order, places, shares, ends, sums = (each.data for each in array.values())
-    x, skip, line = arguments[5], arguments[6], arguments[8]
-    pitch = cgutils.unpack_tuple(builder, array[7].shape)[1]
+    values, total_sums = (context.make_array(signature.args[n])(context, builder, arguments[n]) for n in (0, 5))
+    order, ends, places, shares = (
+        each.data for each in _arrays(context, builder, signature.args[1], arguments[1])
+    )
+    x, skip, line = arguments[3], arguments[4], arguments[6]
+    values, sums, pitch = values.data, total_sums.data, cgutils.unpack_tuple(builder, total_sums.shape)[1]
     dark = ir.Constant(_WIDE, [0.0] * LANES)
     totals = [[cgutils.alloca_once(builder, _WIDE) for _ in range(vectors)] for _ in range(ROWS)]
     for total in (total for row in totals for total in row):
@@ -165,74 +203,9 @@ def _add_rows(
     return context.get_dummy_value()
 
 
-@intrinsic
-def add_rows(typing_context, values, order, places, shares, ends, x, skip, sums, line):  # type: ignore[no-untyped-def]
-    """sums[line + r, x : x + RUN] += Σ shares[e, r] · values[places[e] + x : … + RUN], for r = 0 … 3.
-
-    Args:
-        typing_context: Numba's.
-        values: samples of any type, flat.
-        order: int64, the list's entries e sorted by which of the four rows they reach, as in ``RANGES``.
-        places: int64, where each entry's row of samples begins.
-        shares: float32 (entries, 4).
-        ends: int64, how many entries of ``order`` reach each of ``RANGES`` or one before it.
-        x: int64, where in the rows.
-        skip: int64, how many sample values from ``x`` on are not added: a row's last run may begin before the end
-            of the one before it.
-        sums: float32 (rows, sample values).
-        line: int64, the first of the four rows.
-    """
-    place = types.int64
-    signature = types.void(values, order, places, shares, ends, place, place, sums, place)
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        return _add_rows(context, builder, signature, arguments, VECTORS, None)
-
-    return signature, generate
-
-
-def _add_masked_rows(repeat: int) -> Any:
-    @intrinsic
-    def add_masked_rows(  # type: ignore[no-untyped-def]
-        typing_context, values, order, places, shares, ends, x, skip, sums, line,
-        mask_lines, mask_places, mask_shares,
-    ):  # fmt: skip
-        """As `add_rows`, each sample times its weight from the masks.
-
-        ``RUN_OF_THREES`` sample values are added where a mask's weight counts for three channels.
-
-        Args:
-            typing_context: Numba's.
-            values: see `add_rows`, and so on.
-            order: see there.
-            places: see there.
-            shares: see there.
-            ends: see there.
-            x: see there; a multiple of 3 where a weight counts for three channels.
-            skip: see there.
-            sums: see there.
-            line: see there.
-            mask_lines: float32, flat: lines of masks' weights at the columns of the samples.
-            mask_places: int64 (entries, masks, 2): where the line above and the one below begin.
-            mask_shares: float32 (entries, masks, 2): what each counts.
-        """
-        place = types.int64
-        signature = types.void(
-            values, order, places, shares, ends, place, place, sums, place, mask_lines, mask_places, mask_shares
-        )
-
-        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            found = type(signature)(signature.return_type, signature.args[9:], None)
-            masks = _Masks(context, builder, found, arguments[9:], repeat)
-            return _add_rows(context, builder, signature, arguments, masks.vectors, masks)
-
-        return signature, generate
-
-    return add_masked_rows
-
-
-add_masked_rows = _add_masked_rows(1)
-add_masked_rows_of_threes = _add_masked_rows(3)
+add_rows = _rows_adder(VECTORS)
+add_masked_rows = _rows_adder(VECTORS, repeat=1)
+add_masked_rows_of_threes = _rows_adder(3, repeat=3)
 
 
 @intrinsic

@@ -8,7 +8,6 @@ each the share that is there, and each block meets the same rays.
 
 from __future__ import annotations
 
-import importlib
 import math
 import warnings
 from collections.abc import Iterable
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import late
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.memory import MEMORY_LIMIT
 from vcc.engines import chosen, engine
@@ -250,7 +250,7 @@ class Drive:
                 "pass light_field.replaced(numpy.asarray(values)), or between_views='auto', which carries "
                 "gradients"
             )
-        made = importlib.import_module("vcc.engines.depth_views").DenserViews
+        made = late.module("vcc.engines.depth_views").DenserViews
         self.samples = made(samples, self.plan.views_between, self.threads, IN_MEMORY)
         if whole is not None:
             # As few bytes as serve well, and as many as a block of one view takes.

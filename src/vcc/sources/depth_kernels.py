@@ -9,19 +9,14 @@ _compiled = numba.njit(nogil=True, cache=True, error_model="numpy")
 
 
 @_compiled
-def draw_surface(  # type: ignore[no-untyped-def]
-    quads, across, down, vergence, colour, cover, place, scale, nearest, out
-):
+def draw_surface(surface, pinhole, nearest, out):  # type: ignore[no-untyped-def]
     """Draw a surface of pixels into a picture that keeps what is nearest.
 
-    quads: (rows − 1, columns − 1), whether the four pixels from (r, c) on span a piece of it.
-    across, down: tangents of the directions of columns and rows, as the picture's own pinhole sees them.
-    vergence: (rows, columns), 1 / distance. colour: (rows, columns, channels). cover: (rows, columns),
-    interpolated; where it is below ½ the surface is not there.
-    place, scale: column = place[0] + scale[0] · (across − x · vergence) is given as place[0] + …, with
-    place = (offset of columns, of rows, x, y).
+    surface, pinhole: as `vcc.sources.depth_map` has them.
     nearest: (rows, columns) of the picture, the vergence of what it shows, below 0 for nothing. out: its colours.
     """
+    quads, vergence, colour, cover = surface
+    across, down, offset, scale, place = pinhole
     rows, columns = vergence.shape
     high, wide = nearest.shape
     channels = colour.shape[2]
@@ -34,8 +29,8 @@ def draw_surface(  # type: ignore[no-untyped-def]
                 continue
             for n in range(4):
                 w = vergence[r + n // 2, c + n % 2]
-                h[n] = place[0] + scale[0] * (across[c + n % 2] - place[2] * w)
-                g[n] = place[1] + scale[1] * (down[r + n // 2] - place[3] * w)
+                h[n] = offset[0] + scale[0] * (across[c + n % 2] - place[0] * w)
+                g[n] = offset[1] + scale[1] * (down[r + n // 2] - place[1] * w)
             first_column = max(int(np.ceil(h.min() - 1e-9)), 0)
             last_column = min(int(np.floor(h.max() + 1e-9)), wide - 1)
             first_row = max(int(np.ceil(g.min() - 1e-9)), 0)

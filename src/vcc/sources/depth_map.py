@@ -16,12 +16,12 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import late
 from vcc.base.errors import InputError
 from vcc.sources.views import CameraArray, ViewCamera
 
@@ -206,8 +206,6 @@ class DepthMapScene:
         return np.asarray(1 - self._drawn(camera)[..., 3])
 
     def _drawn(self, camera: ViewCamera) -> NDArray[np.float32]:
-        from vcc.sources.depth_kernels import draw_surface, fill_gaps  # Numba takes a moment to import
-
         self._check(camera)
         if self._surfaces is None:
             self._surfaces = _surfaces(
@@ -216,7 +214,6 @@ class DepthMapScene:
         fine = self.supersampling
         rows, columns = camera.pixels[0] * fine, camera.pixels[1] * fine
         scale = (columns / (camera.right - camera.left), rows / (camera.bottom - camera.top))
-        place = (-camera.left * scale[0] - 0.5, -camera.top * scale[1] - 0.5, camera.x, camera.y)
         nearest = np.full((rows, columns), -1.0, np.float32)
         out = np.zeros((rows, columns, 4), np.float32)
         across, down = (
@@ -225,20 +222,12 @@ class DepthMapScene:
                 self._vergence.shape[::-1], self._margin[::-1], self.slopes[::-1], strict=True
             )
         )
+        offset = (-camera.left * scale[0] - 0.5, -camera.top * scale[1] - 0.5)
+        pinhole = _Pinhole(across, down, offset, scale, (camera.x, camera.y))
+        kernels = late.module("vcc.sources.depth_kernels")
         for surface in self._surfaces:
-            draw_surface(
-                surface.quads,
-                across,
-                down,
-                surface.vergence,
-                surface.colour,
-                surface.cover,
-                place,
-                scale,
-                nearest,
-                out,
-            )
-        if fill_gaps(nearest, out):
+            kernels.draw_surface(surface, pinhole, nearest, out)
+        if kernels.fill_gaps(nearest, out):
             raise InputError(
                 f"view ({camera.row}, {camera.column}) looks past all that the picture shows: it needs a camera "
                 "with a smaller field of view, or nearer to the middle"
@@ -269,15 +258,38 @@ class DepthMapScene:
                 )
 
 
-@dataclass(frozen=True, eq=False)
-class _Surface:
-    """A mesh over the pixels of the picture with its margin."""
+class _Surface(NamedTuple):
+    """A mesh over the pixels of the picture with its margin.
+
+    Args:
+        quads: (rows − 1, columns − 1), whether the four pixels from (r, c) on span a piece of it.
+        vergence: (rows, columns), 1 / distance.
+        colour: (rows, columns, 4): red, green, blue, and 1 where the picture shows it, 0 where it was made up.
+        cover: (rows, columns), interpolated; where it is below ½ the surface is not there.
+    """
 
     quads: Mask
     vergence: Array
     colour: NDArray[np.float32]
-    """Red, green, blue, and 1 where the picture shows it, 0 where it was made up."""
     cover: NDArray[np.float32]
+
+
+class _Pinhole(NamedTuple):
+    """Where a view shows things: at column offset[0] + scale[0] · (across − place[0] · vergence), rows likewise.
+
+    Args:
+        across: (columns,), tangents of the directions of the picture's columns, as its own pinhole sees them.
+        down: (rows,), of its rows.
+        offset: (column, row) of the direction 0.
+        scale: columns and rows for a tangent of 1.
+        place: (x, y) of the view, metres from the picture's own.
+    """
+
+    across: Array
+    down: Array
+    offset: tuple[float, float]
+    scale: tuple[float, float]
+    place: tuple[float, float]
 
 
 def _surfaces(

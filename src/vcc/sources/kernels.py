@@ -10,19 +10,18 @@ _compiled = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="nump
 
 
 @_compiled
-def views_of_row(  # type: ignore[no-untyped-def]
-    rasters, first_row, row_share, first_column, phase, column_share, scale, top, out
-):
+def views_of_row(rasters, down, across, row, scale, top, out):  # type: ignore[no-untyped-def]
     """Fill one row of views: out[i, l, k, c], planes nearest first.
 
     rasters: (planes, rows, phases, 4, columns), opaque-weighted red, green, blue and opacity; raster column m
     of a plane is kept as phase m % phases at m // phases, so that a view reads contiguous numbers.
-    first_row, row_share: (planes,), the raster row of pixel row 0 and the share of the row after it;
-    first_column, phase, column_share: (planes, views), likewise for each view of the row.
+    down, across: where pixel 0 of each row and column of views lies in the raster, as (point, share of the next
+    point), (planes, views) each. row: of views.
     scale, top: a value v is stored as v · scale, cut at top; rounded where out holds integers (½ is added,
     the conversion truncates).
     """
     planes, _, phases, _, width = rasters.shape
+    (row_point, row_share), (column_point, column_share) = down, across
     views, rows, columns, _ = out.shape
     blended = np.empty((planes, phases, 4, width), np.float32)
     line = np.empty((3, columns), np.float32)
@@ -31,9 +30,9 @@ def views_of_row(  # type: ignore[no-untyped-def]
     one = np.float32(1)
     for l in range(rows):
         for p in range(planes):
-            w = row_share[p]
-            above = rasters[p, first_row[p] + phases * l].reshape(-1)
-            below = rasters[p, first_row[p] + phases * l + 1].reshape(-1)
+            w, first = row_share[p, row], row_point[p, row]
+            above = rasters[p, first + phases * l].reshape(-1)
+            below = rasters[p, first + phases * l + 1].reshape(-1)
             target = blended[p].reshape(-1)
             for x in range(target.size):
                 target[x] = above[x] + w * (below[x] - above[x])
@@ -42,7 +41,7 @@ def views_of_row(  # type: ignore[no-untyped-def]
             through[:] = 1
             for p in range(planes):
                 w = column_share[p, i]
-                a, start_a = phase[p, i], first_column[p, i]
+                start_a, a = divmod(column_point[p, i], phases)
                 b, start_b = (a + 1, start_a) if a + 1 < phases else (0, start_a + 1)
                 for c in range(3):
                     left, right, sums = blended[p, a, c], blended[p, b, c], line[c]

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from vcc.base import late
 from vcc.base.errors import InputError
 from vcc.light_field import LightField
 from vcc.sources.textures import Array, Texture, mean_radiance_and_opacity, radiance_and_opacity
@@ -286,8 +287,6 @@ class PlanesScene:
         return picture
 
     def _from_rasters(self, camera: ViewCamera, slope: float) -> NDArray[np.float32]:
-        from vcc.sources.kernels import views_of_row  # Numba takes a moment to import
-
         # By how many pixels each plane is displaced in this view, negated: rows, columns
         middle = ((camera.top + camera.bottom) / 2, (camera.left + camera.right) / 2)
         place = (camera.y, camera.x)
@@ -300,20 +299,10 @@ class PlanesScene:
             with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
                 kept = self._kept = (grid, _rasters(self.planes, grid, pool))
         grid, rasters = kept
-        row, row_share = _starts_at(shifts[:, :1], grid.margins[0])
-        column, column_share = _starts_at(shifts[:, 1:], grid.margins[1])
+        down, across = (_starts_at(shifts[:, n : n + 1], grid.margins[n]) for n in (0, 1))
         picture = np.empty((1, *camera.pixels, 3), np.float32)
-        views_of_row(
-            rasters,
-            row[:, 0].copy(),
-            row_share[:, 0].copy(),
-            column // RASTER_PER_PIXEL,
-            column % RASTER_PER_PIXEL,
-            column_share,
-            np.float32(1),
-            np.float32(np.inf),
-            picture,
-        )
+        one, endless = np.float32(1), np.float32(np.inf)
+        late.module("vcc.sources.kernels").views_of_row(rasters, down, across, 0, one, endless, picture)
         return np.asarray(picture[0])
 
     def description(self) -> dict[str, Any]:
@@ -465,26 +454,13 @@ def _fill(
     pool: ThreadPoolExecutor,
     progress: Callable[[int, int], None] | None,
 ) -> None:
-    from vcc.sources.kernels import views_of_row  # Numba takes a moment to import
-
-    row, row_share = _starts(planes, grid, 0)
-    column, column_share = _starts(planes, grid, 1)
+    down, across = (_starts(planes, grid, axis) for axis in (0, 1))
     whole = values.dtype.kind == "u"
     scale = np.float32(np.iinfo(values.dtype).max if whole else 1.0)
     top = scale if whole else np.float32(np.inf)
 
     def views(j: int) -> None:
-        views_of_row(
-            rasters,
-            row[:, j].copy(),
-            row_share[:, j].copy(),
-            column // RASTER_PER_PIXEL,
-            column % RASTER_PER_PIXEL,
-            column_share,
-            scale,
-            top,
-            values[j],
-        )
+        late.module("vcc.sources.kernels").views_of_row(rasters, down, across, j, scale, top, values[j])
 
     tasks = [pool.submit(views, j) for j in range(grid.views[0])]
     for done, task in enumerate(as_completed(tasks), 1):
