@@ -169,7 +169,7 @@ def test_what_is_refused():
     field = light_field((2, 2))
 
     def refused(words):
-        return pytest.raises(vcc.errors.InputError, match=re.escape(words))
+        return pytest.raises(vcc.InputError, match=re.escape(words))
 
     with refused("the transform for refocusing of shape 1×90×49×6×6 needs 1.211 MiB"):
         Refocuser(field, memory_limit=1000)
