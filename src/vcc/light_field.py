@@ -12,6 +12,7 @@ import numpy as np
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.disparity import Disparities, DisparityMaps
+from vcc.fields.plane_sweep import disparity_maps
 from vcc.fields.sampled import LIGHT_FIELD_AXES, Index, known, sliced, to_dtype, to_numpy
 
 if TYPE_CHECKING:
@@ -417,8 +418,6 @@ class LightField:
         )
 
     def _find_disparities(self, progress: Callable[[int, int], None] | None) -> DisparityMaps:
-        from vcc.recover.depth import disparity_maps  # late: light fields come before what looks at them
-
         return disparity_maps(self, progress=progress)
 
     def __repr__(self) -> str:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
 from vcc.fields.disparity import Disparities, DisparityMaps
+from vcc.fields.plane_sweep import disparity_maps
 from vcc.fields.sampled import Index
 from vcc.files.transfer import decode
 from vcc.light_field import (
@@ -378,7 +379,6 @@ class StoredLightField:
     def _kept_or_found(self, progress: Progress | None) -> DisparityMaps:
         import warnings
 
-        from vcc.recover.depth import disparity_maps
         from vcc.store.disparity_maps import keep_maps, read_maps
 
         kept = read_maps(self.path, self.shape)
