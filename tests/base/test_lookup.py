@@ -16,11 +16,12 @@ def test_a_plane_is_exact_between_points_and_held_beyond_the_edges():
     expected = 1 + 2 * np.clip(y, 0, 3) + 3 * np.clip(x, 0, 4)
     np.testing.assert_allclose(bilinear(plane, y, x), expected, rtol=1e-14)
     np.testing.assert_allclose(bilinear(plane, y[:, None], x)[2, 3], 1 + 2 * 0.25 + 3 * 1.1, rtol=1e-14)
+    np.testing.assert_allclose(bilinear(plane, 0.5, np.inf), 1 + 2 * 0.5 + 3 * 4, rtol=1e-14)
 
 
 @pytest.mark.parametrize(("outside", "mode"), [("edge", "nearest"), ("zero", "grid-constant")])
 @pytest.mark.parametrize("shape", [(6, 7), (1, 7), (6, 1), (1, 1)])
-def test_it_is_scipys(outside: str, mode: str, shape: tuple[int, int]):
+def test_several_numbers_at_a_point_are_looked_up_alike(outside: str, mode: str, shape: tuple[int, int]):
     random = np.random.default_rng(3)
     values = random.random((*shape, 2))
     y, x = (random.uniform(-2, size + 1, (5, 40)) for size in shape)

@@ -165,7 +165,7 @@ K = [np.full((n, n), 1 / n**2) for n in (3, 5)]
 @pytest.mark.parametrize(
     ("image", "kernels", "options", "message"),
     [
-        (np.full((90, 90), np.nan), K, {}, "8100 values that are NaN"),
+        (np.full((90, 90), np.nan), K, {}, "8100 numbers that are not finite"),
         (np.ones(90), K, {}, "rows, columns"),
         (np.ones((4, 90)), K, {}, "5×5 pixels, more than the picture"),
         (np.ones((40, 90)), K, {}, "holds no block of 48"),
