@@ -106,7 +106,7 @@ def test_cameras_that_are_no_stereo_cameras_are_refused(camera: vcc.Camera, mess
 @pytest.mark.parametrize(
     ("values", "options", "message"),
     [
-        (np.nan, {}, "NaN"),
+        (np.nan, {}, "not finite"),
         (1.0, {"distance_range": (1, 0.5)}, "nearest, farthest"),
         (1.0, {"distance_range": (0, 0.5)}, "nearest, farthest"),
         (1.0, {"block": 8}, "block is an odd number"),

@@ -36,8 +36,8 @@ def numbers_of(picture: Image | Recording | ArrayLike, what: str) -> Array:
     if not finite.all():
         first = tuple(int(n) for n in np.argwhere(~finite)[0])
         raise InputError(
-            f"{what} holds {np.count_nonzero(~finite)} numbers that are not finite, the first at index {first}: "
-            "mend such pixels first, or give a part without them"
+            f"{what} holds {np.count_nonzero(~finite)} numbers that are not finite, the first ({values[first]}) "
+            f"at index {first}: mend such pixels first, or give a part without them"
         )
     return values
 
