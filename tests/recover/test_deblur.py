@@ -7,6 +7,7 @@ import pytest
 from scipy import ndimage
 
 import vcc
+from vcc.base.measures import psnr
 from vcc.recover.blur import Blur, blurred
 from vcc.recover.deblur import richardson_lucy, sparse_gradients, wiener
 from vcc.showcase.scene import demo_scene
@@ -21,10 +22,6 @@ def disc(diameter: float) -> np.ndarray:
     y, x = np.mgrid[-half : half + 1, -half : half + 1]
     found = (np.hypot(x, y) <= diameter / 2).astype(float)
     return found / found.sum()
-
-
-def psnr(picture: np.ndarray, truth: np.ndarray) -> float:
-    return float(10 * np.log10(1 / np.mean((picture - truth) ** 2)))
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from vcc.analysis.plane_spectrum import PlaneSpectrum, plane_spectrum
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.units import short
 from vcc.camera import Camera
 from vcc.optics import Scatter
 from vcc.optics.train import Stage
@@ -85,8 +86,6 @@ class PointSpread:
         return float(x), float(y)
 
     def __repr__(self) -> str:
-        from vcc.base.units import short
-
         rows, columns = self.shape
         pitch = short(abs(self.frame.determinant) ** 0.5)
         return f"PointSpread({rows}×{columns}, pixel {pitch}, point at {short(self.distance)})"

@@ -207,7 +207,7 @@ class HeterodyneSetup:
         return self.camera.sensor.decentre[axis] - whole / 2 + whole / samples / 2
 
     def turn(self, axis: int) -> int:
-        """−1 where the sensor's picture is upside down along an axis (slopes grow with places) and turned; else 1."""
+        """−1 where slopes grow with places on the sensor, whose picture is upside down and is turned; else 1."""
         return -1 if self.to_sensor.matrix[axis, axis + 2] > 0 else 1
 
 
