@@ -102,7 +102,7 @@ def plane_sweep(
 def disparity_maps(
     light_field: Views, *, memory_limit: int | None = None, progress: Progress | None = None
 ) -> DisparityMaps:
-    """The disparities by which cameras look between views: the middle view's, by `vcc.recover.depth_by_plane_sweep`.
+    """The disparities by which cameras look between views: a plane sweep's, of the middle view.
 
     A light field calls this when ``between_views="depth"`` first asks for its disparities, and keeps the result.
 
