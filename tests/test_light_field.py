@@ -12,7 +12,7 @@ import torch
 import vcc
 from vcc import Affine, LightField
 from vcc.base.units import mm
-from vcc.light_field import describe_geometry
+
 from vcc.shapes.kernels import Gaussian
 
 FRAME = Affine.scaling(1e-3, 1e-3, -1e-3, -1e-3)
@@ -223,4 +223,4 @@ def test_transformed_is_lazy():
 def test_views_that_converge_beyond_all_rounding_are_called_parallel(distance, words):
     """9 views 0.5 mm apart turn by 9·0.5 mm/10¹⁵ m = 5·10⁻¹⁸: nothing beside a pixel of 0.001."""
     lf = vcc.LightField.from_views(np.ones((9, 9, 4, 4)), 0.5e-3, 1e-3, distance)
-    assert words in describe_geometry(lf)
+    assert words in lf.grid.geometry

@@ -1,39 +1,37 @@
-"""A camera: an optical train, and the verbs that users call."""
+"""The camera that users meet: an optical train, and the verbs that make pictures with it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal
+import warnings
+from os import PathLike
+from typing import Any, Literal, TypeVar, Unpack
 
-from vcc.base.errors import InputError
-from vcc.light_field import LightField
+from vcc.advice.darkness import why_dark
+from vcc.advice.explain import Explanation, explained
+from vcc.base.errors import InputError, ResultWarning
+from vcc.fields.samples import InMemory, Samples
+from vcc.image import Image
 from vcc.optics.train import Train
+from vcc.plan.choice import compile_best
+from vcc.plan.how import How, Options
+from vcc.plan.model import Plan
+from vcc.plan.protocol import Progress
+from vcc.plot.camera_plot import plot_camera
+from vcc.run.drive import drive
+from vcc.run.operators import carried_to
+from vcc.run.recording import Recording, expose
 
-if TYPE_CHECKING:
-    from os import PathLike
+Field = TypeVar("Field", bound=InMemory)
 
-    from vcc.advice.explain import Explanation
-    from vcc.engines import EngineName
-    from vcc.image import Image
-    from vcc.plan.footprints.model import Plan
-    from vcc.plan.rays.model import RayPlan
-    from vcc.run.recording import Recording
-    from vcc.store import StoredLightField
-
-
-def _outline(light_field: LightField | StoredLightField) -> LightField:
-    """What a plan is made from: of a light field on disk nothing is read, and nothing may be missing."""
-    if isinstance(light_field, LightField):
-        return light_field
-    light_field.check_complete()
-    return light_field.outline
+MUCH_MISSING = 0.01
+"""Share of the rays asked for that may be missing without a warning."""
 
 
 class Camera(Train):
     """Elements along an axis and a sensor behind them.
 
     A light field given to the camera is taken to lie at the entrance plane, z = 0. Cameras of equal elements and
-    sensors are equal.
+    sensors are equal, and can be keys of a cache.
 
     Args:
         elements: in any order; kept sorted by z. Elements at the same z commute.
@@ -43,83 +41,38 @@ class Camera(Train):
         InputError: an element before the entrance plane or behind the sensor, two elements of one name.
     """
 
-    def compile(
-        self,
-        light_field: LightField | StoredLightField,
-        *,
-        method: str = "auto",
-        interpolation: str = "sharp",
-        between_views: str = "auto",
-        scene_distance: float | None = None,
-        refine: int | str = "auto",
-        samples: int | None = None,
-        seed: int = 0,
-    ) -> Plan | RayPlan:
+    def compile(self, light_field: Samples, how: How | None = None, **options: Unpack[Options]) -> Plan:
         """The plan by which an engine makes the picture; `capture` does this for you.
 
-        Args: see `capture`.
+        Args:
+            light_field: as in `capture`; its samples are looked at only to measure their disparities.
+            how: as in `capture`.
+            options: as in `capture`.
         """
-        from vcc.plan.choice import compile_best
-
-        return compile_best(
-            self,
-            _outline(light_field),
-            method=method,
-            interpolation=interpolation,
-            between_views=between_views,
-            scene_distance=scene_distance,
-            refine=refine,
-            samples=samples,
-            seed=seed,
-        )
+        light_field.check_complete()
+        return compile_best(self, light_field.grid, How.of(how, options))
 
     def capture(
         self,
-        light_field: LightField | StoredLightField,
+        light_field: Samples,
+        how: How | None = None,
         *,
-        method: str = "auto",
-        interpolation: str = "sharp",
-        between_views: str = "auto",
-        scene_distance: float | None = None,
-        refine: int | str = "auto",
-        samples: int | None = None,
-        tolerance: float | None = None,
-        seed: int = 0,
-        engine: EngineName | None = None,
-        memory_limit: int | None = None,
-        progress: Callable[[int, int], None] | None = None,
+        plan: Plan | None = None,
+        progress: Progress | None = None,
+        **options: Unpack[Options],
     ) -> Image:
         """The picture that the sensor records of a light field.
 
         Args:
-            light_field: given at the entrance plane z = 0; in memory, or on disk (`vcc.store.open_store`) and then
-                read in pieces whose pictures are summed.
-            method: ``"footprints"`` spreads each sample of the light field over the sensor, exactly, where the
-                optics fold into one matrix; ``"rays"`` traces rays back from the sensor through anything;
-                ``"auto"`` takes footprints where they can be had.
-            interpolation: within a view: ``"sharp"``, linear with what that takes from sharpness given back (rings
-                by some per cent beside hard edges, and may go below 0 there), or ``"linear"``; by footprints also
-                ``"nearest"`` (the paper's, for comparison) or ``"cubic"`` (Catmull-Rom).
-            between_views: ``"auto"`` interpolates between views along the scene's parallax (footprints: only
-                where neighbouring views differ by more than about a pixel on the sensor); ``"depth"`` (footprints)
-                makes as many views in between as the sensor can tell apart, up to 16×16 for each one, from the
-                light field's ``disparity``, which is found first where it is not given: no ghosts at any depth, at
-                the cost that `explain` states, for NumPy arrays; ``"none"`` never does.
-            scene_distance: the distance in metres of the scene before the entrance plane, by which that
-                interpolation goes; None takes the range of distances that the light field states or shows.
-            refine: footprints: ``"auto"`` divides cells and samples where a mask is finer than they are, at a
-                cost that `explain` states; a number divides samples by it each way, and 1 divides nothing.
-            samples: rays a pixel, rounded up to a power of two (behind a main lens and lenslets: for each lenslet
-                that the pixel sees); None takes 64.
-            tolerance: double the samples until the estimated sampling error of the picture, root mean square, is
-                at most this share of its mean; None does not.
-            seed: of the rays' choice of points. The same seed gives the same picture, on any number of threads.
-            engine: ``"numba"`` (default for NumPy arrays), ``"array_api"`` (default for PyTorch, JAX and
-                other arrays: carries gradients) or ``"reference"`` (slow; defines what is correct).
-            memory_limit: for a light field on disk, bytes that its pieces, the picture and the engine may take
-                together; None takes `vcc.run.pieces.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time by
-                rays, all of which are traced for each piece.
+            light_field: given at the entrance plane z = 0; in memory, or on disk (`vcc.store.open_store`) and
+                then read in pieces whose pictures are summed.
+            how: all that may be chosen, in one record; None takes the defaults.
+            plan: made before by `compile` for this light field, or for another of the same shape and frame; None
+                makes one.
             progress: called with (done, total) as the work advances.
+            options: what is to be chosen otherwise than in ``how``, by name: ``method``, ``interpolation``,
+                ``between_views``, ``scene_distance``, ``refine``, ``samples``, ``tolerance``, ``seed``,
+                ``engine``, ``threads``, ``memory_limit``; `vcc.How` says what each of them is.
 
         Returns:
             Irradiance on the sensor, radiance × steradian (paper, eq. 5), as light lands on it (inverted).
@@ -132,69 +85,46 @@ class Camera(Train):
         Raises:
             InputError: an option that does not exist or does not go with the method, an element that returns
                 what it must not; of a light field on disk, views that are missing or damaged, or a memory limit
-                that is too small.
+                that is too small; a plan for another sensor or another shape of light field.
         """
-        import warnings
-
-        from vcc.advice.darkness import why_dark
-        from vcc.base.errors import ResultWarning
-        from vcc.engines import record
-        from vcc.image import Image
-
-        if between_views == "depth" and max(light_field.shape[:2]) > 1:
-            light_field.disparity.maps(progress)  # found now, so that progress is seen
-        plan = self.compile(
-            light_field,
-            method=method,
-            interpolation=interpolation,
-            between_views=between_views,
-            scene_distance=scene_distance,
-            refine=refine,
-            samples=samples,
-            seed=seed,
-        )
+        chosen = How.of(how, options)
+        if plan is None:
+            if chosen.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
+                light_field.grid.disparities.maps(progress)  # found now, so that progress is seen
+            plan = self.compile(light_field, chosen)
+        else:
+            plan.check_fits(self.sensor.shape, light_field.grid)
         for caution in plan.cautions:
             warnings.warn(caution, ResultWarning, stacklevel=2)
-        if isinstance(light_field, LightField):
-            recorded = record(plan, light_field.values, engine=engine, tolerance=tolerance, progress=progress)
-        else:
-            from vcc.run.pieces import record_pieces
-
-            recorded = record_pieces(
-                plan, light_field, engine=engine, tolerance=tolerance, memory_limit=memory_limit, progress=progress
-            )
-        dark = why_dark(
-            plan,
-            light_field,
-            recorded.values,
-            recorded.rays,
-            recorded.missing_rays,
-            recorded.missing_reason,
-        )
+        found = drive(plan, light_field, chosen, progress)
+        dark = why_dark(plan, light_field, found)
         if dark is not None:
             warnings.warn(dark, ResultWarning, stacklevel=2)
-        elif recorded.missing_rays > 0.01:
+        elif found.missing_rays > MUCH_MISSING:
             warnings.warn(
-                f"{recorded.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
-                f"({recorded.missing_reason}); the picture is darker there",
+                f"{found.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
+                f"({found.missing_reason}); the picture is darker there",
                 ResultWarning,
                 stacklevel=2,
             )
         return Image(
-            recorded.values,
+            found.values,
             self.sensor.frame,
-            missing_rays=recorded.missing_rays,
-            sampling_error=recorded.sampling_error,
+            missing_rays=found.missing_rays,
+            sampling_error=found.sampling_error,
         )
 
     def expose(
         self,
-        light_field: LightField | StoredLightField,
+        light_field: Samples,
         exposure: float | Literal["auto"],
         *,
         seed: int = 0,
         radiance: float = 1.0,
         ray_seed: int = 0,
+        how: How | None = None,
+        plan: Plan | None = None,
+        progress: Progress | None = None,
         **options: Any,
     ) -> Recording:
         """What the sensor records of a light field, as its electronics number it, noise included (EMVA 1288).
@@ -207,6 +137,9 @@ class Camera(Train):
                 same seed gives the same numbers, on any number of threads.
             radiance: what a sample value of 1 stands for, W/(m²·sr), in each channel's band.
             ray_seed: of the choice of rays, where rays are traced: the seed of `capture`.
+            how: as in `capture`.
+            plan: as in `capture`.
+            progress: as in `capture`.
             options: as in `capture`.
 
         Raises:
@@ -216,34 +149,38 @@ class Camera(Train):
         Warns:
             ResultWarning: as `capture` and `vcc.expose_image`.
         """
-        from vcc.run.recording import expose
+        further = {"how": how, "plan": plan, "progress": progress, **options}
+        return expose(self, light_field, exposure, seed=seed, radiance=radiance, ray_seed=ray_seed, **further)
 
-        return expose(self, light_field, exposure, seed=seed, radiance=radiance, ray_seed=ray_seed, **options)
-
-    def explain(self, light_field: LightField | StoredLightField, **options: Any) -> Explanation:
+    def explain(
+        self,
+        light_field: Samples,
+        how: How | None = None,
+        *,
+        progress: Progress | None = None,
+        **options: Unpack[Options],
+    ) -> Explanation:
         """The plan for a light field in words: what was folded, pulled to the sensor, chosen, and its cost.
 
         Args:
             light_field: given at the entrance plane; in memory or on disk.
+            how: as in `capture`.
+            progress: called with (done, total) while disparities are found, where they are needed.
             options: as in `capture`.
         """
-        if not isinstance(light_field, LightField):
-            from vcc.run.pieces import explain_pieces
-
-            return explain_pieces(self, light_field, **options)
-        options.pop("memory_limit", None)
-        from vcc.advice.explain import explain
-
-        return explain(self, light_field, **options)
+        chosen = How.of(how, options)
+        if chosen.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
+            light_field.grid.disparities.maps(progress)
+        return explained(self, light_field, self.compile(light_field, chosen), chosen)
 
     def light_field_at(
         self,
-        light_field: LightField,
+        light_field: Field,
         z: float,
         *,
         before: bool = False,
         memory_limit: int | None = None,
-    ) -> LightField:
+    ) -> Field:
         """The light field at a plane inside the camera: affine optics folded, masks and diffusers applied.
 
         Args:
@@ -257,33 +194,19 @@ class Camera(Train):
             InputError: a light field on disk, z outside the camera, an element on the way that bends rays not as a
                 lens or a prism does, or more memory needed than allowed.
         """
-        if not isinstance(light_field, LightField):
+        if light_field.whole() is None:
             raise InputError(
                 "the light field inside a camera is made from samples in memory: pass stored.read(), or a part of "
                 "it, stored[a:b, c:d]"
             )
-        if z > self.sensor.z:
-            raise InputError(f"z = {z * 1e3:g} mm lies behind the sensor at {self.sensor.z * 1e3:g} mm")
-        for stage in self.stages:
-            if stage.element.z > z or (before and stage.element.z == z):
-                break
-            if stage.faces.bending is not None:
-                raise InputError(
-                    f"{stage.element.label} is not affine: behind it the light field has no frame. Choose a z "
-                    "before it, or look at the picture (camera.capture)"
-                )
-        from vcc.run.operators import carried_to
-
         return carried_to(self, light_field, z, before, memory_limit)
 
     def plot(self, **options: Any) -> Any:
         """Draw the axis, the elements, the sensor and fans of rays. See `vcc.plot.plot_camera`."""
-        from vcc.plot import plot_camera
-
         return plot_camera(self, **options)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.camera_file`."""
+        """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.files.camera_file`."""
         from vcc.files.camera_file import save_camera
 
         save_camera(self, path)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.fields.sampled import IMAGE_AXES, Index, sliced
+from vcc.fields.sampled import IMAGE_AXES, Index, indices, taken, to_numpy
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -59,8 +59,8 @@ class Image:
 
     def __getitem__(self, index: Index | tuple[Index, ...]) -> Image:
         """A piece of the picture, in its place: slices along (rows, columns[, channel])."""
-        values, frame, _ = sliced(self.values, self.frame, index, IMAGE_AXES, "an image")
-        return replace(self, values=values, frame=frame)
+        frame, ranges = indices(self.shape, self.frame, index, IMAGE_AXES, "an image")
+        return replace(self, values=taken(self.values, ranges), frame=frame)
 
     def upright(self) -> Image:
         """The picture as a person wants to see it: turned by 180° if it is inverted, else unchanged."""
@@ -79,8 +79,6 @@ class Image:
 
     def to_numpy(self) -> NDArray[np.float32]:
         """The values as a float32 NumPy array, wherever they are."""
-        from vcc.fields.sampled import to_numpy
-
         return to_numpy(self.values).astype(np.float32, copy=False)
 
     def save(self, path: str | PathLike[str], **options: Any) -> Any:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.fields.grid import Block
 from vcc.fields.plane_sweep import disparity_maps
 from vcc.recover import depth
 
@@ -17,16 +18,11 @@ class Counted:
     """A light field that says which views were asked for."""
 
     def __init__(self, field: vcc.LightField) -> None:
-        self.field, self.read = field, set()
-        self.shape, self.frame, self.disparity_range = field.shape, field.frame, field.disparity_range
+        self.field, self.grid, self.asked = field, field.grid, set()
 
-    def measured_disparity_range(self) -> tuple[float, float] | None:
-        return self.disparity_range
-
-    def __getitem__(self, index: tuple[slice, slice]) -> vcc.LightField:
-        rows, columns = (range(n)[part] for n, part in zip(self.shape, index, strict=False))
-        self.read |= {(row, column) for row in rows for column in columns}
-        return self.field[index]
+    def read(self, block: Block) -> np.ndarray:
+        self.asked |= {(row, column) for row in range(*block.rows) for column in range(*block.columns)}
+        return self.field.read(block)
 
 
 def plane() -> vcc.LightField:
@@ -42,7 +38,7 @@ def test_the_middle_row_and_column_tell_the_disparity_and_no_other_view_is_read(
     assert maps.views == ((1, 2),)
     # Whatever is tried between the steps, equal views agree best where they are equal.
     assert np.median(maps.values) == pytest.approx(SHIFT, abs=0.01)
-    assert field.read == {(1, i) for i in range(5)} | {(j, 2) for j in range(4)}
+    assert field.asked == {(1, i) for i in range(5)} | {(j, 2) for j in range(4)}
 
 
 def test_users_find_it_where_they_recover_depth():

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from vcc.light_field import LightField
-from vcc.plan.footprints.model import Plan
-from vcc.plan.rays.model import RayPlan
+from vcc.fields.grid import Block
+from vcc.fields.samples import Samples
+from vcc.plan.footprints.model import Footprints
+from vcc.plan.model import Plan
+from vcc.plan.operators import OnSensor
+from vcc.plan.rays.model import Rays
+from vcc.run.drive import Recorded
 
-if TYPE_CHECKING:
-    from vcc.store import StoredLightField
 
-
-def why_dark(
-    plan: Plan | RayPlan,
-    light_field: LightField | StoredLightField,
-    picture: Any,
-    rays: int,
-    missing_rays: float,
-    missing_reason: str,
-) -> str | None:
+def why_dark(plan: Plan, samples: Samples, found: Recorded) -> str | None:
     """A sentence that says why a picture is exactly 0 everywhere; None where it is not, or where it must be.
 
     It must be 0 where the light field is dark, and where a mask lets nothing through, which footprints know and
@@ -29,18 +23,20 @@ def why_dark(
 
     Args:
         plan: that made the picture.
-        light_field: of which it was made.
-        picture: (rows, columns[, channels]).
-        rays: how many were traced; 0 for footprints.
-        missing_rays: the share of the rays asked for that the light field lacks.
-        missing_reason: in words.
+        samples: of which it was made.
+        found: the picture, and what the run told.
     """
-    if not isinstance(picture, np.ndarray) or _lit(picture):
+    if not isinstance(found.values, np.ndarray) or _lit(found.values):
         return None
-    why = _why_no_rays(plan, rays) if isinstance(plan, RayPlan) else _why_no_footprints(plan)
-    if why is None or _dark(light_field):
+    core = plan.core
+    why = _why_no_rays(core, found.rays) if isinstance(core, Rays) else _why_no_footprints(plan, core)
+    if why is None or _dark(samples):
         return None
-    lacking = f"; {missing_rays:.1%} of the rays asked for are missing ({missing_reason})" if missing_rays else ""
+    lacking = (
+        f"; {found.missing_rays:.1%} of the rays asked for are missing ({found.missing_reason})"
+        if found.missing_rays
+        else ""
+    )
     return (
         f"the picture is 0 everywhere, and the light field is not: {why}{lacking}. Check where the elements, the "
         "sensor and the light field stand (camera.explain, camera.plot)"
@@ -53,33 +49,38 @@ def _lit(picture: np.ndarray[Any, Any]) -> bool:
     return bool(picture[rows // 2, columns // 2].any() or picture.any())
 
 
-def _dark(light_field: LightField | StoredLightField) -> bool:
-    if isinstance(light_field, LightField):
-        return not bool(np.any(light_field.values))
-    nv, nu, nt = light_field.outline.shape[:3]
-    return not any(light_field.linear_view(row, column, 0, nt).any() for row in range(nv) for column in range(nu))
+def _dark(samples: Samples) -> bool:
+    whole = samples.whole()
+    if whole is not None:
+        return not bool(np.any(whole))
+    everything = Block.all_of(samples.grid.shape)
+    views = np.ndindex(samples.grid.shape[:2])
+    blocks = (Block((j, j + 1), (i, i + 1), everything.pixel_rows, everything.pixel_columns) for j, i in views)
+    return not any(samples.read(block).any() for block in blocks)
 
 
-def _why_no_rays(plan: RayPlan, rays: int) -> str:
+def _why_no_rays(core: Rays, rays: int) -> str:
     return (
-        f"{rays} rays were traced back towards {plan.aim.words}, and each was stopped on its way ({plan.met}), or "
+        f"{rays} rays were traced back towards {core.aim.words}, and each was stopped on its way ({core.met}), or "
         "came from beside the light field or from a dark sample of it"
     )
 
 
-def _why_no_footprints(plan: Plan) -> str | None:
+def _why_no_footprints(plan: Plan, core: Any) -> str | None:
     """None where masks close the camera: nothing was asked for."""
-    against = plan.sensor_transmission
-    if not all(mask.texture.any() for mask in plan.masks) or not (against is None or against.any()):
+    assert isinstance(core, Footprints)
+    on = next((operator for operator in plan.after if isinstance(operator, OnSensor)), OnSensor(0))
+    open_sensor = on.transmission is None or on.transmission.any()
+    if not all(mask.texture.any() for mask in core.masks) or not open_sensor:
         return None
-    if not plan.weights.any():
+    if not core.weights.any():
         # A stop that is open beside the grid of views asks for rays that are missing; a closed one for none.
         return "what passes the stops comes from beside the grid of views" if plan.missing_rays else None
-    corners = np.array([[k, l] for k in (0, plan.samples[1] - 1) for l in (0, plan.samples[0] - 1)])
-    used = plan.weights > 0
+    corners = np.array([[k, l] for k in (0, core.samples[1] - 1) for l in (0, core.samples[0] - 1)])
+    used = core.weights > 0
     ends = []
-    for places, step in ((plan.x, plan.step[0]), (plan.y, plan.step[1])):
-        on_sensor = places[used][:, None] - plan.guard + corners @ step
+    for places, step in ((core.x, core.step[0]), (core.y, core.step[1])):
+        on_sensor = places[used][:, None] - on.guard + corners @ step
         ends += [round(float(on_sensor.min())), round(float(on_sensor.max()))]
     rows, columns = plan.sensor_shape
     return (

@@ -1,22 +1,18 @@
-"""A ray plan in words: how it samples, what it costs, what to beware of."""
+"""A plan by rays in words: how it samples, what it costs, what to beware of."""
 
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vcc.fields.sampled import known
-from vcc.light_field import LightField
-from vcc.plan.rays.model import CellWindows, RayPlan
-
-if TYPE_CHECKING:
-    from vcc.engines import Recorded
+from vcc.fields.sampled import has_values, to_numpy
+from vcc.plan.protocol import Partial
+from vcc.plan.rays.model import CellWindows, Rays
+from vcc.run.drive import Drive, sampling_error
 
 PATCH = 32
 """Pixels a side, and for each thread, of the pieces of the picture that are traced to foretell time and error."""
@@ -24,116 +20,119 @@ PLACES = (0.1, 0.5, 0.9)
 """Where they lie along each axis, as a share of the sensor's size."""
 
 
-def sections(
-    plan: RayPlan, light_field: LightField, engine: Any, tolerance: float | None
-) -> tuple[list[str], float | None]:
-    """The sections of `vcc.Camera.explain` after how the picture is made, and the seconds expected."""
-    pilot = _pilot(plan, light_field, engine)
-    seconds = None if pilot is None else pilot[0]
-    return [
-        _sampling(plan, pilot, tolerance),
-        _cost(plan, light_field, pilot),
-        _warnings(plan, pilot),
-    ], seconds
+@dataclass(frozen=True)
+class _Pilot:
+    """What pieces of the picture foretell of all of it.
 
-
-def _pilot(plan: RayPlan, light_field: LightField, engine: Any) -> tuple[float, float, float, float] | None:
-    """(seconds, rays, error as a share of the mean, missing share) foretold by tracing pieces of the picture.
-
-    None where the samples cannot be run (an array under a tracer).
+    Args:
+        seconds: of a run.
+        rays: that are traced.
+        error: from sampling, as a share of the picture's mean.
+        missing: share of the rays asked for.
     """
-    from vcc.engines import chosen, record
-    from vcc.engines.sharpening import sharpened
 
-    if known(light_field.values[:1, :1, :1, :1]) is None:
+    seconds: float
+    rays: float
+    error: float
+    missing: float
+
+
+def sections(run: Drive) -> tuple[list[str], float | None]:
+    """The sections of `vcc.Camera.explain` after how the picture is made, and the seconds expected."""
+    core = run.core
+    assert isinstance(core, Rays)
+    pilot = _pilot(run, core)
+    parts = [_sampling(core, pilot, run.how.tolerance), _cost(run, core, pilot), _warnings(run, pilot)]
+    return parts, None if pilot is None else pilot.seconds
+
+
+def _pilot(run: Drive, core: Rays) -> _Pilot | None:
+    """What tracing pieces of the picture foretells; None where the samples cannot be run, or are not in memory."""
+    whole = run.samples.whole()
+    if whole is None or not has_values(whole):
         return None
-    name = chosen(engine, light_field.values)
-    if plan.sharpening is not None:
-        sharpened(plan, light_field.values[:1, :1], name)  # the first run may compile
+    run.engine.prepared(run.plan.before, whole[:1, :1], run.threads)  # the first run may compile
     start = time.perf_counter()
-    plan, values = sharpened(plan, light_field.values, name)
-    sharpening = time.perf_counter() - start
+    values = run.engine.prepared(run.plan.before, whole, run.threads)
+    preparing = time.perf_counter() - start
 
-    def traced_in(patches: list[RayPlan]) -> tuple[list[Recorded], float]:
+    def traced_in(patches: list[Rays]) -> tuple[list[Partial], float]:
         start = time.perf_counter()
-        found = [record(patch, values, engine=engine) for patch in patches]
+        found = [run.runner(patch, values, threads=run.threads) for patch in patches]
         return found, (time.perf_counter() - start) / len(patches)
 
-    rows, columns = plan.sensor_shape
-    patches = list(_patches(plan, (os.cpu_count() or 1) if name == "numba" else 1))
-    pixel = replace(plan, sensor_shape=(1, 1))
+    rows, columns = core.raster_shape
+    patches = list(_patches(core, run.threads if run.name == "numba" else 1))
+    pixel = replace(core, raster_shape=(1, 1))
     traced_in([pixel])  # the first run may compile
     _, fixed = traced_in([pixel])
     traced, each = traced_in(patches)
-    factor = rows * columns / sum(math.prod(patch.sensor_shape) for patch in patches)
-    seconds = sharpening + fixed + max(each - fixed, 0.0) * len(patches) * factor
-    means = [float(np.mean(known(one.values), dtype=np.float64)) for one in traced]  # type: ignore[arg-type]
-    error = math.sqrt(sum(one.sampling_error**2 for one in traced) / len(traced))
-    mean = abs(sum(means) / len(means))
-    missing = sum(one.missing_rays for one in traced) / len(traced)
-    return seconds, sum(one.rays for one in traced) * factor, error / mean if mean > 0 else 0.0, missing
+    factor = rows * columns / sum(math.prod(patch.raster_shape) for patch in patches)
+    mean = abs(sum(float(np.mean(to_numpy(one.values), dtype=np.float64)) for one in traced) / len(traced))
+    error = math.sqrt(sum(sampling_error(one) ** 2 for one in traced) / len(traced))
+    return _Pilot(
+        preparing + fixed + max(each - fixed, 0.0) * len(patches) * factor,
+        sum(one.rays for one in traced) * factor,
+        error / mean if mean > 0 else 0.0,
+        sum(one.missing for one in traced) / len(traced),
+    )
 
 
-def _patches(plan: RayPlan, threads: int) -> Iterator[RayPlan]:
+def _patches(core: Rays, threads: int) -> Iterator[Rays]:
     """Pieces of the sensor, evenly placed; neighbouring pixels look at neighbouring samples and stay together."""
-    rows, columns = min(plan.sensor_shape[0], PATCH), min(plan.sensor_shape[1], PATCH * threads)
+    rows, columns = min(core.raster_shape[0], PATCH), min(core.raster_shape[1], PATCH * threads)
     for down in PLACES:
         for across in PLACES:
-            row = round(down * (plan.sensor_shape[0] - rows))
-            column = round(across * (plan.sensor_shape[1] - columns))
+            row = round(down * (core.raster_shape[0] - rows))
+            column = round(across * (core.raster_shape[1] - columns))
             yield replace(
-                plan,
-                sensor_shape=(rows, columns),
+                core,
+                raster_shape=(rows, columns),
                 first_pixel=(
-                    plan.first_pixel[0] + column * plan.pitch[0],
-                    plan.first_pixel[1] + row * plan.pitch[1],
+                    core.first_pixel[0] + column * core.pitch[0],
+                    core.first_pixel[1] + row * core.pitch[1],
                 ),
             )
 
 
-def _sampling(plan: RayPlan, pilot: Any, tolerance: float | None) -> str:
-    lines = [f"  met on the way back from the sensor: {plan.met}"]
-    through = " and cell of the array that it sees" if isinstance(plan.aim, CellWindows) else ""
-    lines.append(f"  {plan.samples} rays for each pixel{through}, evenly spread, seed {plan.seed}")
+def _sampling(core: Rays, pilot: _Pilot | None, tolerance: float | None) -> str:
+    lines = [f"  met on the way back from the sensor: {core.met}"]
+    through = " and cell of the array that it sees" if isinstance(core.aim, CellWindows) else ""
+    lines.append(f"  {core.samples} rays for each pixel{through}, evenly spread, seed {core.seed}")
     if pilot is not None:
         lines.append(
-            f"  expected sampling error: {pilot[2]:.2g} of the picture's mean, root mean square"
+            f"  expected sampling error: {pilot.error:.2g} of the picture's mean, root mean square"
             + ("" if tolerance is None else f"; samples are doubled until it is {tolerance:g}")
         )
     return "Sampling\n" + "\n".join(lines)
 
 
-def _cost(plan: RayPlan, light_field: LightField, pilot: Any) -> str:
+def _cost(run: Drive, core: Rays, pilot: _Pilot | None) -> str:
     lines = []
     if pilot is not None:
-        lines.append(f"  {pilot[1] / 1e6:.3g} million rays")
-    lines.append(f"  about {expected_memory(plan, light_field) / 1e6:.0f} MB of memory beside the light field")
+        lines.append(f"  {pilot.rays / 1e6:.3g} million rays")
+    lines.append(f"  about {_memory(run, core) / 1e6:.0f} MB of memory beside the light field")
     if pilot is not None:
-        lines.append(f"  about {pilot[0]:.2g} s expected (pieces of the picture were timed on this machine)")
+        lines.append(f"  about {pilot.seconds:.2g} s expected (pieces of the picture were timed on this machine)")
     return "Cost\n" + "\n".join(lines)
 
 
-def expected_memory(plan: RayPlan, light_field: LightField) -> int:
-    """Bytes that a run of the plan takes beside the light field and the picture, estimated."""
-    from vcc.engines.sharpening import kept_as
-
-    # Once in the plan's steps and once as the kernel reads them; a single large table is not copied.
-    tables = 2 * sum(table.nbytes for table in plan.packed().arrays())
-    values = light_field.values
-    copied = 0
-    if isinstance(values, np.ndarray):
-        kept = kept_as(plan, values.dtype)
-        if plan.sharpening is not None or kept != values.dtype or not values.flags.c_contiguous:
-            copied = values.size * kept.itemsize
-    return int(plan.points.nbytes + tables + copied)
+def _memory(run: Drive, core: Rays) -> int:
+    """Bytes that a run takes beside the light field and the picture, estimated."""
+    whole, copied = run.samples.whole(), 0
+    if isinstance(whole, np.ndarray) and (
+        run.plan.before or run.kind != whole.dtype or not whole.flags.c_contiguous
+    ):
+        copied = whole.size * run.kind.itemsize
+    return run.engine.memory(core, run.channels, run.threads) + copied
 
 
-def _warnings(plan: RayPlan, pilot: Any) -> str:
+def _warnings(run: Drive, pilot: _Pilot | None) -> str:
     lines = []
-    if pilot is not None and pilot[3] > 1e-3:
+    if pilot is not None and pilot.missing > 1e-3:
         lines.append(
-            f"  {pilot[3]:.1%} of the rays asked for are missing: they fall outside the grid of views or the "
+            f"  {pilot.missing:.1%} of the rays asked for are missing: they fall outside the grid of views or the "
             "views' pictures"
         )
-    lines += [f"  {caution}" for caution in plan.cautions]
+    lines += [f"  {caution}" for caution in run.plan.cautions]
     return "Warnings\n" + ("\n".join(lines) if lines else "  none")

@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.advice.view_gaps import ROUNDING, ViewGaps
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.optics.deflections import CellDeflection, FacetDeflection
+from vcc.optics.train import Train
 from vcc.plan.parallax_rule import index_motions
+from vcc.plan.view_gaps import ROUNDING, ViewGaps
 from vcc.shapes.lattice import CellApertures
 from vcc.shapes.patterns import Bounded, Cells, CosineSum, FunctionPattern, Pattern
 
 if TYPE_CHECKING:
-    from vcc.camera import Camera
     from vcc.optics.train import Stage
 
 Array = NDArray[np.float64]
@@ -188,7 +188,7 @@ def finest_detail(pattern: Pattern) -> float | None:
 
 
 def sampling_limits(
-    camera: Camera,
+    camera: Train,
     frame: Affine,
     shape: tuple[int, int, int, int],
     vergences: tuple[float, float] | None,
@@ -224,7 +224,7 @@ class _Met:
 class _Limits:
     """The arguments of `sampling_limits`, and each item worked out from them."""
 
-    camera: Camera
+    camera: Train
     frame: Affine
     shape: tuple[int, int, int, int]
     vergences: tuple[float, float] | None

@@ -13,7 +13,8 @@ from vcc.advice.limits import GREEN_LIGHT, SamplingLimits, sampling_limits
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.camera import Camera
-from vcc.light_field import LightField, describe_geometry
+from vcc.fields.grid import Grid
+from vcc.light_field import LightField
 from vcc.plan.parallax_rule import vergences
 
 if TYPE_CHECKING:
@@ -119,18 +120,18 @@ def sampling_advice(
             raise InputError("views is for advice without a light field; this one has views of its own")
         frame, shape = light_field.frame, light_field.shape[:4]
         if known is None:
-            shown = vergences(light_field, None)
+            shown = vergences(light_field.grid, None)
             known = None if shown is None else (float(shown.min()), float(shown.max()))
-        words = "{}×{} views of {}×{} pixels".format(*shape) + f", {describe_geometry(light_field)}"
+        words = "{}×{} views of {}×{} pixels".format(*shape) + f", {light_field.grid.geometry}"
     else:
         if known is None:
             raise InputError(
                 "sampling advice needs a light field, or the scene's depths=(near, far) in metres, or both"
             )
         frame, shape = _asked_for(camera, known, views)
-        outline = LightField(np.broadcast_to(np.uint8(0), shape), frame)  # takes no memory
+        outline = Grid(tuple(shape), frame, np.dtype(np.float32))
         words = "none given. " + ("Needed is one of " if views is None else "Taken is one of ")
-        words += "{}×{} views of {}×{} pixels".format(*shape) + f", {describe_geometry(outline)}"
+        words += "{}×{} views of {}×{} pixels".format(*shape) + f", {outline.geometry}"
     limits = sampling_limits(camera, frame, (shape[0], shape[1], shape[2], shape[3]), known, wavelength)
     return SamplingAdvice(
         **{each.name: getattr(limits, each.name) for each in fields(SamplingLimits)},

@@ -26,8 +26,9 @@ from vcc.analysis.plane_spectrum import PlaneSpectrum, transformed_along
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_samples
+from vcc.fields.grid import Sample
 from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
-from vcc.light_field import LightField, Sample
+from vcc.light_field import LightField
 
 Array = NDArray[np.float64]
 Window = str | tuple[Any, ...] | None

@@ -31,7 +31,9 @@ def one_of(name: str, value: object, choices: Iterable[str]) -> str:
     words = list(choices)
     if value not in words:
         listed = ", ".join(map(repr, words[:-1])) + f" or {words[-1]!r}"
-        raise InputError(f"{name} is {listed}, not {value!r}")
+        raise InputError(
+            f"{name} is one of {listed}, not {value!r}" if len(words) > 3 else f"{name} is {listed}, not {value!r}"
+        )
     return str(value)
 
 

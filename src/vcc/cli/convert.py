@@ -133,7 +133,7 @@ def store_facts(path: Path, quick: bool) -> str:
         InputError: what `vcc.store.open_store` refuses.
     """
     from vcc.base.units import short
-    from vcc.light_field import SAMPLES_IN_WORDS, describe_geometry
+    from vcc.fields.grid import SAMPLES_IN_WORDS
     from vcc.store import open_store
 
     stored = open_store(path)
@@ -149,7 +149,7 @@ def store_facts(path: Path, quick: bool) -> str:
         "pictures": f"{ns} × {nt} pixels, {colour}{names}, {stored.dtype} {stored.transfer}",
         "samples": SAMPLES_IN_WORDS[stored.sample],
         "size": f"{packed / 1e6:,.1f} MB on disk, {stored.view_bytes * nv * nu / 1e6:,.1f} MB in memory, linear",
-        "cameras": describe_geometry(stored.outline),
+        "cameras": stored.grid.geometry,
     }
     if assumed := stored.provenance.get("assumed"):
         lines["assumed"] = f"{', '.join(map(str, assumed))}: the files it was made from did not state them"

@@ -140,7 +140,7 @@ def _describe_store(path: Path, quick: bool, picture: Path | None) -> str:
 def _facts(facts: FolderInfo) -> dict[str, str]:
     """What the folder or file states and what is taken for granted, line by line."""
     from vcc.base.units import short
-    from vcc.light_field import SAMPLES_IN_WORDS
+    from vcc.fields.grid import SAMPLES_IN_WORDS
 
     def assumed(name: str) -> str:
         return "  (not stated: assumed)" if name in facts.unknown else ""

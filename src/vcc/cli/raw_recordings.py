@@ -343,13 +343,12 @@ def write_light_field(
 
 def described(field: LightField, camera: Camera | None, output: Path) -> list[str]:
     """What a decoded light field is, and what to do next, in lines."""
-    from vcc.light_field import describe_geometry
 
     lines = []
     nv, nu, nt, ns = field.shape[:4]
     colour = "grey" if field.channels is None else f"{field.channels} channels"
     lines.append(f"  views    {nv}×{nu} of {ns}×{nt} pixels, {colour}")
     metric = "" if camera else "; not metric without --camera: disparities are right, distances are not"
-    lines.append(f"  cameras  {describe_geometry(field)}{metric}")
+    lines.append(f"  cameras  {field.grid.geometry}{metric}")
     lines.append(f"  next     vcc info {output}  ·  vcc refocus {output} --all-in-focus -o sharp.png")
     return lines

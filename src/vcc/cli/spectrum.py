@@ -62,7 +62,7 @@ def spectrum(
     from vcc.light_field import LightField
 
     if not isinstance(field, LightField):
-        check_size(field.outline.shape, limit, "the spectrum")  # before anything is read
+        check_size(field.grid.shape, limit, "the spectrum")  # before anything is read
         field = field.read()
     pictures_only = [None, None, "hann", "hann"]  # there are too few views to fade
     found = fft4(field, pictures_only if window == "hann" else None, memory_limit=limit)

@@ -19,6 +19,7 @@ from vcc.demo import story
 from vcc.demo.report import DemoReport, Timing, duration, speed_up
 from vcc.image import Image
 from vcc.light_field import LightField
+from vcc.run.drive import drive
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench, built_in, from_someone
 from vcc.showcase.figures import Crop, SheetRow, Shown
@@ -161,15 +162,12 @@ def _warm_up(bench: Bench) -> None:
 
     Views of the middle: those of the corners lie outside the round lens, and a plan passes them over.
     """
-    from vcc.engines import record
-
     row, column = (n // 2 for n in bench.light_field.shape[:2])
     middle = bench.light_field[row - 1 : row + 1, column - 1 : column + 1, :8, :8]
     middle = middle.replaced(np.ascontiguousarray(middle.values))
     for camera in (bench.conventional(bench.near), bench.cosine(), bench.coded()):
         for interpolation in INTERPOLATIONS:
-            plan = camera.compile(middle, interpolation=interpolation)
-            record(plan, middle.values)
+            drive(camera.compile(middle, interpolation=interpolation), middle)
 
 
 def _show_light_field(work: _Work, bench: Bench) -> None:

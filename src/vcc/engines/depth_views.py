@@ -12,25 +12,20 @@ filled from others: Chen and Williams 1993.)
 
 from __future__ import annotations
 
-import math
-import os
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError, ResultWarning
-from vcc.light_field import LightField
+from vcc.engines.depth_kernels import look_from_between, march_bounds, share_out, tile_ranges
+from vcc.fields.grid import Block, Grid
+from vcc.fields.samples import Samples
 from vcc.plan.depth_rule import ViewsBetween
-
-if TYPE_CHECKING:
-    from vcc.engines import EngineName, Progress
-    from vcc.plan.footprints.model import Plan
-    from vcc.run.pieces import Unread
 
 Array = NDArray[np.float32]
 
@@ -38,37 +33,8 @@ BAND = 64
 """Rows of a picture that a thread makes at once."""
 TEAR = 0.25
 """Pixels per view of disparity from pixel to pixel from which on a map shows a border, not a slanted surface."""
-IN_MEMORY = 2**28
-"""Bytes of denser views that are there at a time, of a light field in memory."""
 HELD = 0.25
 """Share of the memory that views and maps, kept to be used again, may take."""
-MUCH_UNSEEN = 0.01
-"""Share of the samples between views that no view shows, from which on a warning says it."""
-
-
-class InMemory:
-    """Samples in memory, given view by view.
-
-    Args:
-        values: (v, u, t, s[, channels]).
-    """
-
-    stored_bytes = 0
-
-    def __init__(self, values: NDArray[Any]) -> None:
-        self.values = values
-
-    @property
-    def outline(self) -> LightField:
-        """Their shape and type; where they lie, plans know."""
-        return LightField(self.values, Affine.identity(), _checked=True)
-
-    def check_complete(self) -> None:
-        """All views are there."""
-
-    def linear_view(self, row: int, column: int, first: int, stop: int) -> NDArray[Any]:
-        """Rows of pixels of one view."""
-        return self.values[row, column, first:stop]
 
 
 class _Held:
@@ -97,18 +63,15 @@ class DenserViews:
     """A light field with views in between, read like one on disk.
 
     Args:
-        source: the light field that there is: samples in memory, or a light field on disk.
+        source: the light field that there is: in memory, or on disk.
         between: how views in between are made.
+        threads: how many make a view at once.
         memory_limit: bytes; a share of it is for views and maps kept to be used again.
     """
 
-    def __init__(
-        self,
-        source: Unread,
-        between: ViewsBetween,
-        memory_limit: float = IN_MEMORY,
-    ) -> None:
-        self._source, self._given, self._between = source, source.outline.shape, between
+    def __init__(self, source: Samples, between: ViewsBetween, threads: int, memory_limit: float) -> None:
+        self._source, self._given, self._between = source, source.grid.shape, between
+        self._threads = threads
         self.unseen = 0
         """Samples made so far that no view shows."""
         self.made = 0
@@ -117,10 +80,12 @@ class DenserViews:
         self._own = {view: number for number, view in enumerate(between.maps.views)}
 
     @property
-    def outline(self) -> LightField:
+    def grid(self) -> Grid:
         """The shape and type of the denser light field; where it lies, plans know."""
-        shape = self._between.shape(self._given)
-        return LightField(np.broadcast_to(np.float32(0), shape), Affine.identity())
+        return Grid(self._between.shape(self._given), Affine.identity(), np.dtype(np.float32))
+
+    def whole(self) -> None:
+        """Made when they are read."""
 
     @property
     def stored_bytes(self) -> int:
@@ -131,8 +96,14 @@ class DenserViews:
         """Refuse a light field of which views are missing."""
         self._source.check_complete()
 
-    def linear_view(self, row: int, column: int, first: int, stop: int) -> Array:
-        """Rows of pixels of one view of the denser grid, radiance; see `vcc.run.pieces.Unread`."""
+    def read(self, block: Block) -> Array:
+        """The samples of a block of the denser grid, radiance."""
+        (a, b), (c, d), rows, columns = block.ranges
+        views = [[self._view(j, i, *rows)[:, slice(*columns)] for i in range(c, d)] for j in range(a, b)]
+        return np.stack([np.stack(row) for row in views]) if block.shape[:2] != (1, 1) else views[0][0][None, None]
+
+    def _view(self, row: int, column: int, first: int, stop: int) -> Array:
+        """Rows of pixels of one view of the denser grid."""
         down, across = self._between.times
         j, i = row // down, column // across
         y, x = (row % down + 0.5) / down - 0.5, (column % across + 0.5) / across - 0.5
@@ -164,17 +135,14 @@ class DenserViews:
 
     def _read(self, row: int, column: int) -> tuple[NDArray[Any], ...]:
         """A view (t, s, channels), its nearness (t, s) and the nearness's ranges."""
-        from vcc.engines.depth_kernels import tile_ranges
-
-        view = self._source.linear_view(row, column, 0, self._given[2])
+        whole = Block.all_of(self._given)
+        view = self._source.read(replace(whole, rows=(row, row + 1), columns=(column, column + 1)))[0, 0]
         view = np.ascontiguousarray(view, dtype=np.float32 if view.dtype == np.float16 else view.dtype)
         nearness = self._nearness(row, column)
         return view.reshape(*view.shape[:2], -1), nearness, tile_ranges(nearness)
 
     def _nearness(self, row: int, column: int) -> Array:
         """sign · disparity of a view: its own map's, or what the nearest map shows from there."""
-        from vcc.engines.depth_kernels import tile_ranges
-
         sign, maps = np.float32(self._between.parallax.sign), self._between.maps
         if (row, column) in self._own:
             return np.ascontiguousarray(sign * maps.values[self._own[row, column]])
@@ -192,12 +160,10 @@ class DenserViews:
 
         ``others``: more views, as far away as they are, and weights, for what the first one does not show.
         """
-        from vcc.engines.depth_kernels import share_out
-
         samples = view[0]
         out = np.zeros((stop - first, *samples.shape[1:]), dtype=np.float32)
         seen, far, near = np.empty((3, *out.shape[:2]), dtype=np.float32)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
+        with ThreadPoolExecutor(self._threads) as pool:
             self._look(pool, view, away, 1.0, False, first, (out, seen, far, near))
             if (seen < 0).any():
                 for other, distance, weight in others:
@@ -214,8 +180,6 @@ class DenserViews:
         first: int,
         into: tuple[Array, ...],
     ) -> None:
-        from vcc.engines.depth_kernels import look_from_between, march_bounds
-
         samples, nearness, ranges = view
         parallax = self._between.parallax
         down, across = away
@@ -232,40 +196,3 @@ class DenserViews:
             )
 
         list(pool.map(band, range(0, len(into[0]), BAND)))
-
-
-def run(plan: Plan, values: Any, engine: EngineName, progress: Progress | None = None) -> Any:
-    """The picture of samples (v, u, t, s[, channels]) by a plan with ``views_between``; see `run_plan`.
-
-    Raises:
-        InputError: samples that are no NumPy array.
-    """
-    from vcc.run.pieces import record_pieces
-
-    if not isinstance(values, np.ndarray):
-        raise InputError(
-            f"between_views='depth' takes NumPy arrays, not {type(values).__module__}.{type(values).__name__}: "
-            "pass light_field.replaced(numpy.asarray(values)), or between_views='auto', which carries gradients"
-        )
-    source = InMemory(values)
-    return record_pieces(plan, source, engine=engine, memory_limit=_room(plan, source), progress=progress).values
-
-
-def _room(plan: Plan, source: InMemory) -> int:
-    """Bytes for blocks of denser views: as few as serve well, and as many as a block of one view takes."""
-    from vcc.run.pieces import least_memory
-
-    return max(IN_MEMORY, math.ceil(least_memory(plan, source.outline) / (1 - HELD)))
-
-
-def warn_of_unseen(views: DenserViews, stacklevel: int) -> None:
-    """Say it if much of what lies between views is seen by none."""
-    import warnings
-
-    if views.made and views.unseen > MUCH_UNSEEN * views.made:
-        warnings.warn(
-            f"{views.unseen / views.made:.1%} of the samples between views show what none of the views around "
-            "them shows (it is hidden there, or outside their pictures): borders go on there",
-            ResultWarning,
-            stacklevel=stacklevel,
-        )

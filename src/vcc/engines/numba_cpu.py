@@ -10,8 +10,7 @@ bands of rows.
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -21,12 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.engines import numba_kernels as kernels
-from vcc.engines.smear import LONG, finish, finishing_terms
+from vcc.engines import rays_compiled, sharpening_kernels
 from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
-from vcc.plan.footprints.model import Plan
+from vcc.plan import operators
+from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import REACH, Division, taps
-
-Progress = Callable[[int, int], None]
+from vcc.plan.protocol import Partial, Progress
+from vcc.plan.rays.model import Rays
 
 BAND = 64
 """Rows of the picture that a thread works on at once, at most."""
@@ -36,54 +36,93 @@ MASK_LINES = 64
 """Lines of a mask that a thread samples at once."""
 
 
-def run(plan: Plan, values: NDArray[Any], progress: Progress | None = None) -> NDArray[Any]:
-    """The picture of samples (v, u, t, s[, channels]) by a plan, float32; see `vcc.engines.run_plan`."""
+def footprints(
+    core: Footprints, values: NDArray[Any], *, beside: int = 0, threads: int, progress: Progress | None = None
+) -> Partial:
+    """The raster of samples (v, u, t, s[, channels]), float32; see `vcc.plan.protocol.Runner`."""
     channels = values.shape[4] if values.ndim == 5 else 1
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        if plan.separable:
-            raster = _ByColumns(plan, channels, pool).raster(values, progress)
+    with ThreadPoolExecutor(threads) as pool:
+        if core.separable:
+            raster = _ByColumns(core, channels, pool).raster(values, progress)
         else:
-            raster = _sheared(plan, values, channels, pool, progress)
-        picture = _finished(plan, raster, channels, pool)
-    return picture if values.ndim == 5 else picture[..., 0]
+            raster = _sheared(core, values, channels, pool, progress)
+    return Partial(raster.reshape(*core.raster_shape, channels))
 
 
-def memory(plan: Plan, channels: int) -> int:
-    """Bytes that a run takes beside the light field and the picture, estimated."""
-    line = 4 * channels * plan.samples[1] * plan.refine
-    raster = 4 * channels * math.prod(plan.raster_shape)
+def rays(
+    core: Rays, values: NDArray[Any], *, beside: int = 0, threads: int, progress: Progress | None = None
+) -> Partial:
+    """The raster of samples (v, u, t, s[, channels]), float32, by compiled rays."""
+    return rays_compiled.traced(core, values, beside, threads, progress)
+
+
+def takes(values: Any) -> bool:
+    """NumPy's."""
+    return values is None or isinstance(values, np.ndarray)
+
+
+def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:
+    """Samples as a core takes them: what is sharpened is so by compiled loops, to the bit as plainly."""
+    for operator in before:
+        if isinstance(operator, operators.SharpenViews):
+            values = sharpening_kernels.filtered(operator.weights, values, threads)
+        else:
+            values = operator.apply(values)
+    return values
+
+
+def finished(after: Sequence[operators.After], raster: NDArray[Any], threads: int) -> NDArray[np.float32]:
+    """The picture (rows, columns, channels), float32, of a raster (rows, columns, channels).
+
+    Short filters along the axes and what lies against the sensor are done in one pass.
+    """
+    match list(operators.merged(after)):
+        case []:
+            return np.asarray(raster, dtype=np.float32)
+        case [operators.AlongAxes() as along, operators.OnSensor() as on] if (
+            on.detail is None and max(len(along.down), len(along.across)) < operators.LONG
+        ):
+            return _in_one_pass(along, on, np.asarray(raster, dtype=np.float32), threads)
+        case merged:
+            return np.asarray(operators.finished(merged, raster), dtype=np.float32)
+
+
+def _in_one_pass(
+    along: operators.AlongAxes, on: operators.OnSensor, raster: NDArray[np.float32], threads: int
+) -> NDArray[np.float32]:
+    rows, columns, channels = raster.shape
+    rows, columns = rows - 2 * on.guard, columns - 2 * on.guard
+    picture = np.empty((rows, columns * channels), dtype=np.float32)
+    transmission = np.zeros((0, 0)) if on.transmission is None else on.transmission
+    weights = along.down.astype(np.float32), along.across.astype(np.float32)
+    lines = raster.reshape(raster.shape[0], -1)
+
+    def filtered(start: int) -> None:
+        stop = min(start + BAND, rows)
+        kernels.filter_rows(lines, *weights, channels, on.guard, transmission, start, stop, picture)
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(filtered, range(0, rows, BAND)))
+    return picture.reshape(rows, columns, channels)
+
+
+def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
+    """Bytes that a run takes beside the samples and the raster, estimated."""
+    if isinstance(core, Rays):
+        # Once in the core's steps and once as the kernel reads them; a single large table is not copied.
+        return int(core.points.nbytes + 2 * core.tables_bytes)
+    line = 4 * channels * core.samples[1] * core.refine
+    raster = 4 * channels * math.prod(core.raster_shape)
     band = _band(line)
     # A band's sums, eight of them turned, and the rows of a view where its samples are divided.
-    thread = (band + EIGHT + (2 * band if plan.refine > 1 else 0)) * line
-    masks = sum(mask.texture.nbytes + len(mask.texture) * line for mask in plan.masks)
-    return (os.cpu_count() or 1) * thread + 2 * raster + masks
+    thread = (band + EIGHT + (2 * band if core.refine > 1 else 0)) * line
+    masks = sum(mask.texture.nbytes + len(mask.texture) * line for mask in core.masks)
+    return threads * thread + 2 * raster + masks
 
 
 def _band(line: int) -> int:
     """How many rows of the picture make a band whose lines of sums take so many bytes: a multiple of eight."""
     return int(np.clip(BAND_BYTES // line, EIGHT, BAND)) // EIGHT * EIGHT
-
-
-def _finished(
-    plan: Plan, raster: NDArray[np.float32], channels: int, pool: ThreadPoolExecutor
-) -> NDArray[np.float32]:
-    """The picture (rows, columns, channels) from the raster (rows, columns × channels)."""
-    rows, columns = plan.sensor_shape
-    ((down, across),) = finishing_terms(plan) if plan.blur is None else [(np.ones(LONG), np.ones(LONG))]
-    if max(len(down), len(across)) >= LONG or plan.sensor_detail is not None:
-        return finish(plan, raster.reshape(*plan.raster_shape, channels))
-    if down.tolist() == across.tolist() == [1.0] and not plan.guard and plan.sensor_transmission is None:
-        return raster.reshape(rows, columns, channels)
-    picture = np.empty((rows, columns * channels), dtype=np.float32)
-    transmission = np.zeros((0, 0)) if plan.sensor_transmission is None else plan.sensor_transmission
-    weights = down.astype(np.float32), across.astype(np.float32)
-
-    def filtered(start: int) -> None:
-        stop = min(start + BAND, rows)
-        kernels.filter_rows(raster, *weights, channels, plan.guard, transmission, start, stop, picture)
-
-    list(pool.map(filtered, range(0, rows, BAND)))
-    return picture.reshape(rows, columns, channels)
 
 
 @dataclass(frozen=True)
@@ -108,14 +147,14 @@ class _Block:
 class _FineGrid:
     """The samples of a view after division: how many, the index of the first, and how they are made."""
 
-    def __init__(self, plan: Plan) -> None:
-        self.samples = plan.samples
-        self.rows, self.columns = plan.samples
+    def __init__(self, core: Footprints) -> None:
+        self.samples = core.samples
+        self.rows, self.columns = core.samples
         self.first_row = self.first_column = 0.0
         self.divided_as: tuple[Division, Division] | None = None
         self.tables: tuple[NDArray[Any], ...] = ()
-        if plan.refine > 1:
-            down, across = (plan.division(n) for n in plan.samples)
+        if core.refine > 1:
+            down, across = (core.division(n) for n in core.samples)
             self.rows, self.columns = len(down.first), len(across.first)
             self.first_row, self.first_column = down.start, across.start
             self.divided_as = down, across
@@ -137,43 +176,43 @@ class _FineGrid:
         return np.ascontiguousarray(fine, dtype=np.float32)
 
 
-def _blocks(plan: Plan, values: NDArray[Any], by_column: bool) -> Iterator[_Block]:
+def _blocks(core: Footprints, values: NDArray[Any], by_column: bool) -> Iterator[_Block]:
     """The samples in pieces that kernels can read, without ever copying more than a column of views."""
     nv, nu, nt, ns = values.shape[:4]
     channels = values.shape[4] if values.ndim == 5 else 1
-    taps = len(plan.view_columns)
+    taps = len(core.view_columns)
     n = ns * channels
     if values.flags.c_contiguous and values.dtype != np.float16 and n >= SHORTEST:
         view = nt * n
         flat = values.reshape(-1)
-        begin, column_begin = plan.view_rows * (nu * view), plan.view_columns * view
+        begin, column_begin = core.view_rows * (nu * view), core.view_columns * view
         for a in range(taps) if by_column else (0,):
             yield _Block(flat, begin, column_begin, n, (a, a + 1) if by_column else (0, taps))
         return
     kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
     missing = max(math.ceil(SHORTEST / channels) - ns, 0)
-    for a in map(int, np.flatnonzero((plan.weights != 0).any(axis=0))):
-        column = values[:, plan.view_columns[a]]
+    for a in map(int, np.flatnonzero((core.weights != 0).any(axis=0))):
+        column = values[:, core.view_columns[a]]
         if missing:
             column = np.pad(column, [(0, 0), (0, 0), (0, missing), *[(0, 0)] * (values.ndim - 4)])
         column = np.ascontiguousarray(column, dtype=kind).reshape(nv, nt, -1)
         pitch = column.shape[2]
-        begin, none = plan.view_rows * (nt * pitch), np.zeros(taps, dtype=np.int64)
+        begin, none = core.view_rows * (nt * pitch), np.zeros(taps, dtype=np.int64)
         yield _Block(column.reshape(-1), begin, none, pitch, (a, a + 1))
 
 
 class _ByColumns:
     """Tables for plans in which rows and columns part, and the loop over columns of views and bands."""
 
-    def __init__(self, plan: Plan, channels: int, pool: ThreadPoolExecutor) -> None:
-        self.plan, self.channels, self.pool = plan, channels, pool
-        self.fine = fine = _FineGrid(plan)
-        rows, columns = plan.raster_shape
-        start_y = plan.y[:, 0] + plan.row_step * fine.first_row
-        start_x = plan.x[0] + plan.column_step * fine.first_column
-        row_step, column_step = plan.row_step / plan.refine, plan.column_step / plan.refine
-        self.down = taps(plan.interpolation, start_y, row_step, fine.rows, rows, plan.opening)
-        self.across = taps(plan.interpolation, start_x, column_step, fine.columns, columns, plan.opening)
+    def __init__(self, core: Footprints, channels: int, pool: ThreadPoolExecutor) -> None:
+        self.core, self.channels, self.pool = core, channels, pool
+        self.fine = fine = _FineGrid(core)
+        rows, columns = core.raster_shape
+        start_y = core.y[:, 0] + core.row_step * fine.first_row
+        start_x = core.x[0] + core.column_step * fine.first_column
+        row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
+        self.down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
+        self.across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
         # How many rows of samples four rows of the raster gather, and how many the next four need anew.
         ends = np.pad(self.down.first, [(0, 0), (0, -rows % ROWS)], mode="edge").reshape(len(start_y), -1, ROWS)
         self.reach = int(np.ptp(ends, axis=2).max(initial=0)) + self.down.weights.shape[2]
@@ -181,20 +220,20 @@ class _ByColumns:
         self.mirrored = column_step < 0
         if self.mirrored:
             self.across = self.across.mirrored()
-        self.weights = (plan.weights * plan.scale).astype(np.float32)
+        self.weights = (core.weights * core.scale).astype(np.float32)
         # A mask's weight counts for all channels of a sample: for three of them as it is looked up, for other
         # numbers by being repeated.
         self.shared, self.repeated = (3, 1) if channels == 3 else (1, channels)
-        self.mask_rows = np.array([len(mask.texture) for mask in plan.masks], dtype=np.int64)
-        self.mask_row_step = np.array([mask.step[1, 1] / plan.refine for mask in plan.masks], dtype=np.float64)
+        self.mask_rows = np.array([len(mask.texture) for mask in core.masks], dtype=np.int64)
+        self.mask_row_step = np.array([mask.step[1, 1] / core.refine for mask in core.masks], dtype=np.float64)
         self.lines = np.zeros((0, 0), dtype=np.float32)
 
     def raster(self, values: NDArray[Any], progress: Progress | None) -> NDArray[np.float32]:
         """The sum over all samples: the raster (rows, columns × channels)."""
-        plan, fine, done = self.plan, self.fine, 0
-        rows, columns = plan.raster_shape
+        core, fine, done = self.core, self.fine, 0
+        rows, columns = core.raster_shape
         tiles = np.zeros((-(-rows // EIGHT), columns * self.channels, EIGHT), dtype=np.float32)
-        for block in _blocks(plan, values, bool(plan.masks) or plan.refine > 1 or progress is not None):
+        for block in _blocks(core, values, bool(core.masks) or core.refine > 1 or progress is not None):
             first, end = block.columns
             if not self.weights[:, first:end].any():
                 continue
@@ -203,7 +242,7 @@ class _ByColumns:
             list(self.pool.map(add, range(0, rows, _band(4 * pitch))))
             if progress is not None:
                 done += int(np.count_nonzero(self.weights[:, first:end]))
-                progress(done, plan.taps_used)
+                progress(done, core.taps_used)
         raster = np.empty((rows, columns * self.channels), dtype=np.float32)
 
         def untiled(start: int) -> None:
@@ -218,11 +257,11 @@ class _ByColumns:
         self, block: _Block, pitch: int, masks: tuple[Any, ...] | None, tiles: NDArray[np.float32], start: int
     ) -> None:
         """Add one block's samples to the band of raster rows that begins at ``start``."""
-        stop = min(start + _band(4 * pitch), self.plan.raster_shape[0])
+        stop = min(start + _band(4 * pitch), self.core.raster_shape[0])
         first, end = block.columns
         rows = self.down.first, self.down.weights, self.reach, self.advance
         across = self.across.first, self.across.weights
-        if self.plan.refine > 1:
+        if self.core.refine > 1:
             for a in range(first, end):
                 begin = block.begin + block.column_begin[a]
                 kernels.add_divided_column(
@@ -241,15 +280,15 @@ class _ByColumns:
         Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: each group of taps
         that agree gets the lines that it needs.
         """
-        plan, fine = self.plan, self.fine
-        if not plan.masks:
+        core, fine = self.core, self.fine
+        if not core.masks:
             return None
         used = np.flatnonzero(self.weights[:, a])
-        begin = np.zeros((len(plan.masks), len(plan.view_rows)), dtype=np.int64)
+        begin = np.zeros((len(core.masks), len(core.view_rows)), dtype=np.int64)
         row = np.zeros(begin.shape)
         total = 0
         pieces: list[tuple[NDArray[np.float32], NDArray[np.float64], int]] = []
-        for number, mask in enumerate(plan.masks):
+        for number, mask in enumerate(core.masks):
             step = self.mask_row_step[number]
             row[number] = mask.row[:, a] + mask.step[1, 1] * fine.first_row
             ends = np.sort([row[number], row[number] + step * (fine.rows - 1)], axis=0)
@@ -261,7 +300,7 @@ class _ByColumns:
                 if low >= high:  # all of it lies beyond the mask's border, where it is dark
                     continue
                 begin[number, taps] = total - low
-                columns = place + mask.step[0, 0] * (fine.first_column + np.arange(fine.columns) / plan.refine)
+                columns = place + mask.step[0, 0] * (fine.first_column + np.arange(fine.columns) / core.refine)
                 pieces += [
                     (mask.texture[n : min(n + MASK_LINES, high)], columns, total + n - low)
                     for n in range(low, high, MASK_LINES)
@@ -280,34 +319,34 @@ class _ByColumns:
 
 
 def _sheared(
-    plan: Plan, values: NDArray[Any], channels: int, pool: ThreadPoolExecutor, progress: Progress | None
+    core: Footprints, values: NDArray[Any], channels: int, pool: ThreadPoolExecutor, progress: Progress | None
 ) -> NDArray[np.float32]:
     """The raster (rows, columns × channels) where rows and columns do not part."""
-    raster = np.zeros((*plan.raster_shape, channels), dtype=np.float32)
-    fine = _FineGrid(plan)
-    size = np.array([mask.texture.shape for mask in plan.masks], dtype=np.int64).reshape(-1, 2)
-    textures = np.zeros((len(plan.masks), *size.max(axis=0, initial=1)), dtype=np.float32)
-    for texture, mask in zip(textures, plan.masks, strict=True):
+    raster = np.zeros((*core.raster_shape, channels), dtype=np.float32)
+    fine = _FineGrid(core)
+    size = np.array([mask.texture.shape for mask in core.masks], dtype=np.int64).reshape(-1, 2)
+    textures = np.zeros((len(core.masks), *size.max(axis=0, initial=1)), dtype=np.float32)
+    for texture, mask in zip(textures, core.masks, strict=True):
         texture[: mask.texture.shape[0], : mask.texture.shape[1]] = mask.texture
-    mask_step = np.array([mask.step for mask in plan.masks]).reshape(-1, 2, 2)
-    row_step, column_step = plan.row_step, plan.column_step
-    code = list(REACH).index(plan.interpolation)
-    for done, (b, a) in enumerate(zip(*np.nonzero(plan.weights), strict=True)):
+    mask_step = np.array([mask.step for mask in core.masks]).reshape(-1, 2, 2)
+    row_step, column_step = core.row_step, core.column_step
+    code = list(REACH).index(core.interpolation)
+    for done, (b, a) in enumerate(zip(*np.nonzero(core.weights), strict=True)):
         if progress is not None:
-            progress(done, plan.taps_used)
-        view = fine.divided(values[plan.view_rows[b], plan.view_columns[a]].reshape(*plan.samples, -1))
-        place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in plan.masks]).reshape(-1, 2)
+            progress(done, core.taps_used)
+        view = fine.divided(values[core.view_rows[b], core.view_columns[a]].reshape(*core.samples, -1))
+        place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
 
         def band(start: int, view=view, place=place, b=b, a=a) -> None:  # type: ignore[no-untyped-def]
             kernels.sheared_view(
-                view, plan.weights[b, a] * plan.scale, code, REACH[plan.interpolation],
-                plan.x[b, a], plan.y[b, a], plan.step, plan.shear, row_step, column_step,
-                row_step / plan.refine, column_step / plan.refine, fine.first_column, fine.first_row,
-                plan.refine, textures, size, place, mask_step, start, min(start + BAND, len(raster)), plan.opening,
+                view, core.weights[b, a] * core.scale, code, REACH[core.interpolation],
+                core.x[b, a], core.y[b, a], core.step, core.shear, row_step, column_step,
+                row_step / core.refine, column_step / core.refine, fine.first_column, fine.first_row,
+                core.refine, textures, size, place, mask_step, start, min(start + BAND, len(raster)), core.opening,
                 raster,
             )  # fmt: skip
 
         list(pool.map(band, range(0, len(raster), BAND)))
     if progress is not None:
-        progress(plan.taps_used, plan.taps_used)
+        progress(core.taps_used, core.taps_used)
     return raster.reshape(len(raster), -1)

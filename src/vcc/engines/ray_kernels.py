@@ -12,6 +12,8 @@ import math
 import numpy as np
 from numba import njit
 
+from vcc.engines.bilinear import around, bilinear
+from vcc.engines.ray_tables import Drawn, Packet
 from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add_views_of_4
 from vcc.plan.rays.model import DIGITS
 
@@ -67,30 +69,36 @@ def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
-    """(row, column, next row, next column, way to it, way to it) of a place on a texture."""
-    column = min(max((x - real[0]) * real[2], 0.0), columns - 1.0)
-    row = min(max((y - real[1]) * real[3], 0.0), rows - 1.0)
-    c, r = min(int(column), max(columns - 2, 0)), min(int(row), max(rows - 2, 0))
-    return r, c, min(r + 1, rows - 1), min(c + 1, columns - 1), row - r, column - c
+    """(columns, row, next row, column, next column, way down, way to the right) of a place on a texture."""
+    c, c1, right = around((x - real[0]) * real[2], columns)
+    r, r1, down = around((y - real[1]) * real[3], rows)
+    return columns, r, r1, c, c1, down, right
 
 
 @njit(**OPTIONS)
-def mixed(table, start, width, number, columns, at):  # type: ignore[no-untyped-def]
-    """One of ``width`` numbers of a texture at a place that `corner` found."""
-    r, c, r1, c1, fr, fc = at
-    above = table[start + (r * columns + c) * width + number] * (1 - fc)
-    above += table[start + (r * columns + c1) * width + number] * fc
-    below = table[start + (r1 * columns + c) * width + number] * (1 - fc)
-    below += table[start + (r1 * columns + c1) * width + number] * fc
-    return above * (1 - fr) + below * fr
+def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
+    """One of ``width`` numbers of the texture that begins at ``start``, at a place that `corner` found."""
+    columns, r, r1, c, c1, down, right = at
+    above, below, start = r * columns, r1 * columns, start + number
+    return bilinear(
+        table[start + (above + c) * width],
+        table[start + (above + c1) * width],
+        table[start + (below + c) * width],
+        table[start + (below + c1) * width],
+        right,
+        down,
+    )
 
 
 @njit(**INLINED)
-def take_steps(codes, whole, real, shares, slopes, points, first, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
-    """Take a packet of n rays, whose points of the table begin at ``first``, through all steps.
+def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
+    """Take a packet of rays through all steps.
 
     Numbers of a step are read before its loop, so that loops without branches run on several rays at once.
     """
+    codes, whole, real, shares, slopes = steps
+    points, first, n, _ = drawn
+    x, y, s, t, share = rays
     for step in range(len(codes)):
         code, a, f = codes[step], whole[step], real[step]
         if code == 0:
@@ -157,8 +165,8 @@ def take_steps(codes, whole, real, shares, slopes, points, first, n, x, y, s, t,
         elif code == 5:
             for p in range(n):
                 at = corner(x[p], y[p], a[0], a[1], f)
-                s[p] -= mixed(slopes, a[2], 2, 0, a[1], at)
-                t[p] -= mixed(slopes, a[2], 2, 1, a[1], at)
+                s[p] -= mixed(slopes, a[2], 2, 0, at)
+                t[p] -= mixed(slopes, a[2], 2, 1, at)
         elif code == 6:
             f0, f1, f2 = f[0], f[1], f[2]
             for p in range(n):
@@ -176,7 +184,7 @@ def take_steps(codes, whole, real, shares, slopes, points, first, n, x, y, s, t,
         elif code == 9:
             for p in range(n):
                 at = corner(x[p], y[p], a[0], a[1], f)
-                share[p] *= mixed(shares, a[2], 1, 0, a[1], at)
+                share[p] *= mixed(shares, a[2], 1, 0, at)
         elif code == 12:
             for p in range(n):
                 for axis in range(2):
@@ -195,19 +203,23 @@ def take_steps(codes, whole, real, shares, slopes, points, first, n, x, y, s, t,
                 if a[3] > 0:
                     at = corner(x[p], y[p], a[3], a[4], f)
                     picked = points[a[2], first + p]
-                    while kernel < a[1] - 1 and picked >= mixed(shares, a[5], a[1], kernel, a[4], at):
+                    while kernel < a[1] - 1 and picked >= mixed(shares, a[5], a[1], kernel, at):
                         kernel += 1
                 stretch = 1.0
                 if a[6] > 0:
                     at = corner(x[p], y[p], a[6], a[7], f[4:])
-                    stretch = mixed(shares, a[8], 1, 0, a[7], at)
+                    stretch = mixed(shares, a[8], 1, 0, at)
                 s[p] -= stretch * points[a[0] + 2 * kernel, first + p]
                 t[p] -= stretch * points[a[0] + 2 * kernel + 1, first + p]
 
 
 @njit(**OPTIONS)
-def add_view(values, base, k, l, rows, columns, channels, weight, found):  # type: ignore[no-untyped-def]
-    """Add a view's value at pixel (k, l), interpolated linearly and dark outside, times a weight."""
+def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def]
+    """Add a view's value at pixel (k, l), interpolated linearly and dark outside, times a weight.
+
+    ``base`` is where the view's samples begin.
+    """
+    values, (_, _, rows, columns), channels = samples
     k0, l0 = math.floor(k), math.floor(l)
     fk, fl = np.float32(k - k0), np.float32(l - l0)
     one = np.float32(1)
@@ -252,16 +264,16 @@ def add_view(values, base, k, l, rows, columns, channels, weight, found):  # typ
 
 
 @njit(**INLINED)
-def add_rays(  # type: ignore[no-untyped-def]
-    values, views, channels, index, motion, between, ends, n, second, x, y, s, t, share, sums, tally,
-):  # fmt: skip
+def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-def]
     """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
 
     Rays from ``second`` on belong to the second half. ``tally`` collects the weights of all rays and of those that
     the light field does not hold. Places are replaced by indices.
     """
-    nv, nu, nt, ns = views[0], views[1], views[2], views[3]
-    to_indices(index, n, x, y, s, t)
+    samples, _, index, motion, between, ends = field
+    values, (nv, nu, nt, ns), channels = samples
+    x, y, s, t, share = rays
+    to_indices(index, rays, n)
     flat = sums.reshape(-1)
     # Where x and y do not mix, the pixels looked at in four views are two columns and two rows.
     parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
@@ -293,7 +305,7 @@ def add_rays(  # type: ignore[no-untyped-def]
         if not between:
             i0, j0 = int(ci + 0.5), int(cj + 0.5)
             base = j0 * row_of_views + i0 * picture
-            add_view(values, base, k, l, nt, ns, channels, np.float32(weight), sums[half])
+            add_view(samples, base, k, l, np.float32(weight), sums[half])
             continue
         i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
         fi, fj = ci - i0, cj - j0
@@ -314,29 +326,18 @@ def add_rays(  # type: ignore[no-untyped-def]
                 upper = np.float32(weight) - lower
                 above_1, below_1 = upper * fl0, lower * fl1
                 left_1, right_1 = (one - fi) * fk0, fi * fk1
-                upper_left = base + r0 + c0
-                upper_right = base + picture + r0 + c1
-                lower_left = base + row_of_views + r1 + c0
-                lower_right = base + row_of_views + picture + r1 + c1
+                upper_corners = base + r0 + c0, base + picture + r0 + c1
+                lower_corners = base + row_of_views + r1 + c0, base + row_of_views + picture + r1 + c1
+                corners = upper_corners + lower_corners
+                rows = upper - above_1, above_1, lower - below_1, below_1
+                columns = one - fi - left_1, left_1, fi - right_1, right_1
                 at = half * sums.shape[1]
                 if channels == 3:
-                    add_views_of_3(
-                        values, upper_left, upper_right, lower_left, lower_right, line,
-                        upper - above_1, above_1, lower - below_1, below_1,
-                        one - fi - left_1, left_1, fi - right_1, right_1, flat, at,
-                    )  # fmt: skip
+                    add_views_of_3(values, corners, line, rows, columns, flat, at)
                 elif channels == 1:
-                    add_views_of_1(
-                        values, upper_left, upper_right, lower_left, lower_right, line,
-                        upper - above_1, above_1, lower - below_1, below_1,
-                        one - fi - left_1, left_1, fi - right_1, right_1, flat, at,
-                    )  # fmt: skip
+                    add_views_of_1(values, corners, line, rows, columns, flat, at)
                 else:
-                    add_views_of_4(
-                        values, upper_left, upper_right, lower_left, lower_right, line,
-                        upper - above_1, above_1, lower - below_1, below_1,
-                        one - fi - left_1, left_1, fi - right_1, right_1, flat, at,
-                    )  # fmt: skip
+                    add_views_of_4(values, corners, line, rows, columns, flat, at)
                 continue
         for dj in range(2):
             wj = weight * (fj if dj else 1.0 - fj)
@@ -350,7 +351,7 @@ def add_rays(  # type: ignore[no-untyped-def]
                 view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j
                 view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
                 base = (j0 + dj) * row_of_views + (i0 + di) * picture
-                add_view(values, base, view_k, view_l, nt, ns, channels, np.float32(w), sums[half])
+                add_view(samples, base, view_k, view_l, np.float32(w), sums[half])
     tally[0] += asked
     tally[1] += missing
 
@@ -365,9 +366,9 @@ def fold_lanes(sums, channels):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINED)
-def to_indices(index, n, x, y, s, t):  # type: ignore[no-untyped-def]
-    """Replace the places and slopes of n rays by their indices (i, j, k, l)."""
-    m = index
+def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
+    """Replace the places and slopes of n rays by their indices (i, j, k, l), by a 4×5 matrix."""
+    x, y, s, t, _ = rays
     if m[0, 1] == m[0, 3] == m[1, 0] == m[1, 2] == m[2, 1] == m[2, 3] == m[3, 0] == m[3, 2] == 0.0:
         a, b, c, d, e, f = m[0, 0], m[0, 2], m[0, 4], m[2, 0], m[2, 2], m[2, 4]
         for p in range(n):
@@ -398,51 +399,53 @@ def hashed(number, seed):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINED)
-def set_image(images, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
+def set_image(image, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
     """Numbers by which `through_cell` finds the stop's image seen through a cell, along one axis, and the cell."""
-    gain = cells[6, axis] + power * cells[8, axis]
+    gain = cells.beyond[axis] + power * cells.beyond_from_slope[axis]
     if abs(gain) < 1e-12:
         gain = 1e-12
-    rest = cells[10, axis] - cells[9, axis] + cells[8, axis] * (power * centre + slope)
-    images[axis, 0] = rest / gain
-    images[axis, 1] = -cells[7, axis] / gain
-    images[axis, 2] = cells[11, axis] / abs(gain)
-    images[axis, 3] = centre
-    images[axis, 4] = cells[12, axis]
+    from_slope = cells.beyond_from_slope[axis] * (power * centre + slope)
+    rest = cells.middle[axis] - cells.beyond_offset[axis] + from_slope
+    image[0] = rest / gain
+    image[1] = -cells.beyond_from_sensor[axis] / gain
+    image[2] = cells.half[axis] / abs(gain)
+    image[3] = centre
+    image[4] = cells.cell_half[axis]
 
 
 @njit(**OPTIONS)
-def kind_of(cell_whole, row, column):  # type: ignore[no-untyped-def]
-    """Which kind of cell this is; divisions are spared where there is one kind, the usual case."""
-    if cell_whole[1] * cell_whole[2] == 1:
-        return np.int64(0)
-    return (row % cell_whole[1]) * cell_whole[2] + column % cell_whole[2]
+def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
+    """(power, δs, δt) of a cell; divisions are spared where there is one kind, the usual case."""
+    rows, columns = kinds.shape[0], kinds.shape[1]
+    one = rows * columns == 1
+    r, c = (0, 0) if one else (row % rows, column % columns)
+    return kinds[r, c, 0], kinds[r, c, 1], kinds[r, c, 2]
 
 
 @njit(**INLINED)
-def cells_seen(cells, cell_kinds, cell_whole, x, y, pixels, near):  # type: ignore[no-untyped-def]
+def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
     """Fill ``near`` with the (row, column) of the cells through which a pixel sees the stop; returns how many."""
-    turn = cells[0:3].ravel()
-    centre_x = (cells[10, 0] - cells[9, 0] - cells[7, 0] * x) / cells[6, 0]
-    centre_y = (cells[10, 1] - cells[9, 1] - cells[7, 1] * y) / cells[6, 1]
-    row, column, _, _ = cell_of(cell_whole[0], turn, centre_x, centre_y)
+    beyond, from_sensor, from_slope = cells.beyond, cells.beyond_from_sensor, cells.beyond_from_slope
+    offset, middle, half, cell_half = cells.beyond_offset, cells.middle, cells.half, cells.cell_half
+    centre_x = (middle[0] - offset[0] - from_sensor[0] * x) / beyond[0]
+    centre_y = (middle[1] - offset[1] - from_sensor[1] * y) / beyond[1]
+    row, column, _, _ = cell_of(cells.layout, cells.turn, centre_x, centre_y)
     # The place p(a) = gain·a + rest at the stop, over the cell and the pixel, must meet the stop.
-    loose_x, loose_y = abs(cells[7, 0]) * pixels[0, 2] / 2, abs(cells[7, 1]) * pixels[1, 2] / 2
-    rest_x = cells[7, 0] * x + cells[9, 0] - cells[10, 0]
-    rest_y = cells[7, 1] * y + cells[9, 1] - cells[10, 1]
+    loose_x, loose_y = abs(from_sensor[0]) * sensitive[0] / 2, abs(from_sensor[1]) * sensitive[1] / 2
+    rest_x = from_sensor[0] * x + offset[0] - middle[0]
+    rest_y = from_sensor[1] * y + offset[1] - middle[1]
     found = 0
-    for r in range(row - cell_whole[3], row + cell_whole[3] + 1):
-        for c in range(column - cell_whole[4], column + cell_whole[4] + 1):
-            centre_x, centre_y = centre_of(cell_whole[0], turn, r, c)
-            kind = kind_of(cell_whole, r, c)
-            power = cell_kinds[kind, 0]
+    for r in range(row - cells.reach[0], row + cells.reach[0] + 1):
+        for c in range(column - cells.reach[1], column + cells.reach[1] + 1):
+            centre_x, centre_y = centre_of(cells.layout, cells.turn, r, c)
+            power, slope_x, slope_y = kind_of(cells.kinds, r, c)
             # At the centre the cell's lens does nothing: there p is beyond·centre + rest.
-            gain = abs(cells[6, 0] + power * cells[8, 0])
-            off = abs(cells[6, 0] * centre_x + rest_x - cells[8, 0] * cell_kinds[kind, 1])
-            seen = off <= cells[11, 0] + (gain * cells[12, 0] + loose_x) * (1 + 1e-9)
-            gain = abs(cells[6, 1] + power * cells[8, 1])
-            off = abs(cells[6, 1] * centre_y + rest_y - cells[8, 1] * cell_kinds[kind, 2])
-            if seen and off <= cells[11, 1] + (gain * cells[12, 1] + loose_y) * (1 + 1e-9):
+            gain = abs(beyond[0] + power * from_slope[0])
+            off = abs(beyond[0] * centre_x + rest_x - from_slope[0] * slope_x)
+            seen = off <= half[0] + (gain * cell_half[0] + loose_x) * (1 + 1e-9)
+            gain = abs(beyond[1] + power * from_slope[1])
+            off = abs(beyond[1] * centre_y + rest_y - from_slope[1] * slope_y)
+            if seen and off <= half[1] + (gain * cell_half[1] + loose_y) * (1 + 1e-9):
                 near[found, 0], near[found, 1] = r, c
                 found += 1
     return found
@@ -455,8 +458,11 @@ def unit(point, flipped):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINED)
-def at_pixel(points, start, n, flipped, middle_x, middle_y, wide, high, x, y):  # type: ignore[no-untyped-def]
-    """Places of n rays over the sensitive area of a pixel."""
+def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
+    """Places of a packet's rays over the sensitive area of a pixel."""
+    points, start, n, flipped = drawn
+    x, y = rays.x, rays.y
+    (middle_x, middle_y), (wide, high) = middle, sensitive
     across, down = np.int32(flipped[0]), np.int32(flipped[1])
     for p in range(n):
         x[p] = middle_x + (unit(points[0, start + p], across) - 0.5) * wide
@@ -464,13 +470,13 @@ def at_pixel(points, start, n, flipped, middle_x, middle_y, wide, high, x, y):  
 
 
 @njit(**INLINED)
-def through_window(  # type: ignore[no-untyped-def]
-    points, start, n, flipped, window, scatter, x, y, s, t, share
-):  # fmt: skip
-    """Slopes and weights of n rays towards a window, making up for diffusers; see `vcc.plan.rays.model.Window`."""
-    f0, f1, f2, f3, f4 = window[0, 0], window[0, 1], window[0, 2], window[0, 3], window[0, 4]
-    g0, g1, g2, g3, g4 = window[1, 0], window[1, 1], window[1, 2], window[1, 3], window[1, 4]
-    solid_angle, disc = window[2, 0], window[2, 1] == 1.0
+def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
+    """Slopes and weights of rays towards a window, making up for diffusers; see `vcc.plan.rays.model.Window`."""
+    points, start, n, flipped = drawn
+    from_point, from_sensor, (f4, g4), solid_angle, disc, scatter = window
+    x, y, s, t, share = rays
+    f0, f1, f2, f3 = from_point[0, 0], from_point[0, 1], from_sensor[0, 0], from_sensor[0, 1]
+    g0, g1, g2, g3 = from_point[1, 0], from_point[1, 1], from_sensor[1, 0], from_sensor[1, 1]
     if disc:  # turned
         turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
         cosine, sine = math.cos(turn), math.sin(turn)
@@ -494,16 +500,19 @@ def through_window(  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINED)
-def through_cell(points, start, n, flipped, images, cells, borders, x, y, s, t, share):  # type: ignore[no-untyped-def]
-    """Slopes and weights of n rays through what of a cell the stop is seen through; see `CellWindows.aimed`.
+def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
+    """Slopes and weights of rays through what of a cell the stop is seen through; see `CellWindows.aimed`.
 
-    Until the last loop, s holds places across, t and share the ends of what is seen there.
+    ``images``: (2, 5), see `set_image`. Until the last loop, s holds places across, t and share the ends of what is
+    seen there.
     """
+    points, start, n, flipped = drawn
+    x, y, s, t, share = rays
     middle, along, half, centre, reach = images[0, 0], images[0, 1], images[0, 2], images[0, 3], images[0, 4]
     middle_y, along_y, half_y, centre_y = images[1, 0], images[1, 1], images[1, 2], images[1, 3]
-    radius, disc = cells[13, 0], cells[13, 1]
+    radius, borders = cells.opening_radius, cells.borders
     across, down = np.int32(flipped[2]), np.int32(flipped[3])
-    per_half = disc / half  # of a rectangle all chords are alike
+    per_half = cells.disc / half  # of a rectangle all chords are alike
     for p in range(n):
         image = middle + along * x[p]
         low = max(image - half, centre - reach)
@@ -522,9 +531,9 @@ def through_cell(points, start, n, flipped, images, cells, borders, x, y, s, t, 
             away = s[p] - centre
             chord = math.sqrt(max(radius * radius - away * away, 0.0))
             t[p], share[p] = max(t[p], centre_y - chord), min(share[p], centre_y + chord)
-    per_slope_x, per_slope_y = 1 / cells[4, 0], 1 / cells[4, 1]
+    per_slope_x, per_slope_y = 1 / cells.place_from_slope[0], 1 / cells.place_from_slope[1]
     weight = abs(per_slope_x * per_slope_y)
-    from_x, from_y, offset_x, offset_y = cells[3, 0], cells[3, 1], cells[5, 0], cells[5, 1]
+    (from_x, from_y), (offset_x, offset_y) = cells.place_from_sensor, cells.offset
     for p in range(n):
         image = middle + along * x[p]
         wide = max(min(image + half, centre + reach) - max(image - half, centre - reach), 0.0)
@@ -536,97 +545,67 @@ def through_cell(points, start, n, flipped, images, cells, borders, x, y, s, t, 
 
 
 @njit(**OPTIONS)
-def add_tile(  # type: ignore[no-untyped-def]
-    values, views, channels, scale, pixels, tile, samples, block_shift, seed, points, window, scatter, cells,
-    cell_kinds, cell_whole, borders, codes, whole, real, shares, slopes, index, motion, between, ends, picture,
-    tally,
-):  # fmt: skip
-    """The pixels of a tile, into picture (rows, columns, channels).
+def add_tile(field, sensor, points, aim, steps, pictures, tile):  # type: ignore[no-untyped-def]
+    """The pixels of a tile, into pictures (2, rows, columns, channels); arguments as `vcc.engines.ray_tables` has them.
 
-    Args:
-        values: samples of the light field, flat.
-        views: (v, u, t, s).
-        channels: numbers a sample.
-        scale: factor on everything.
-        pixels: (2, 3): first place, pitch and sensitive size along (x, y).
-        tile: (first row, row after the last, first column, column after the last).
-        samples: rays a pixel.
-        block_shift: which block beside the hashed one is taken, see `vcc.engines.rays`.
-        seed: of the hash.
-        points: the table, (columns, points).
-        window: (2, 5): slopes from point, from sensor, and offset; and a third row: solid angle, 1 for a disc.
-        scatter: (diffusers, 5): column of the table and slopes from what the diffuser does, see `Window`.
-        cells: rows of numbers by axis (x, y) where rays are aimed through cells, else empty.
-        cell_kinds: (kinds, 3): power, δs, δt.
-        cell_whole: layout, rows and columns of kinds, reach in rows and columns.
-        borders: (strips, 2): what cuts out a cell's opening, see `vcc.plan.rays.model.CellWindows`.
-        codes: see `vcc.plan.rays.steps.Packer`, likewise the next four.
-        whole: see above.
-        real: see above.
-        shares: see above.
-        slopes: see above.
-        index: 4×5, indices from rays.
-        motion: 2×2.
-        between: whether views are interpolated.
-        ends: whether rays outside the grid of views are missing.
-        picture: where to write.
-        tally: (weights of rays, of missing rays, squared differences of the halves, rays) are added here.
+    The first picture is the mean of what the two halves of a pixel's rays find, the second their difference.
+
+    Returns:
+        (3,): weights of all rays, of missing rays, how many rays.
     """
-    x, y, s, t, share = np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET)
+    table, samples, beside, seed = points
+    channels, cells = field.samples.channels, aim.cells
+    tally = np.zeros(3)
+    rays = Packet(np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET))
+    share = rays.share
     sums = np.zeros((2, max(channels, LANES)), dtype=np.float32)
     totals = np.zeros(sums.shape)
-    rows_there, columns_there = picture.shape[0], picture.shape[1]
-    by_cell = cells.shape[0] > 0
-    blocks = points.shape[1] // samples
+    blocks = table.shape[1] // samples
     near = np.empty((256, 2), dtype=np.int64)
-    turn = cells[0:3].ravel()
     images, flipped = np.empty((2, 5)), np.empty(4, dtype=np.int64)
-    for row in range(tile[0], min(tile[1], rows_there)):
-        for column in range(tile[2], min(tile[3], columns_there)):
-            middle_x = pixels[0, 0] + column * pixels[0, 1]
-            middle_y = pixels[1, 0] + row * pixels[1, 1]
-            block = (np.int64(hashed(row * columns_there + column, seed)) * blocks) >> 32
-            first = (block ^ block_shift) * samples
+    for row in range(tile.first_row, min(tile.end_row, sensor.rows)):
+        for column in range(tile.first_column, min(tile.end_column, sensor.columns)):
+            middle = sensor.first[0] + column * sensor.pitch[0], sensor.first[1] + row * sensor.pitch[1]
+            block = (np.int64(hashed(row * sensor.columns + column, seed)) * blocks) >> 32
+            first = (block ^ beside) * samples
             totals[:] = 0
             cells_near = 1
-            if by_cell:
-                cells_near = cells_seen(cells, cell_kinds, cell_whole, middle_x, middle_y, pixels, near)
+            if aim.by_cell:
+                cells_near = cells_seen(cells, middle[0], middle[1], sensor.sensitive, near)
             for q in range(cells_near):
-                number = np.int64(row * columns_there + column)
-                if by_cell:
+                number = np.int64(row * sensor.columns + column)
+                if aim.by_cell:
                     number ^= np.int64(hashed(near[q, 0] * 65537 + near[q, 1], seed))
                 for n in range(4):
                     flipped[n] = hashed(number, seed + 1 + n) >> np.uint32(32 - DIGITS)
-                if by_cell:
-                    centre_x, centre_y = centre_of(cell_whole[0], turn, near[q, 0], near[q, 1])
-                    kind = kind_of(cell_whole, near[q, 0], near[q, 1])
-                    set_image(images, cells, 0, centre_x, cell_kinds[kind, 0], cell_kinds[kind, 1])
-                    set_image(images, cells, 1, centre_y, cell_kinds[kind, 0], cell_kinds[kind, 2])
+                if aim.by_cell:
+                    centre_x, centre_y = centre_of(cells.layout, cells.turn, near[q, 0], near[q, 1])
+                    power, slope_x, slope_y = kind_of(cells.kinds, near[q, 0], near[q, 1])
+                    set_image(images[0], cells, 0, centre_x, power, slope_x)
+                    set_image(images[1], cells, 1, centre_y, power, slope_y)
                 for done in range(0, samples, PACKET):
                     n = min(PACKET, samples - done)
-                    start = first + done
-                    at_pixel(points, start, n, flipped, middle_x, middle_y, pixels[0, 2], pixels[1, 2], x, y)
-                    if by_cell:
-                        through_cell(points, start, n, flipped, images, cells, borders, x, y, s, t, share)
+                    drawn = Drawn(table, first + done, n, flipped)
+                    at_pixel(drawn, middle, sensor.sensitive, rays)
+                    if aim.by_cell:
+                        through_cell(drawn, images, cells, rays)
                     else:
-                        through_window(points, start, n, flipped, window, scatter, x, y, s, t, share)
+                        through_window(drawn, aim.window, rays)
                     traced = 0
                     for p in range(n):
                         traced += share[p] > 0.0
                     if traced == 0:
                         continue
-                    tally[3] += traced
-                    take_steps(codes, whole, real, shares, slopes, points, start, n, x, y, s, t, share)
-                    add_rays(
-                        values, views, channels, index, motion, between, ends, n, samples // 2 - done,
-                        x, y, s, t, share, sums, tally,
-                    )  # fmt: skip
+                    tally[2] += traced
+                    take_steps(steps, drawn, rays)
+                    add_rays(field, rays, n, samples // 2 - done, sums, tally)
                     for half in range(2):  # a packet in single precision, the packets in double
                         for lane in range(sums.shape[1]):
                             totals[half, lane] += sums[half, lane]
                             sums[half, lane] = 0
             fold_lanes(totals, channels)
             for channel in range(channels):
-                one, two = totals[0, channel] * scale / samples, totals[1, channel] * scale / samples
-                picture[row, column, channel] = one + two
-                tally[2] += (one - two) ** 2
+                one, two = totals[0, channel] * field.scale / samples, totals[1, channel] * field.scale / samples
+                pictures[0, row, column, channel] = one + two
+                pictures[1, row, column, channel] = 2 * (one - two)
+    return tally

@@ -8,66 +8,101 @@ that is looked at, x(q) + shear · (y − y(q)), so that the shares still sum to
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.engines.smear import finish
-from vcc.plan.footprints.model import Plan
+from vcc.engines.rays import memory_of_rays, traced
+from vcc.plan import operators
+from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import shares
+from vcc.plan.protocol import Partial, Progress
+from vcc.plan.rays.model import Rays
 
 Array = NDArray[np.float64]
 
 
-def run(plan: Plan, values: NDArray[Any], progress: Callable[[int, int], None] | None = None) -> NDArray[Any]:
-    """The picture of samples (v, u, t, s[, channels]) by a plan, float32; see `vcc.engines.run_plan`."""
+def footprints(
+    core: Footprints, values: NDArray[Any], *, beside: int = 0, threads: int, progress: Progress | None = None
+) -> Partial:
+    """The raster of samples (v, u, t, s[, channels]), float64; see `vcc.plan.protocol.Runner`."""
     channels = values.shape[4:] or (1,)
-    rows, columns = plan.raster_shape
-    raster = np.zeros((rows, columns, *channels))
-    total = plan.weights.size
-    for done, (b, a) in enumerate(np.ndindex(plan.weights.shape)):
+    raster = np.zeros((*core.raster_shape, *channels))
+    total = core.weights.size
+    for done, (b, a) in enumerate(np.ndindex(core.weights.shape)):
         if progress is not None:
             progress(done, total)
-        if plan.weights[b, a] == 0:
+        if core.weights[b, a] == 0:
             continue
-        view = values[plan.view_rows[b], plan.view_columns[a]].astype(np.float64)
-        flux, k, l = _samples_of(plan, view.reshape(*view.shape[:2], *channels))
-        flux = flux * plan.weights[b, a]
-        for mask in plan.masks:
+        view = values[core.view_rows[b], core.view_columns[a]].astype(np.float64)
+        flux, k, l = _samples_of(core, view.reshape(*view.shape[:2], *channels))
+        flux = flux * core.weights[b, a]
+        for mask in core.masks:
             flux = flux * mask.weights(b, a, k, l)[..., None]
-        _spread(plan, raster, flux, b, a, k, l)
+        _spread(core, raster, flux, b, a, k, l)
     if progress is not None:
         progress(total, total)
-    picture = finish(plan, raster * plan.scale)
-    return picture if values.ndim == 5 else picture[..., 0]
+    return Partial(raster * core.scale)
 
 
-def _samples_of(plan: Plan, view: Array) -> tuple[Array, Array, Array]:
+def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None) -> Partial:
+    """The raster of samples (v, u, t, s[, channels]) by the plan's own rays, in double precision."""
+    return traced(core, values, True, beside, progress)
+
+
+def takes(values: Any) -> bool:
+    """NumPy's."""
+    return values is None or isinstance(values, np.ndarray)
+
+
+def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:
+    """Samples as a core takes them, sharpened in double precision."""
+    for operator in before:
+        wide = isinstance(operator, operators.SharpenViews) and values.dtype != np.uint8
+        values = operator.apply(values.astype(np.float64) if wide else values)
+    return values
+
+
+def finished(after: Sequence[operators.After], raster: Array, threads: int) -> NDArray[np.float32]:
+    """The picture (rows, columns, channels), float32, of a raster."""
+    return np.asarray(operators.finished(after, raster), dtype=np.float32)
+
+
+def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
+    """Bytes that a run takes beside the samples and the raster, estimated: mostly of numbers of 8 bytes."""
+    if isinstance(core, Rays):
+        return memory_of_rays(core)
+    # A view in double precision, divided, and times its weights; shares of one row.
+    return 24 * channels * core.samples[0] * core.samples[1] * core.refine**2 + 16 * math.prod(core.samples)
+
+
+def _samples_of(core: Footprints, view: Array) -> tuple[Array, Array, Array]:
     """The samples of a view, divided where the plan says so, with their column and row indices k, l."""
-    if plan.refine == 1:
+    if core.refine == 1:
         return view, np.arange(view.shape[1], dtype=float), np.arange(view.shape[0], dtype=float)
     rows, columns = view.shape[:2]
-    down = plan.division(rows)
-    across = plan.division(columns)
+    down = core.division(rows)
+    across = core.division(columns)
     fine = np.einsum("al,bk,lkc->abc", down.matrix(rows), across.matrix(columns), view, optimize=True)
-    k = across.start + np.arange(fine.shape[1]) / plan.refine
-    l = down.start + np.arange(fine.shape[0]) / plan.refine
+    k = across.start + np.arange(fine.shape[1]) / core.refine
+    l = down.start + np.arange(fine.shape[0]) / core.refine
     return fine, k, l
 
 
-def _spread(plan: Plan, raster: Array, flux: Array, b: int, a: int, k: Array, l: Array) -> None:
+def _spread(core: Footprints, raster: Array, flux: Array, b: int, a: int, k: Array, l: Array) -> None:
     """Add each sample's light to the pixels under its footprint."""
-    rows, columns = plan.raster_shape
-    fine = plan.refine
+    rows, columns = core.raster_shape
+    fine = core.refine
     pixel = np.arange(columns, dtype=float)
-    y = plan.y[b, a] + plan.step[1, 0] * k[None, :] + plan.step[1, 1] * l[:, None]
+    y = core.y[b, a] + core.step[1, 0] * k[None, :] + core.step[1, 1] * l[:, None]
     for row in range(rows):
-        share_y = shares(plan.interpolation, float(row), y, plan.row_step / fine, plan.opening)
+        share_y = shares(core.interpolation, float(row), y, core.row_step / fine, core.opening)
         if not share_y.any():
             continue
         line = (share_y[..., None] * flux).sum(axis=0)
-        x = plan.x[b, a] + plan.shear * (row - plan.y[b, a]) + plan.column_step * k
-        across = shares(plan.interpolation, pixel[:, None], x[None, :], plan.column_step / fine, plan.opening)
+        x = core.x[b, a] + core.shear * (row - core.y[b, a]) + core.column_step * k
+        across = shares(core.interpolation, pixel[:, None], x[None, :], core.column_step / fine, core.opening)
         raster[row] += across @ line

@@ -2,14 +2,41 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from vcc.engines.sharpening import KEPT_DIGITS
-from vcc.plan.rays.sharpening import DIGITS, REACH
+from vcc.plan.how import cores
+from vcc.plan.operators import KEPT_DIGITS, REACH
+from vcc.plan.operators import WEIGHT_DIGITS as DIGITS
 
 OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy"}
 SHIFT = 2 * DIGITS - KEPT_DIGITS
+
+
+def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int | None = None) -> NDArray[Any]:
+    """Samples (v, u, t, s[, channels]) filtered: int16 of uint8, else in floating point, double of double."""
+    small = values.dtype == np.uint8
+    given = np.dtype(np.float32) if values.dtype == np.float16 else values.dtype
+    wide = np.float64 if values.dtype == np.float64 else np.float32
+    kept = np.empty(values.shape, dtype=np.int16 if small else wide)
+    factors = np.array(weights, dtype=np.int32) if small else (np.array(weights) * 2.0**-DIGITS).astype(wide)
+    rows, length = values.shape[2], int(np.prod(values.shape[3:]))
+    channels = values.shape[4] if values.ndim == 5 else 1
+
+    def sharpen_row(row: int) -> None:
+        lines = np.empty((2 * REACH + 2, length), dtype=factors.dtype)
+        for column in range(values.shape[1]):
+            view = np.ascontiguousarray(values[row, column], dtype=given).reshape(rows, length)
+            to = kept[row, column].reshape(rows, length)
+            sharpen(view, to, channels, factors, True if small else None, lines)
+
+    with ThreadPoolExecutor(threads or cores()) as pool:
+        list(pool.map(sharpen_row, range(values.shape[0])))
+    return kept
 
 
 @njit(**OPTIONS)
@@ -40,15 +67,17 @@ def sharpen_across(row, plain, line, channels, weights):  # type: ignore[no-unty
 
 
 @njit(**OPTIONS)
-def sharpen_whole(view, kept, channels, weights, lines):  # type: ignore[no-untyped-def]
-    """A view of 8-bit samples (rows, samples in a row) into 16 bits with `KEPT_DIGITS` digits after the point.
+def sharpen(view, kept, channels, weights, whole, lines):  # type: ignore[no-untyped-def]
+    """A view (rows, samples in a row) filtered along both axes.
 
     Args:
         view: (rows, samples in a row).
         kept: where to write, likewise.
         channels: numbers a pixel.
-        weights: (3,) int32 in 2⁻¹⁰: |Σ| ≤ 255·(1398 + 2·207 + 2·20)² < 2³⁰ for means.
-        lines: room for six rows.
+        weights: (3,) of the type of the sums: of 8-bit samples int32 in 2⁻¹⁰, for which
+            |Σ| ≤ 255·(1398 + 2·207 + 2·20)² < 2³⁰ for means; else real numbers.
+        whole: True for 8-bit samples, whose sums are rounded to `KEPT_DIGITS` digits after the point; else None.
+        lines: room for six rows of sums.
     """
     rows, half = len(view), 1 << (SHIFT - 1)
     for r in range(-REACH, rows):
@@ -62,21 +91,7 @@ def sharpen_whole(view, kept, channels, weights, lines):  # type: ignore[no-unty
         middle, near, far = weights[0], weights[1], weights[2]
         for q in range(view.shape[1]):
             total = middle * here[q] + near * (above[q] + below[q]) + far * (above2[q] + below2[q])
-            kept[r, q] = np.int32(total + half) >> SHIFT
-
-
-@njit(**OPTIONS)
-def sharpen_real(view, kept, channels, weights, lines):  # type: ignore[no-untyped-def]
-    """A view of other samples, in floating point; arguments as those of `sharpen_whole`, weights as they are."""
-    rows = len(view)
-    for r in range(-REACH, rows):
-        ahead = r + REACH
-        if ahead < rows:
-            sharpen_across(view[ahead], lines[5], lines[ahead % 5], channels, weights)
-        if r < 0:
-            continue
-        above2, above, here = lines[max(r - 2, 0) % 5], lines[max(r - 1, 0) % 5], lines[r % 5]
-        below, below2 = lines[min(r + 1, rows - 1) % 5], lines[min(r + 2, rows - 1) % 5]
-        middle, near, far = weights[0], weights[1], weights[2]
-        for q in range(view.shape[1]):
-            kept[r, q] = middle * here[q] + near * (above[q] + below[q]) + far * (above2[q] + below2[q])
+            if whole is None:  # told apart when compiled
+                kept[r, q] = total
+            else:
+                kept[r, q] = np.int32(total + half) >> SHIFT

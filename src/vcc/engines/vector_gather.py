@@ -12,6 +12,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 LANES = 8
@@ -23,10 +24,7 @@ def _add_views(channels: int) -> Any:
     lanes = 2 if channels == 1 else LANES
 
     @intrinsic
-    def add_views(  # type: ignore[no-untyped-def]
-        typing_context, values, upper_left, upper_right, lower_left, lower_right, line,
-        above_0, above_1, below_0, below_1, left_0, left_1, right_0, right_1, sums, at,
-    ):  # fmt: skip
+    def add_views(typing_context, values, corners, line, rows, columns, sums, at):  # type: ignore[no-untyped-def]
         """What a ray finds in two by two views, two by two pixels in each.
 
         The views of one row are looked at in the same rows of pixels, those of one column in the same columns: so
@@ -35,29 +33,24 @@ def _add_views(channels: int) -> Any:
         Args:
             typing_context: Numba's.
             values: flat samples; ``LANES`` of them can be read from every place that is looked at.
-            upper_left: where the upper left pixel of the upper left view begins.
-            upper_right: of the upper right view.
-            lower_left: of the lower left view.
-            lower_right: of the lower right view.
+            corners: (4,) where the upper left pixel of the upper left view begins, of the upper right, the lower
+                left and the lower right view.
             line: samples in a row of pixels.
-            above_0: float32, weight of the upper row of pixels in the upper views.
-            above_1: of the lower row.
-            below_0: of the upper row of pixels in the lower views.
-            below_1: of the lower row.
-            left_0: of the left column of pixels in the left views.
-            left_1: of the right column.
-            right_0: of the left column of pixels in the right views.
-            right_1: of the right column.
+            rows: (4,) float32, weights of the upper and the lower row of pixels in the upper views, and in the
+                lower views.
+            columns: (4,) float32, weights of the left and the right column of pixels in the left views, and in the
+                right views.
             sums: flat float32.
             at: where in ``sums`` the eight numbers stand.
         """
-        place, share = types.int64, types.float32
-        signature = types.void(values, *(place,) * 5, *(share,) * 8, sums, place)
+        place, weights = types.int64, types.UniTuple(types.float32, 4)
+        signature = types.void(values, types.UniTuple(place, 4), place, weights, weights, sums, place)
 
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
             data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-            kept = context.make_array(signature.args[14])(context, builder, arguments[14]).data
-            corners, line, rows, columns = arguments[1:5], arguments[5], arguments[6:10], arguments[10:14]
+            kept = context.make_array(signature.args[5])(context, builder, arguments[5]).data
+            corners, rows, columns = (cgutils.unpack_tuple(builder, arguments[n]) for n in (1, 3, 4))
+            line = arguments[2]
             number = ir.IntType(32)
             wide = ir.VectorType(ir.FloatType(), lanes)
             sample = context.get_value_type(values.dtype)
@@ -89,7 +82,7 @@ def _add_views(channels: int) -> Any:
                 ir.VectorType(number, lanes),
                 [lane if lane < channels else lanes + lane for lane in range(lanes)],
             )
-            place = builder.bitcast(builder.gep(kept, [arguments[15]]), wide.as_pointer())
+            place = builder.bitcast(builder.gep(kept, [arguments[6]]), wide.as_pointer())
             total = builder.load(place, align=4)
             for column in range(2):
                 found = None

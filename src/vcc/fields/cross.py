@@ -7,14 +7,14 @@ converge.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.fields.grid import Block, Grid
 from vcc.fields.sampled import to_numpy
 
 Array = NDArray[np.float32]
@@ -26,34 +26,15 @@ MARGIN = 0.3
 """Pixels per view by which a measured range is widened: it leaves out the outermost 2 %."""
 
 
-class Part(Protocol):
-    """Of a light field, in memory."""
-
-    @property
-    def values(self) -> Any:
-        """Radiance, shape (v, u, t, s[, channels])."""
-
-
 class Views(Protocol):
-    """A light field whose views can be read part by part: in memory or on disk."""
+    """Of `vcc.fields.samples.Samples`, what is needed here: a grid, and its blocks when they are asked for."""
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        """(v, u, t, s) or (v, u, t, s, channels)."""
+    def grid(self) -> Grid:
+        """Which rays the samples are."""
 
-    @property
-    def frame(self) -> Affine:
-        """From indices (i, j, k, l) to rays (u, v, s, t)."""
-
-    @property
-    def disparity_range(self) -> tuple[float, float] | None:
-        """(lowest, highest) where it was given."""
-
-    def measured_disparity_range(self) -> tuple[float, float] | None:
-        """(lowest, highest), given or measured; None where there is nothing to measure it from."""
-
-    def __getitem__(self, index: tuple[slice, slice], /) -> Part:
-        """Rows and columns of views."""
+    def read(self, block: Block, /) -> Any:
+        """The samples of a block, (v, u, t, s[, channels])."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,22 +76,22 @@ class DisparityGeometry:
     view: tuple[int, int]
 
     @classmethod
-    def of(cls, light_field: Views, fewest: int) -> DisparityGeometry:
+    def of(cls, grid: Grid, fewest: int) -> DisparityGeometry:
         """That of a light field.
 
         Args:
-            light_field: its views' axes along those of its pixels.
+            grid: its views' axes along those of its pixels.
             fewest: views that there must be in a row or column.
 
         Raises:
             InputError: too few views, or a frame that turns or mixes its axes.
         """
-        rows, columns = light_field.shape[:2]
+        rows, columns = grid.shape[:2]
         if max(rows, columns) < fewest:
             raise InputError(
                 f"depth needs {fewest} views or more in a row or column; this light field has {rows}×{columns}"
             )
-        linear = light_field.frame.linear
+        linear = grid.frame.linear
         scale = np.abs(linear).max(axis=1, keepdims=True)
         if not np.allclose(
             linear[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]] / scale.repeat(2), 0, atol=1e-9
@@ -132,7 +113,7 @@ class DisparityGeometry:
         return np.asarray(numerator / (self.slope[1, 3] * z - self.position[1, 3] * one), np.float64)
 
     def distance(self, disparity: Array) -> Array:
-        """`vcc.LightField.distance_of` of each, metres."""
+        """`vcc.fields.grid.Grid.distance_of` of each, metres."""
         z, one = self._homogeneous(disparity.astype(np.float64))
         with np.errstate(divide="ignore"):
             return np.where(one == 0, np.inf, z / np.where(one == 0, 1, one)).astype(np.float32)
@@ -148,14 +129,14 @@ def arms(light_field: Views) -> list[Arm]:
     Raises:
         InputError: they are black.
     """
-    rows, columns = light_field.shape[:2]
-    row, column = (rows - 1) // 2, (columns - 1) // 2
+    shape = light_field.grid.shape
+    row, column = ((n - 1) // 2 for n in shape[:2])
+    whole = Block.all_of(shape)
     found = []
-    # By slices, so that of a light field on disk no more is read.
-    if columns > 1:
-        found.append(Arm(_pictures(light_field[row : row + 1, :].values), "u"))
-    if rows > 1:
-        found.append(Arm(_pictures(light_field[:, column : column + 1].values), "v"))
+    if shape[1] > 1:
+        found.append(Arm(_pictures(light_field.read(replace(whole, rows=(row, row + 1)))), "u"))
+    if shape[0] > 1:
+        found.append(Arm(_pictures(light_field.read(replace(whole, columns=(column, column + 1)))), "v"))
     bright = max(float(np.percentile(arm.views, 99)) for arm in found)
     if bright == 0:
         raise InputError("the middle views of this light field are black: there is no parallax to see")
@@ -173,24 +154,24 @@ def _pictures(values: Any) -> Array:
     return np.ascontiguousarray(np.moveaxis(views, 3, 1))
 
 
-def range_to_search(light_field: Views, given: tuple[float, float] | None) -> tuple[float, float]:
+def range_to_search(grid: Grid, given: tuple[float, float] | None) -> tuple[float, float]:
     """(lowest, highest) disparity along u to be found, pixels per view.
 
     Args:
-        light_field: whose own range counts where none is given, widened by `MARGIN` if it was measured.
+        grid: of a light field, whose own range counts where none is given, widened by `MARGIN` if it was measured.
         given: by a user.
 
     Raises:
         InputError: a range that is none, that is in other units, or that cannot be measured.
     """
     if given is None:
-        measured = light_field.measured_disparity_range()
+        measured = grid.measured_disparity_range()
         if measured is None:
             raise InputError(
                 "the range of disparities cannot be measured (too little texture): give "
                 "disparity_range=(low, high)"
             )
-        widened = 0.0 if light_field.disparity_range is not None else MARGIN
+        widened = 0.0 if grid.disparity_range is not None else MARGIN
         given = (measured[0] - widened, measured[1] + widened)
     low, high = float(given[0]), float(given[1])
     if not (math.isfinite(low) and math.isfinite(high) and low <= high):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.errors import InputError
+from vcc.fields.sampled import as_slice
 
 Progress = Callable[[int, int], None]
 
@@ -94,20 +95,22 @@ class DisparityMaps:
         """
         v, u, t, s = ranges[:4]
         factor = u.step / s.step
-        values = self.values[:, _slice(t), _slice(s)] * np.float32(factor)
+        values = self.values[:, as_slice(t), as_slice(s)] * np.float32(factor)
         views = tuple(((row - v.start) / v.step, (column - u.start) / u.step) for row, column in self.views)
         low, high = sorted(end * factor for end in self.extent)
         return DisparityMaps(values, views, self.source, (low, high))
 
 
 class Disparities:
-    """The disparity maps of a light field: given, or found when first asked for and then kept.
+    """What a light field shows of depth: its range and its maps, each found when first asked for and then kept.
 
     Shared by a light field and all pieces of it, so that each piece is treated like the whole.
 
     Args:
         known: the maps, where they are given.
-        find: finds them, called with a progress callback or None.
+        find: finds them, called with a progress callback or None; without it there are none to be had.
+        measure: measures (lowest, highest) in pixels per view along u, or None where the pictures show no
+            parallax; without it there is nothing to measure.
         whole: that of which this is a piece, where it is one.
     """
 
@@ -115,14 +118,34 @@ class Disparities:
         self,
         known: DisparityMaps | None = None,
         find: Callable[[Progress | None], DisparityMaps] | None = None,
+        measure: Callable[[], tuple[float, float] | None] | None = None,
         whole: Disparities | None = None,
     ) -> None:
         self._maps, self._find, self._whole = known, find, whole
+        self._measure = measure
+        self._range: tuple[float, float] | None = None
+        self._measured = False
+
+    def completed(
+        self,
+        find: Callable[[Progress | None], DisparityMaps],
+        measure: Callable[[], tuple[float, float] | None],
+    ) -> Disparities:
+        """These, with ways to find and to measure where they have none."""
+        if (self._find or self._maps) and (self._measure or self._whole):
+            return self
+        return Disparities(self._maps, self._find or find, self._measure or measure, self._whole)
 
     @property
     def known(self) -> bool:
         """Whether the maps are there without further work."""
         return self._maps is not None or (self._whole is not None and self._whole.known)
+
+    def range(self) -> tuple[float, float] | None:
+        """(lowest, highest) in pixels per view along u, measured now if it was not; None if there is none."""
+        if not self._measured and self._measure is not None:
+            self._range, self._measured = self._measure(), True
+        return self._range
 
     def maps(self, progress: Progress | None = None) -> DisparityMaps:
         """The maps, found now if they are not known yet.
@@ -131,18 +154,26 @@ class Disparities:
             progress: called with (done, total) while they are found.
 
         Raises:
-            InputError: what `vcc.recover.depth.disparity_maps` refuses.
+            InputError: what `vcc.recover.depth.disparity_maps` refuses, or a light field without samples.
         """
         if self._maps is None:
-            assert self._find is not None
+            if self._find is None:
+                raise InputError("there are no samples to find disparities in: give the light field itself")
             self._maps = self._find(progress)
         return self._maps
 
     def piece(self, ranges: Sequence[Any]) -> Disparities:
         """Those of a piece of the light field, found from the whole; see `DisparityMaps.piece`."""
-        return Disparities(find=lambda progress: self.maps(progress).piece(ranges), whole=self)
+        factor = ranges[1].step / ranges[3].step
+
+        def measured() -> tuple[float, float] | None:
+            whole = self.range()
+            return None if whole is None else scaled(whole, factor)
+
+        return Disparities(find=lambda progress: self.maps(progress).piece(ranges), measure=measured, whole=self)
 
 
-def _slice(part: range) -> slice:
-    """The slice that takes a range of indices from an axis that begins at 0."""
-    return slice(part.start, None if part.stop < 0 else part.stop, part.step)
+def scaled(ends: tuple[float, float], factor: float) -> tuple[float, float]:
+    """Both ends of a range times a factor, the lower one first."""
+    low, high = sorted((ends[0] * factor, ends[1] * factor))
+    return low, high

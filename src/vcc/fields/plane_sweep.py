@@ -76,12 +76,12 @@ def plane_sweep(
     step = above_zero("step", step)
     if not (window >= 1 and window % 2 == 1):
         raise InputError(f"window is an odd number of pixels, 1 or more, not {window}")
-    geometry = DisparityGeometry.of(light_field, fewest=2)
-    low, high = range_to_search(light_field, disparity_range)
+    geometry = DisparityGeometry.of(light_field.grid, fewest=2)
+    low, high = range_to_search(light_field.grid, disparity_range)
     # Three steps at the least: a parabola needs neighbours.
     tried = np.linspace(low, high, max(3, math.ceil((high - low) / step) + 1))
     cross = arms(light_field)
-    rows, columns = light_field.shape[2:4]
+    rows, columns = light_field.grid.shape[2:4]
     needed = 4 * (rows * columns * (len(tried) + 24) + 3 * sum(arm.views.size for arm in cross))
     what = f"a sweep of {len(tried)} disparities over {rows}×{columns} pixels"
     check_memory(needed, memory_limit, what, "give a part of the light field")
@@ -115,7 +115,7 @@ def disparity_maps(
         InputError: as there; the way out is to give the disparities with the light field.
     """
     try:
-        low, high = range_to_search(light_field, None)
+        low, high = range_to_search(light_field.grid, None)
         # Neighbouring views are half a view from what is looked at in between: a parabola through steps of this
         # size finds disparities to a hundredth or two of a pixel, which is half of that on the sensor.
         step = max(FINEST_STEP, (high - low) / MOST_STEPS)

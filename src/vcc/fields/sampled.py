@@ -6,6 +6,8 @@ and composing its frame with a translation: a piece of a light field is a light 
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from types import EllipsisType
 from typing import Any
 
@@ -22,15 +24,15 @@ IMAGE_AXES = (1, 0)
 """The value axis of each frame index (column, row): values are stored rows before columns."""
 
 
-def sliced(
-    values: Any, frame: Affine, index: Index | tuple[Index, ...], axes: tuple[int, ...], what: str
-) -> tuple[Any, Affine, list[range]]:
-    """A piece of ``values``, its frame, and the indices taken along each axis of ``values``.
+def indices(
+    shape: tuple[int, ...], frame: Affine, index: Index | tuple[Index, ...], axes: tuple[int, ...], what: str
+) -> tuple[Affine, tuple[range, ...]]:
+    """The frame of a piece of values on a grid, and the indices that it takes along each axis of them.
 
     Args:
-        values: an array whose first axes are the sampled ones.
-        frame: maps indices of ``values`` to physical coordinates.
-        index: slices, one for each leading axis of ``values``; an ellipsis stands for whole axes.
+        shape: of the values, whose first axes are the sampled ones.
+        frame: maps indices of the values to physical coordinates.
+        index: slices, one for each leading axis of the values; an ellipsis stands for whole axes.
         axes: which value axis each frame index belongs to.
         what: how to name the thing in an error.
 
@@ -42,9 +44,9 @@ def sliced(
     if len(ellipses) > 1:
         raise InputError(f"{what} takes at most one ellipsis as an index")
     for place in ellipses:
-        parts[place : place + 1] = [slice(None)] * (values.ndim - len(parts) + 1)
-    if len(parts) > values.ndim:
-        raise InputError(f"{what} has {values.ndim} axes, and {len(parts)} slices were given")
+        parts[place : place + 1] = [slice(None)] * (len(shape) - len(parts) + 1)
+    if len(parts) > len(shape):
+        raise InputError(f"{what} has {len(shape)} axes, and {len(parts)} slices were given")
     for part in parts:
         if not isinstance(part, slice):
             raise InputError(
@@ -53,16 +55,24 @@ def sliced(
                 if isinstance(part, int)
                 else f"{what} is indexed by slices, not by {part!r}"
             )
-    parts += [slice(None)] * (values.ndim - len(parts))
-    ranges = [range(*part.indices(size)) for part, size in zip(parts, values.shape, strict=True)]
+    parts += [slice(None)] * (len(shape) - len(parts))
+    ranges = tuple(range(*part.indices(size)) for part, size in zip(parts, shape, strict=True))
     for axis, chosen in enumerate(ranges):
         if len(chosen) == 0:
-            raise InputError(f"slice {parts[axis]} of axis {axis} of {what} (size {values.shape[axis]}) is empty")
+            raise InputError(f"slice {parts[axis]} of axis {axis} of {what} (size {shape[axis]}) is empty")
     starts = [ranges[axis].start for axis in axes]
     steps = [ranges[axis].step for axis in axes]
-    piece = values[tuple(parts)]
-    moved = frame @ Affine.translation(*starts) @ Affine.scaling(*steps)
-    return piece, moved, ranges
+    return frame @ Affine.translation(*starts) @ Affine.scaling(*steps), ranges
+
+
+def taken(values: Any, ranges: Sequence[range]) -> Any:
+    """The values at these indices along each axis: a view of them, nothing is copied."""
+    return values[tuple(as_slice(part) for part in ranges)]
+
+
+def as_slice(part: range) -> slice:
+    """The slice that takes a range of indices from an axis that begins at 0."""
+    return slice(part.start, None if part.stop < 0 else part.stop, part.step)
 
 
 def to_numpy(values: Any) -> np.ndarray[Any, Any]:
@@ -77,15 +87,22 @@ def to_numpy(values: Any) -> np.ndarray[Any, Any]:
         return np.from_dlpack(values)
 
 
-def known(values: Any) -> np.ndarray[Any, Any] | None:
-    """`to_numpy`, or None for an array under a tracer, which has a shape and a type but no values yet.
+def has_values(values: Any) -> bool:
+    """Whether an array holds numbers that can be looked at: under a tracer there are a shape and a type only.
 
-    Under a tracer, libraries refuse to give numbers, each with an error of its own.
+    Known are JAX's tracers (``jit``, ``grad``, ``vmap``), and PyTorch's fake and meta tensors and its transforms.
     """
-    try:
-        return to_numpy(values)
-    except Exception:
-        return None
+    kind = type(values)
+    if isinstance(values, np.ndarray):
+        return True
+    if kind.__module__.startswith("jax"):
+        jax = sys.modules["jax"]
+        return not isinstance(values, jax.core.Tracer)
+    if hasattr(values, "detach"):
+        torch = sys.modules["torch"]
+        wrapped = torch._C._functorch.is_functorch_wrapped_tensor(values)
+        return not (wrapped or values.device.type == "meta" or kind.__name__ == "FakeTensor")
+    return True
 
 
 def to_dtype(values: Any) -> np.dtype[Any]:

@@ -24,7 +24,8 @@ from vcc.files.atomic import atomic_path
 from vcc.formats.grid import Decoded, Geometry
 
 if TYPE_CHECKING:
-    from vcc.light_field import LightField, Sample
+    from vcc.fields.grid import Sample
+    from vcc.light_field import LightField
 
 ENDINGS = (".npy", ".npz")
 

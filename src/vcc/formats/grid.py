@@ -16,7 +16,7 @@ from vcc.base.units import mm
 
 if TYPE_CHECKING:
     from vcc.base.affine import Affine
-    from vcc.light_field import Sample
+    from vcc.fields.grid import Sample
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")
 """The endings of the files that views may be stored in."""

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.base.units import mm
+from vcc.fields.grid import Sample
 from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
-from vcc.light_field import Sample
 
 PARAMETERS = "parameters.cfg"
 

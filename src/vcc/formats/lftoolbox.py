@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.fields.grid import Sample
 from vcc.fields.sampled import to_numpy
 from vcc.files.atomic import atomic_path
 from vcc.formats import hdf5
 from vcc.formats.grid import Decoded, Geometry
-from vcc.light_field import LightField, Sample
+from vcc.light_field import LightField
 
 _TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
 _FROM_ZERO = Affine.translation(1, 1, 1, 1)  # from indices counted from 0 to MATLAB's

@@ -17,6 +17,9 @@ from vcc.base import units
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
 from vcc.fields import parallax
+from vcc.fields.disparity import Disparities
+from vcc.fields.grid import Grid, Sample, camera_array_frame
+from vcc.fields.samples import check_samples
 from vcc.files.pictures import read_picture
 from vcc.files.transfer import decode
 from vcc.formats import (
@@ -34,7 +37,7 @@ from vcc.formats.numbered import ORDERS, Order
 from vcc.formats.orientation import VISIBLE_DISPARITY, OrientationChoice, look, looked_at, rearranged
 from vcc.formats.reading_views import read_views
 from vcc.formats.sparse import SparseViews
-from vcc.light_field import DisparityRange, LightField, Sample
+from vcc.light_field import LightField
 
 Transfer = Literal["auto", "srgb", "linear"]
 
@@ -204,10 +207,12 @@ def open_light_field(
     if frame is None:
         if "transpose" in moved.steps and spacing is None:
             geometry["spacing"] = geometry["spacing"][::-1]
-        frame = LightField.from_views(_hollow(values.shape), **geometry).frame
+        frame = camera_array_frame(values.shape, **geometry)
     # Integers and light decoded from them are neither negative nor infinite: no need to look through them all.
-    shared = DisparityRange(lambda: seen.disparities) if seen.measured and not moved.steps else None
-    light_field = LightField(values, frame, stated, info.sample, _shared_disparity=shared, _checked=counts)
+    if not counts:
+        check_samples(values)
+    shown = Disparities(measure=lambda: seen.disparities) if seen.measured and not moved.steps else Disparities()
+    light_field = LightField.of(values, Grid(values.shape, frame, values.dtype, info.sample, stated, shown))
     remarks = (*info.remarks, turned, moved.remark)
     if info.frame is None:
         remarks += (
@@ -257,7 +262,7 @@ def open_sparse_views(
         pictures,
         tuple(grid.present),
         grid.shape,
-        LightField.from_views(_hollow((*grid.shape, info.height, info.width)), **geometry).frame,
+        camera_array_frame((*grid.shape, info.height, info.width), **geometry),
         info.disparity_range,
         info.sample,
     )
@@ -376,11 +381,6 @@ def _resolved(info: FolderInfo, given: dict[str, Any], path: Path) -> dict[str, 
     geometry["focus_distance"] = focus
     LightField.from_views(np.zeros((1, 1, 1, 1), np.uint8), **geometry)  # refuse before the long reading
     return geometry
-
-
-def _hollow(shape: tuple[int, ...]) -> NDArray[np.uint8]:
-    """An array of a shape that takes no memory."""
-    return np.broadcast_to(np.uint8(0), shape)
 
 
 def _decoded(

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.light_field import LightField, Sample
+from vcc.fields.grid import Sample
+from vcc.light_field import LightField
 
 
 @dataclass(frozen=True, eq=False)

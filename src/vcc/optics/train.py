@@ -184,6 +184,12 @@ class Train(Value):
         """Rays from just behind the last stage (or from the entrance plane) to the sensor."""
         return self._path[1]
 
+    @property
+    def arriving_at_sensor(self) -> Affine:
+        """Rays from the entrance plane to the sensor, folded as in `Stage.arriving`."""
+        behind = self.stages[-1].leaving if self.stages else Affine.identity()
+        return self.approach_to_sensor @ behind
+
     def rays_at(self, z: float, *, before: bool = False) -> Affine:
         """The map of rays from the entrance plane to the plane at z, all affine optics on the way folded.
 

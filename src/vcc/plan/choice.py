@@ -1,99 +1,58 @@
-"""Which kind of plan a camera gets: footprints where its optics allow them, else rays."""
+"""Which core a plan gets: footprints where the optics allow them, else rays."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from vcc.base.errors import InputError
+from vcc.fields.grid import Grid
+from vcc.optics.train import Train
 from vcc.plan.depth_rule import denser
-from vcc.plan.footprints.compile import compile_plan, why_not_footprints
-from vcc.plan.footprints.model import Plan
+from vcc.plan.footprints.compile import blurs_or_why_not, compile_footprints
+from vcc.plan.how import How
+from vcc.plan.model import Plan
 from vcc.plan.rays.compile import compile_rays
-from vcc.plan.rays.model import RayPlan
-
-if TYPE_CHECKING:
-    from vcc.camera import Camera
-    from vcc.light_field import LightField
 
 
-def compile_best(
-    camera: Camera,
-    light_field: LightField,
-    *,
-    method: str = "auto",
-    interpolation: str = "sharp",
-    between_views: str = "auto",
-    scene_distance: float | None = None,
-    refine: int | str = "auto",
-    samples: int | None = None,
-    seed: int = 0,
-) -> Plan | RayPlan:
-    """The plan by which an engine makes the picture; the arguments are those of `vcc.Camera.capture`.
+def compile_best(train: Train, grid: Grid, how: How | None = None) -> Plan:
+    """The plan by which an engine makes the picture that an optical train makes of a light field.
+
+    Args:
+        train: the optics and the sensor.
+        grid: of the light field.
+        how: what was chosen; None takes the defaults.
 
     Raises:
-        InputError: an option that does not exist, or does not go with the method.
+        InputError: options that do not go with one another, an element that returns what it must not.
     """
-    if method not in ("auto", "footprints", "rays"):
-        raise InputError(f"method is 'auto', 'footprints' or 'rays', not {method!r}")
-    if between_views == "depth":
-        if scene_distance is not None:
+    how = how or How()
+    by_footprints = "asked for" if how.method == "rays" else blurs_or_why_not(train, grid, how)
+    if how.between_views == "depth":
+        if isinstance(by_footprints, str):
             raise InputError(
-                "scene_distance is for between_views='auto'; by 'depth' each pixel has a distance of its own: "
-                "leave it out"
+                "between_views='depth' is for pictures made by footprints; this one is made by rays "
+                f"({by_footprints}): leave it out, and rays interpolate along the parallax of one depth"
             )
-        by_rays = "asked for" if method == "rays" else why_not_footprints(camera, light_field)
-        if by_rays is not None:
-            raise InputError(
-                f"between_views='depth' is for pictures made by footprints; this one is made by rays ({by_rays}): "
-                "leave it out, and rays interpolate along the parallax of one depth"
-            )
-        made, between, why = denser(camera, light_field)
-        plan = compile_best(
-            camera,
-            made,
-            method=method,
-            interpolation=interpolation,
-            refine=refine,
-            samples=samples,
-        )
-        assert isinstance(plan, Plan)
-        return replace(plan, views_between=between, notes=(*plan.notes, why))
-    if between_views not in ("auto", "none"):
-        raise InputError(f"between_views is 'auto', 'none' or 'depth', not {between_views!r}")
-    reason = "asked for" if method == "rays" else why_not_footprints(camera, light_field)
-    if reason is None:
-        if samples is not None:
-            raise InputError(
-                "samples is for pictures made by rays, and this camera needs none: leave it out, or pass "
-                "method='rays'"
-            )
-        return compile_plan(
-            camera,
-            light_field,
-            interpolation=interpolation,
-            between_views=between_views,
-            scene_distance=scene_distance,
-            refine=refine,
-        )
-    if method == "footprints":
-        raise InputError(f"this camera's picture cannot be made by footprints: {reason}. Use method='rays'")
-    for name, given, allowed in (
-        ("interpolation", interpolation, ("sharp", "linear")),
-        ("refine", refine, ("auto",)),
+        made, between, why = denser(train, grid)
+        plan = compile_best(train, made, replace(how, between_views="auto"))
+        return replace(plan, grid_shape=grid.shape[:4], views_between=between, notes=(*plan.notes, why))
+    if not isinstance(by_footprints, str):
+        for name, given in (("samples", how.samples), ("tolerance", how.tolerance)):
+            if given is not None:
+                raise InputError(
+                    f"{name} is for pictures made by rays, and this camera needs none: footprints have no "
+                    "sampling error. Leave it out, or pass method='rays'"
+                )
+        return compile_footprints(train, grid, how, by_footprints)
+    if how.method == "footprints":
+        raise InputError(f"this camera's picture cannot be made by footprints: {by_footprints}. Use method='rays'")
+    for name, value, fine in (
+        ("interpolation", how.interpolation, how.interpolation in ("sharp", "linear")),
+        ("refine", how.refine, how.refine == "auto"),
     ):
-        if given not in allowed:
+        if not fine:
             raise InputError(
-                f"{name}={given!r} is for pictures made by footprints; this one is made by rays ({reason}): "
-                "leave it out"
+                f"{name}={value!r} is for pictures made by footprints; this one is made by rays "
+                f"({by_footprints}): leave it out"
             )
-    return compile_rays(
-        camera,
-        light_field,
-        interpolation=interpolation,
-        between_views=between_views,
-        scene_distance=scene_distance,
-        samples=samples,
-        seed=seed,
-        reason=reason,
-    )
+    return compile_rays(train, grid, how, by_footprints)

@@ -9,19 +9,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.advice.view_gaps import ViewGaps
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.fields.disparity import DisparityMaps
-from vcc.light_field import LightField
-
-if TYPE_CHECKING:
-    from vcc.camera import Camera
+from vcc.base.values import Value
+from vcc.fields.disparity import Disparities, DisparityMaps
+from vcc.fields.grid import Grid
+from vcc.optics.train import Train
+from vcc.plan.view_gaps import ViewGaps
 
 Array = NDArray[np.float64]
 
@@ -77,7 +75,7 @@ class Parallax:
 
 
 @dataclass(frozen=True, eq=False)
-class ViewsBetween:
+class ViewsBetween(Value):
     """A denser light field, as a plan has it: pure numbers.
 
     Args:
@@ -97,30 +95,30 @@ class ViewsBetween:
         return (given[0] * self.times[0], given[1] * self.times[1], *given[2:])
 
 
-def denser(camera: Camera, light_field: LightField) -> tuple[LightField, ViewsBetween | None, str]:
+def denser(train: Train, grid: Grid) -> tuple[Grid, ViewsBetween | None, str]:
     """The light field with views in between, without samples; how they are made; and why, in words.
 
     None where views are as dense as the sensor can tell apart.
 
     Args:
-        camera: whose sensor is asked; what bends rays otherwise than affinely is passed over.
-        light_field: whose disparities are found now if they are not known.
+        train: whose sensor is asked; what bends rays otherwise than affinely is passed over.
+        grid: whose disparities are found now if they are not known.
 
     Raises:
         InputError: a frame that turns view axes against those of pixels, or disparities that cannot be found.
     """
-    rows, columns = light_field.whole_views
+    rows, columns = grid.extent
     if rows <= 1 and columns <= 1:
-        return light_field, None, "a single view: nothing between views"
-    parallax = Parallax.of(light_field.frame)
-    maps = light_field.disparity.maps()
+        return grid, None, "a single view: nothing between views"
+    parallax = Parallax.of(grid.frame)
+    maps = grid.disparities.maps()
     low, high = maps.extent
-    pixels_from_metres = camera.sensor.frame.inverse()
-    on_sensor = pixels_from_metres.linear @ camera.rays_at(camera.sensor.z).linear[:2]
+    pixels_from_metres = train.sensor.frame.inverse()
+    on_sensor = pixels_from_metres.linear @ train.rays_at(train.sensor.z).linear[:2]
     views = (math.ceil(rows), math.ceil(columns))
-    gaps = ViewGaps(light_field.frame, on_sensor, views)
+    gaps = ViewGaps(grid.frame, on_sensor, views)
     disparities = np.linspace(low, high, 33)
-    per_index = on_sensor @ light_field.frame.linear
+    per_index = on_sensor @ grid.frame.linear
     motion = np.zeros((33, 2, 2))
     motion[:, 0, 0], motion[:, 1, 1] = disparities, parallax.down(disparities)
     apart = np.linalg.norm(per_index[:, :2] - per_index[:, 2:] @ motion, axis=1)  # (n, axis of the views)
@@ -133,24 +131,23 @@ def denser(camera: Camera, light_field: LightField) -> tuple[LightField, ViewsBe
     spread = f"neighbouring views' pictures lie up to {max(down, across):.2g} pixels apart on the sensor"
     source = f"disparities from {low:.2g} to {high:.2g} pixels per view, {maps.source}"
     if times == (1, 1):
-        return light_field, None, f"{spread}, less than it can tell apart: nothing between views ({source})"
+        return grid, None, f"{spread}, less than it can tell apart: nothing between views ({source})"
     j, i = times
-    whole = light_field.shape
+    whole = grid.shape
     shape = (whole[0] * j, whole[1] * i, *whole[2:])
     finer = Affine.from_parts(np.diag([1 / i, 1 / j, 1, 1]), [0.5 / i - 0.5, 0.5 / j - 0.5, 0, 0])
-    outline = replace(
-        light_field,
-        values=np.broadcast_to(np.float32(0), shape),
-        frame=light_field.frame @ finer,
+    made = replace(
+        grid,
+        shape=shape,
+        frame=grid.frame @ finer,
+        kind=np.dtype(np.float32),
         disparity_range=(min(low / i, high / i), max(low / i, high / i)),
-        disparity=None,
-        _shared_disparity=None,
-        _disparity_factor=1.0,
-        _whole_views=(rows * j, columns * i),
+        disparities=Disparities(),
+        extent=(rows * j, columns * i),
     )
     reason = f"{spread}: {j}×{i} views are made for each one, looking along each pixel's own parallax ({source})"
     if max(wanted) > MOST_TIMES:
         left = max(down / j, across / i)
         reason += f"; {max(wanted)} would be needed, and {left:.2g} pixels stay between their pictures"
-    between = ViewsBetween(times, maps, parallax, light_field.full_scale)
-    return outline, between, reason
+    between = ViewsBetween(times, maps, parallax, grid.full_scale)
+    return made, between, reason

@@ -18,7 +18,7 @@ from vcc.base.values import Value
 Method = Literal["auto", "footprints", "rays"]
 Interpolation = Literal["sharp", "nearest", "linear", "cubic"]
 BetweenViews = Literal["auto", "none", "depth"]
-EngineName = Literal["numba", "array_api", "reference"]
+EngineName = Literal["reference", "array_api", "numba"]
 
 LARGEST_REFINEMENT = 8
 LARGEST_SAMPLES = 2**16

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.light_field import LightField
+from vcc.fields.grid import Grid
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def index_motions(frame: Affine, vergences: Array) -> Array:
 
 
 def choose_between_views(
-    light_field: LightField,
+    grid: Grid,
     frame: Affine,
     on_sensor: Array,
     between_views: str,
@@ -69,16 +69,16 @@ def choose_between_views(
     that is in focus gets blurred, and under strong defocus, where all gaps are alike, all are filled.
 
     Args:
-        light_field: whose disparities are asked for.
+        grid: whose disparities are asked for.
         frame: its frame, as the plan uses it.
         on_sensor: 2×4, pixels per index step (i, j, k, l).
         between_views: ``"auto"`` or ``"none"``.
         scene_distance: metres before the entrance plane, or None.
     """
-    rows, columns = light_field.whole_views
+    rows, columns = grid.extent
     if rows <= 1 and columns <= 1:
         return BetweenViews(np.zeros((2, 2)), (0.0, 0.0), 0.0, "a single view: nothing between views")
-    known = vergences(light_field, scene_distance)
+    known = vergences(grid, scene_distance)
     if known is None:
         motion = _in_focus(on_sensor)
         steps = np.stack([on_sensor[:, :2] - on_sensor[:, 2:] @ motion])
@@ -116,11 +116,11 @@ def choose_between_views(
     )
 
 
-def vergences(light_field: LightField, scene_distance: float | None) -> Array | None:
+def vergences(grid: Grid, scene_distance: float | None) -> Array | None:
     """1/Z of the scene in 1/m, evenly over its disparities; None where it shows no parallax.
 
     Args:
-        light_field: whose disparities are asked for.
+        grid: whose disparities are asked for.
         scene_distance: metres before it, which then is all that counts, or None.
 
     Raises:
@@ -130,13 +130,13 @@ def vergences(light_field: LightField, scene_distance: float | None) -> Array | 
         if not scene_distance > 0:
             raise InputError(f"scene_distance must be greater than 0 m, not {scene_distance}")
         return np.array([1.0 / scene_distance])
-    disparities = light_field.measured_disparity_range()
+    disparities = grid.measured_disparity_range()
     if disparities is None:
         return None
     # distance_of, kept as 1/Z so that infinity needs no special case; by disparity rather than by distance,
     # since behind a lens the scene's images may lie on both sides of infinity
     disparity = np.linspace(*disparities, 33)
-    position, slope = light_field.frame.linear[0], light_field.frame.linear[2]
+    position, slope = grid.frame.linear[0], grid.frame.linear[2]
     numerator, denominator = slope[0] - disparity * slope[2], position[0] - disparity * position[2]
     apart = denominator != 0  # else the scene's image lies in this very plane
     return np.asarray(numerator[apart] / denominator[apart]) if apart.any() else None

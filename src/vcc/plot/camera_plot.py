@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import mm, short
-from vcc.camera import Camera
-from vcc.light_field import LightField
+from vcc.fields.samples import InMemory
 from vcc.optics import CellDeflection, Element, FirstOrder, Lens
-from vcc.optics.train import Stage
+from vcc.optics.train import Stage, Train
 from vcc.plot import style
 from vcc.plot.elements import Pen, draw_element, draw_sensor, half_size, label_of, length_in_words, magnification
 from vcc.plot.tracing import Paths, fan, openings, trace
@@ -44,7 +43,7 @@ RAYS_A_CELL = 5
 """There, about so many of a fan go through each cell."""
 
 
-def focused_distance(camera: Camera) -> float | None:
+def focused_distance(camera: Train) -> float | None:
     """How far before the entrance plane a point must be to be sharp on the sensor, metres.
 
     With position and slope at the entrance mapped to a plane by x = A·u + B·s, a point at distance Z sends
@@ -65,7 +64,7 @@ def focused_distance(camera: Camera) -> float | None:
     return distance if distance > 0 else None
 
 
-def _lenslets(camera: Camera) -> Stage | None:
+def _lenslets(camera: Train) -> Stage | None:
     """The last array of cells with a power, before the sensor and not on it."""
     found = None
     for stage in camera.stages:
@@ -75,7 +74,7 @@ def _lenslets(camera: Camera) -> Stage | None:
     return found
 
 
-def _to_focus(camera: Camera) -> Affine:
+def _to_focus(camera: Train) -> Affine:
     """Rays from the entrance plane to the plane in which a picture must stand to be sharp on the sensor."""
     stage = _lenslets(camera)
     if stage is None:
@@ -93,9 +92,9 @@ def _to_focus(camera: Camera) -> Affine:
 
 
 def plot_camera(
-    camera: Camera,
+    camera: Train,
     *,
-    light_field: LightField | None = None,
+    light_field: InMemory | None = None,
     object_distances: Sequence[float] | None = None,
     across: str = "x",
     rays: int | None = None,
@@ -199,7 +198,7 @@ class _Point:
     label: str
 
 
-def _points(camera: Camera, distances: Sequence[float] | None, axis: int) -> list[_Point]:
+def _points(camera: Train, distances: Sequence[float] | None, axis: int) -> list[_Point]:
     colours = (style.BLUE, style.ORANGE, style.GREEN)
     if distances is not None:
         for distance in distances:
@@ -232,7 +231,7 @@ def _away(distance: float) -> str:
     return "parallel light" if math.isinf(distance) else f"{short(distance, digits=3)} away"
 
 
-def _scene_length(camera: Camera, points: list[_Point]) -> float:
+def _scene_length(camera: Train, points: list[_Point]) -> float:
     """How much of the scene's side to draw, metres: a piece, or up to points that are close."""
     shown = SCENE_SHARE * (camera.sensor.z or 10 * mm)
     near = [point.distance for point in points if point.distance < 2.5 * shown]
@@ -240,9 +239,9 @@ def _scene_length(camera: Camera, points: list[_Point]) -> float:
 
 
 def _trace_point(
-    camera: Camera,
+    camera: Train,
     point: _Point,
-    light_field: LightField | None,
+    light_field: InMemory | None,
     axis: int,
     rays: int,
     start: float,
@@ -253,7 +252,7 @@ def _trace_point(
     return trace(camera, bundle, max(start, -point.distance), split_along=axis)
 
 
-def _entrance(camera: Camera, point: _Point, light_field: LightField | None, axis: int) -> tuple[float, float]:
+def _entrance(camera: Train, point: _Point, light_field: InMemory | None, axis: int) -> tuple[float, float]:
     """From where to where on the entrance plane the rays of a point go, metres."""
     if light_field is not None:
         ends = np.array(light_field.shape[1::-1]) - 0.5
@@ -283,7 +282,7 @@ def _entrance(camera: Camera, point: _Point, light_field: LightField | None, axi
 # --- drawing ---
 
 
-def _half_height(camera: Camera, paths: list[Paths], axis: int) -> float:
+def _half_height(camera: Train, paths: list[Paths], axis: int) -> float:
     """Half the height of the drawing, metres: bounded elements, the sensor, and rays within reason."""
     sizes = [camera.sensor.size[1 - axis] / 2 + abs(camera.sensor.decentre[axis])]
     halves = [(half_size(element, axis), abs(element.decentre[axis])) for element in camera.elements]
@@ -339,7 +338,7 @@ def _draw_paths(axes: Axes, point: _Point, paths: Paths, axis: int, width: float
 # --- a magnified piece of an array ---
 
 
-def _array_to_magnify(camera: Camera, axis: int, half: float, needed: bool) -> Stage | None:
+def _array_to_magnify(camera: Train, axis: int, half: float, needed: bool) -> Stage | None:
     """The last array of cells before the sensor; None where it has none, or (unless needed) none that is small."""
     arrays = [
         stage
@@ -357,10 +356,10 @@ def _array_to_magnify(camera: Camera, axis: int, half: float, needed: bool) -> S
 def _draw_magnified(
     inset: Axes,
     axes: Axes,
-    camera: Camera,
+    camera: Train,
     stage: Stage,
     points: list[_Point],
-    light_field: LightField | None,
+    light_field: InMemory | None,
     axis: int,
 ) -> None:
     """Some cells in the middle of an array, with what is behind them up to the sensor."""
@@ -424,7 +423,7 @@ def _join(axes: Axes, piece: tuple[float, float, float], inset: Axes) -> None:
 # --- words ---
 
 
-def _draw_labels(pen: Pen, camera: Camera, own_figure: bool) -> None:
+def _draw_labels(pen: Pen, camera: Train, own_figure: bool) -> None:
     """What each thing is, side by side above the drawing, each with a line to its place."""
     from matplotlib.figure import Figure
     from matplotlib.text import Text

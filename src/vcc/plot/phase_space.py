@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.units import mm
-from vcc.camera import Camera
 from vcc.fields.sampled import to_numpy
-from vcc.light_field import LightField
+from vcc.fields.samples import InMemory
 from vcc.optics import Faces
 from vcc.optics.sensor import Sensor
+from vcc.optics.train import Train
 from vcc.plot import style
 from vcc.plot.phase_space_rays import (
     FULL,
@@ -27,6 +27,7 @@ from vcc.plot.phase_space_rays import (
     slice_of,
     traced,
 )
+from vcc.run.operators import carried_to
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NO_OPTICS = Camera([], Sensor(0.0, (1, 1), 1.0))
+NO_OPTICS = Train([], Sensor(0.0, (1, 1), 1.0))
 """What a light field meets that is drawn where it is."""
 ENTRANCE = "entrance, z = 0 mm"
 CELLS_DRAWN_ONE_BY_ONE = 20_000
@@ -42,7 +43,7 @@ CELLS_DRAWN_ONE_BY_ONE = 20_000
 
 
 def plot_phase_space(
-    light_field: LightField,
+    light_field: InMemory,
     *,
     row: int | None = None,
     pixel_row: int | None = None,
@@ -107,8 +108,8 @@ def plot_phase_space(
 
 
 def plot_phase_space_stages(
-    camera: Camera,
-    light_field: LightField,
+    camera: Train,
+    light_field: InMemory,
     *,
     row: int | None = None,
     pixel_row: int | None = None,
@@ -142,11 +143,11 @@ def plot_phase_space_stages(
     """
     chosen = slice_of(across)
     titles = [(-1.0, ENTRANCE), *_planes(camera)]
-    cells: dict[float, LightField] = {}
+    cells: dict[float, InMemory] = {}
     if _held_by_samples(chosen, row, pixel_row, fixed):
         piece = _slice(light_field, row, pixel_row, NAMES[chosen[0]])  # first: what follows works on few samples
         cells = {
-            z: piece if z < 0 else camera.light_field_at(piece, z) for z, _ in titles if z < _traced_from(camera)
+            z: piece if z < 0 else carried_to(camera, piece, z) for z, _ in titles if z < _traced_from(camera)
         }
     pictures: dict[float, PhaseSpacePicture] = {}
     if len(cells) < len(titles):
@@ -180,8 +181,8 @@ def plot_phase_space_stages(
 
 
 def phase_space_stages(
-    camera: Camera,
-    light_field: LightField,
+    camera: Train,
+    light_field: InMemory,
     *,
     row: int | None = None,
     pixel_row: int | None = None,
@@ -222,7 +223,7 @@ def _held_by_samples(
     return False
 
 
-def _traced_from(camera: Camera) -> float:
+def _traced_from(camera: Train) -> float:
     """The z of the first plane behind which a frame no longer holds the cells."""
     for element in camera.elements:
         for part in element.parts():
@@ -267,7 +268,7 @@ def _set_limits(axes: Axes, pictures: list[PhaseSpacePicture], chosen: tuple[int
     axes.set_ylim(limits[1][::-1] if chosen == (0, 1) else limits[1])
 
 
-def cell_corners(light_field: LightField, across: str = "u") -> tuple[Array, Array]:
+def cell_corners(light_field: InMemory, across: str = "u") -> tuple[Array, Array]:
     """Corners of the cells of a light field's middle slice in phase space.
 
     Returns:
@@ -286,7 +287,7 @@ def cell_corners(light_field: LightField, across: str = "u") -> tuple[Array, Arr
     return rays[..., view], rays[..., pixel]
 
 
-def _slice(light_field: LightField, row: int | None, pixel_row: int | None, across: str) -> LightField:
+def _slice(light_field: InMemory, row: int | None, pixel_row: int | None, across: str) -> InMemory:
     """The light field with one row of views and one row of pixels left, in its place."""
     nv, nu, nt, ns = light_field.shape[:4]
     counts = {"row": nv, "pixel_row": nt} if across == "u" else {"row": nu, "pixel_row": ns}
@@ -301,11 +302,11 @@ def _slice(light_field: LightField, row: int | None, pixel_row: int | None, acro
     return light_field[:, chosen[0], :, chosen[1]]
 
 
-def _radiance(piece: LightField, across: str) -> Array:
+def _radiance(piece: InMemory, across: str) -> Array:
     """Radiance of a slice, (views, pixels) or (views, pixels, 3)."""
     values = to_numpy(piece.values)
     values = values[0, :, 0] if across == "u" else values[:, 0, :, 0]
-    radiance: Array = values.astype(np.float64) / piece.full_scale
+    radiance: Array = values.astype(np.float64) / piece.grid.full_scale
     if radiance.ndim == 3 and radiance.shape[2] != 3:
         radiance = radiance.mean(axis=2)
     return radiance
@@ -318,7 +319,7 @@ def _for_display(values: Array) -> Any:
     return np.clip(from_linear(np.clip(values, 0, 1)), 0, 1)
 
 
-def _planes(camera: Camera) -> list[tuple[float, str]]:
+def _planes(camera: Train) -> list[tuple[float, str]]:
     """The places behind elements and the sensor's, each with a title."""
     behind: dict[float, str] = {}
     for element in camera.elements:

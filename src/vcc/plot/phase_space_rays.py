@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.camera import Camera
 from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
-from vcc.light_field import LightField
+from vcc.fields.samples import InMemory
 from vcc.optics import Scatter
-from vcc.optics.train import Stage, about
+from vcc.optics.train import Stage, Train, about
 from vcc.plot.tracing import marginals
 
 Array = NDArray[np.float64]
@@ -111,7 +110,7 @@ def slice_of(across: str) -> tuple[int, int]:
     return NAMES.index(names[0]), NAMES.index(names[1])
 
 
-def sheet_of_samples(piece: LightField, across: tuple[int, int]) -> Sheet:
+def sheet_of_samples(piece: InMemory, across: tuple[int, int]) -> Sheet:
     """The sheet of a light field with one row of views and one row of pixels left: its own cells.
 
     Args:
@@ -125,7 +124,7 @@ def sheet_of_samples(piece: LightField, across: tuple[int, int]) -> Sheet:
     return Sheet(values, piece.frame.offset - first / 2 - second / 2, first, second, across)
 
 
-def sheet_of_rays(light_field: LightField, across: tuple[int, int], fixed: tuple[float, float] | None) -> Sheet:
+def sheet_of_rays(light_field: InMemory, across: tuple[int, int], fixed: tuple[float, float] | None) -> Sheet:
     """The sheet of all rays with two coordinates held, interpolated linearly between samples.
 
     Args:
@@ -183,10 +182,10 @@ def sheet_of_rays(light_field: LightField, across: tuple[int, int], fixed: tuple
     return Sheet(values, origin, steps[0], steps[1], across)
 
 
-def radiance_of(values: NDArray[Any], light_field: LightField) -> Array:
+def radiance_of(values: NDArray[Any], light_field: InMemory) -> Array:
     """Radiance of samples of a light field; of channels that are not three, of colour, the mean."""
-    radiance: Array = values.astype(np.float64) / light_field.full_scale
-    return radiance.mean(axis=-1) if light_field.channels not in (None, 3) else radiance
+    radiance: Array = values.astype(np.float64) / light_field.grid.full_scale
+    return radiance.mean(axis=-1) if light_field.grid.channels not in (None, 3) else radiance
 
 
 @dataclass
@@ -322,7 +321,7 @@ def _along_slope(light: Array, scatter: Scatter, axis: int, places: Array, step:
 
 
 def traced(
-    camera: Camera, sheet: Sheet, titles: dict[float, str], *, rays: int = RAYS, raster: tuple[int, int] = RASTER
+    camera: Train, sheet: Sheet, titles: dict[float, str], *, rays: int = RAYS, raster: tuple[int, int] = RASTER
 ) -> Iterator[PhaseSpacePicture]:
     """The pictures of a sheet at the entrance, behind each plane of elements and on the sensor.
 

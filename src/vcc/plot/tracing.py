@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.affine import Affine
-from vcc.camera import Camera
 from vcc.optics import Element, Faces, Scatter
-from vcc.optics.train import Stage, about
+from vcc.optics.train import Stage, Train, about
 from vcc.shapes.kernels import Kernel
 
 Array = NDArray[np.float64]
@@ -85,7 +84,7 @@ def crossings(element: Element) -> list[Crossing]:
     return found
 
 
-def trace(camera: Camera, rays: ArrayLike, start: float = 0.0, split_along: int | None = None) -> Paths:
+def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int | None = None) -> Paths:
     """The paths of rays from a plane before the camera through its elements to the sensor.
 
     Args:
@@ -198,7 +197,7 @@ def _marginal(kernel: Kernel, axis: int) -> tuple[Array, Array]:
     return np.bincount(bins, shares * slopes)[lit] / total[lit], total[lit]
 
 
-def openings(camera: Camera, axis: int) -> Iterator[tuple[Element, Affine, float]]:
+def openings(camera: Train, axis: int) -> Iterator[tuple[Element, Affine, float]]:
     """What is opaque around an opening of known size.
 
     Yields:

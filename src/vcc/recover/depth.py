@@ -158,8 +158,8 @@ def depth_by_structure_tensor(
     """
     for name, scale in (("inner_scale", inner_scale), ("outer_scale", outer_scale)):
         above_zero(name, scale)
-    geometry = DisparityGeometry.of(light_field, fewest=3)
-    low, high = range_to_search(light_field, disparity_range)
+    geometry = DisparityGeometry.of(light_field.grid, fewest=3)
+    low, high = range_to_search(light_field.grid, disparity_range)
     cross = arms(light_field)
     samples = max(arm.views.size for arm in cross)
     # Beside the samples of one arm: its shear, two derivatives, a product and its smoothed copy.

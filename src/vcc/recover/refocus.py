@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Any, cast
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,13 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress
 from vcc.camera import Camera
+from vcc.fields.grid import Grid
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Element, Lens, Mask
 from vcc.optics.sensor import Sensor
-from vcc.plan.footprints.model import Plan
+from vcc.plan.model import Plan
+from vcc.plan.operators import AlongAxes, Blur
 from vcc.shapes import patterns
 from vcc.store import StoredLightField
 
@@ -126,7 +129,6 @@ def refocused(
         "interpolation": "linear" if sharp else interpolation,
         "between_views": between_views,
     }
-    outline = light_field if isinstance(light_field, LightField) else light_field.outline
     with warnings.catch_warnings():
         # "rays are missing; the picture is darker there": it is not, once divided by the coverage.
         warnings.filterwarnings("ignore", message=".*of the rays that this camera asks for.*")
@@ -134,7 +136,7 @@ def refocused(
             "ignore", message="the picture is 0 everywhere.*"
         )  # told below, or in its own words
         taken = camera.capture(light_field, **options, memory_limit=memory_limit, progress=progress)
-        covered = _coverage(camera, outline, options)
+        covered = _coverage(camera, light_field.grid, options)
     most = float(covered.max())
     if not most > 0:
         raise InputError(
@@ -149,8 +151,8 @@ def refocused(
     values = taken.to_numpy().astype(np.float64)
     values /= share if values.ndim == 2 else share[..., None]
     if sharp:
-        plan = camera.compile(outline, **(options | {"interpolation": "sharp"}))
-        values = _sharpened(values, cast(Plan, plan))
+        plan = camera.compile(light_field, **(options | {"interpolation": "sharp"}))
+        values = _sharpened(values, plan)
     nv, nu, nt, ns = light_field.shape[:4]
     s, t = light_field.frame([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2])[2:]
     on_sensor = Affine.translation(-camera.sensor.decentre[0], -camera.sensor.decentre[1]) @ taken.frame
@@ -162,24 +164,26 @@ def _sharpened(values: NDArray[np.float64], plan: Plan) -> NDArray[np.float64]:
     """A picture with what a plan gives back to sharpness; beyond its border it goes on as its edge."""
     from scipy.ndimage import convolve, convolve1d
 
-    if plan.sharpen is not None:
-        for axis in (0, 1):
-            values = convolve1d(values, plan.sharpen[axis], axis=axis, mode="nearest")
-    elif plan.blur is not None:  # of a turned grid of pixels
-        values = convolve(values, plan.blur if values.ndim == 2 else plan.blur[..., None], mode="nearest")
+    for operator in plan.after:
+        if isinstance(operator, AlongAxes) and not any(operator.half_widths):
+            for axis, weights in enumerate((operator.down, operator.across)):
+                values = convolve1d(values, weights, axis=axis, mode="nearest")
+        elif isinstance(operator, Blur):  # of a turned grid of pixels
+            kernel = operator.kernel if values.ndim == 2 else operator.kernel[..., None]
+            values = convolve(values, kernel, mode="nearest")
     return values
 
 
-def _coverage(camera: Camera, outline: LightField, options: dict[str, Any]) -> NDArray[np.float64]:
+def _coverage(camera: Camera, grid: Grid, options: dict[str, Any]) -> NDArray[np.float64]:
     """The picture of uniform radiance 1, (rows, columns), made row of views by row, without reading samples.
 
     Pieces of a light field are treated as the whole would be (its range of disparities is theirs too), and
     their pictures add up.
     """
     total = np.zeros(camera.sensor.shape)
-    for row in range(outline.shape[0]):
-        piece = outline[row : row + 1]
-        ones = piece.replaced(np.ones(piece.shape[:4], np.float32))
+    for row in range(grid.shape[0]):
+        piece, _ = grid.piece(slice(row, row + 1))
+        ones = LightField.of(np.ones(piece.shape[:4], np.float32), replace(piece, shape=piece.shape[:4]))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ResultWarning)
             total += camera.capture(ones, **options).to_numpy()

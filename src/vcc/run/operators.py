@@ -9,7 +9,7 @@ above a limit.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,26 +17,27 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_samples
+from vcc.fields.disparity import Disparities
 from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
+from vcc.fields.samples import InMemory, maps_of
+from vcc.optics.faces import Element
+from vcc.optics.mask import Mask
+from vcc.optics.scatter import Scatter
+from vcc.optics.train import Stage, Train
 from vcc.plan.footprints.planes import Plane, depends_on_view_only, mask_lookup
 from vcc.shapes.patterns import Pattern
 
-if TYPE_CHECKING:
-    from vcc.camera import Camera
-    from vcc.image import Image
-    from vcc.light_field import LightField
-    from vcc.optics import Element, Mask, Scatter
-    from vcc.optics.sensor import Sensor
-    from vcc.optics.train import Stage
+Field = TypeVar("Field", bound=InMemory)
+"""A light field in memory: what is made of it is of its own type."""
 
 SPLINE_ORDER = {"nearest": 0, "linear": 1, "cubic": 3}
 
 
 def masked_at(
-    light_field: LightField,
+    light_field: Field,
     planes: list[tuple[Pattern, tuple[float, float], Affine]],
     memory_limit: int | None = None,
-) -> LightField:
+) -> Field:
     """The light field times what patterns at several planes let pass; its own plane and frame stay.
 
     Args:
@@ -57,7 +58,7 @@ def masked_at(
     nv, nu, nt, ns = values.shape[:4]
     k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
     for j, i in np.ndindex(nv, nu):
-        weight: Any = 1.0 / light_field.full_scale
+        weight: Any = 1.0 / light_field.grid.full_scale
         for table in tables:
             # A texture that makes up for being looked up linearly may pass 0 beside an edge; light does not.
             weight = weight * (
@@ -66,32 +67,48 @@ def masked_at(
         if values.ndim == 5 and np.ndim(weight):
             weight = weight[..., None]
         result[j, i] = values[j, i] * weight
-    return light_field.replaced(result)
+    return light_field.with_values(result)
 
 
 def carried_to(
-    camera: Camera, light_field: LightField, z: float, before: bool, memory_limit: int | None = None
-) -> LightField:
-    """The light field at a plane inside a camera; see `vcc.Camera.light_field_at`."""
-    here = Affine.identity()
-    planes: list[tuple[Pattern, tuple[float, float], Affine]] = []
-    for stage in camera.stages:
+    train: Train, light_field: Field, z: float, before: bool = False, memory_limit: int | None = None
+) -> Field:
+    """The light field at a plane inside a camera; see `vcc.Camera.light_field_at`.
+
+    Raises:
+        InputError: z behind the sensor, or an element on the way that bends rays not as a lens or a prism does.
+    """
+    if z > train.sensor.z:
+        raise InputError(f"z = {z * 1e3:g} mm lies behind the sensor at {train.sensor.z * 1e3:g} mm")
+    for stage in train.stages:
         if stage.element.z > z or (before and stage.element.z == z):
             break
-        here = stage.approach @ here
+        if stage.faces.bending is not None:
+            raise InputError(
+                f"{stage.element.label} is not affine: behind it the light field has no frame. Choose a z "
+                "before it, or look at the picture (camera.capture)"
+            )
+    planes: list[tuple[Pattern, tuple[float, float], Affine]] = []
+    for stage in train.stages:
+        if stage.element.z > z or (before and stage.element.z == z):
+            break
+        here = stage.arriving
         if stage.faces.pattern is not None:
             planes.append((stage.faces.pattern, stage.element.decentre, here))
         if stage.faces.spread is not None:
-            arriving = masked_at(light_field, planes, memory_limit).transformed(here)
+            arriving = transformed(masked_at(light_field, planes, memory_limit), here)
             planes = []
-            light_field = scattered_by(arriving, stage, memory_limit).transformed(here.inverse())
-        if stage.centred is not None:
-            here = stage.centred @ here
+            light_field = transformed(scattered_by(arriving, stage, memory_limit), here.inverse())
     behind = masked_at(light_field, planes, memory_limit)
-    return behind.transformed(camera.rays_at(z, before=before))
+    return transformed(behind, train.rays_at(z, before=before))
 
 
-def _weight_table(light_field: LightField, pattern: Pattern, decentre: tuple[float, float], rays: Affine) -> Any:
+def transformed(light_field: Field, rays: Affine) -> Field:
+    """The light field after a map of rays: 𝕋 of the paper (section 3.2.1); no sample is touched."""
+    return light_field.of(light_field.values, light_field.grid.moved(rays))
+
+
+def _weight_table(light_field: Field, pattern: Pattern, decentre: tuple[float, float], rays: Affine) -> Any:
     """One weight for each view where the pattern tells views apart only, else a lookup for samples."""
     nv, nu, nt, ns = light_field.shape[:4]
     plane = Plane.met_by(light_field.frame, rays, pattern, decentre, "pattern")
@@ -102,17 +119,15 @@ def _weight_table(light_field: LightField, pattern: Pattern, decentre: tuple[flo
     return mask_lookup(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
 
 
-def masked(light_field: LightField, mask: Mask, memory_limit: int | None = None) -> LightField:
+def masked(light_field: Field, mask: Mask, memory_limit: int | None = None) -> Field:
     """The paper's dot product L · K; see `vcc.LightField.masked`."""
     pattern = mask.faces().pattern
     assert pattern is not None
     return masked_at(light_field, [(pattern, mask.decentre, Affine.identity())], memory_limit)
 
 
-def scattered(light_field: LightField, diffuser: Element, memory_limit: int | None = None) -> LightField:
+def scattered(light_field: Field, diffuser: Element, memory_limit: int | None = None) -> Field:
     """The paper's convolution L ⊗ D; see `vcc.LightField.scattered`."""
-    from vcc.optics.train import Stage
-
     faces = diffuser.faces()
     if faces.spread is None:
         raise InputError(f"{diffuser.label} does not scatter light: its faces have no kernel")
@@ -127,7 +142,7 @@ def scattered(light_field: LightField, diffuser: Element, memory_limit: int | No
     return scattered_by(light_field, Stage(diffuser, 0.0, Affine.identity(), faces), memory_limit)
 
 
-def scattered_by(light_field: LightField, stage: Stage, memory_limit: int | None = None) -> LightField:
+def scattered_by(light_field: Field, stage: Stage, memory_limit: int | None = None) -> Field:
     """The light field just behind a stage that lies in its plane, scattered; what else it does is left out.
 
     Args:
@@ -164,14 +179,19 @@ def scattered_by(light_field: LightField, stage: Stage, memory_limit: int | None
         inside = result[j, i, high - rows : high + nt + rows, wide - columns : wide + ns + columns]
         kernel = weights[j][i] if values.ndim == 4 else weights[j][i][:, :, None]
         # In double precision: what Fourier transforms round to in the dark would else add up over a view.
-        view = values[j, i].astype(np.float64) / light_field.full_scale
+        view = values[j, i].astype(np.float64) / light_field.grid.full_scale
         np.maximum(oaconvolve(view, kernel, axes=(0, 1)), 0.0, out=inside, casting="same_kind")
-    grown = frame @ Affine.translation(0, 0, -wide, -high)
-    return replace(light_field, values=result, frame=grown, disparity=None)
+    # Scattering moves nothing: what is followed between views stays, and maps are found where they are asked for.
+    disparities = Disparities(
+        find=lambda progress: maps_of(made, progress), measure=light_field.grid.disparities.range
+    )
+    grid = replace(light_field.grid.grown(high, wide), kind=result.dtype, disparities=disparities)
+    made = light_field.of(result, grid)
+    return made
 
 
 def _view_weights(
-    scatter: Scatter, light_field: LightField, decentre: tuple[float, float]
+    scatter: Scatter, light_field: Field, decentre: tuple[float, float]
 ) -> list[list[NDArray[np.float64]]]:
     """The kernel in the middle of each view's cell, as weights on the lattice of a view's samples."""
     nv, nu = light_field.shape[:2]
@@ -201,12 +221,12 @@ def _view_weights(
 
 
 def resampled(
-    light_field: LightField,
+    light_field: Field,
     frame: Affine,
     shape: tuple[int, int, int, int],
     interpolation: str = "linear",
     memory_limit: int | None = None,
-) -> LightField:
+) -> Field:
     """The light field on another grid; see `vcc.LightField.resampled`."""
     from scipy.ndimage import affine_transform
 
@@ -214,7 +234,7 @@ def resampled(
         raise InputError(f"interpolation is one of {', '.join(map(repr, SPLINE_ORDER))}, not {interpolation!r}")
     if len(shape) != 4 or min(shape) < 1:
         raise InputError(f"a grid has the shape (v, u, t, s), each at least 1, not {shape}")
-    check_samples((*shape, light_field.channels or 1), memory_limit, "the resampled light field")
+    check_samples((*shape, light_field.grid.channels or 1), memory_limit, "the resampled light field")
     old_from_new = light_field.frame.inverse() @ frame
     axes = list(np.argsort(LIGHT_FIELD_AXES))
     matrix, offset = old_from_new.linear[np.ix_(axes, axes)], old_from_new.offset[axes]
@@ -222,7 +242,7 @@ def resampled(
     values = values.reshape(*values.shape[:4], -1)
     result = np.empty((*shape, values.shape[4]), dtype=np.float32)
     for channel in range(values.shape[4]):
-        samples = values[..., channel].astype(np.float32) / np.float32(light_field.full_scale)
+        samples = values[..., channel].astype(np.float32) / np.float32(light_field.grid.full_scale)
         result[..., channel] = affine_transform(
             samples,
             matrix,
@@ -233,21 +253,5 @@ def resampled(
             output=np.float32,
         )
     np.maximum(result, 0, out=result)  # a spline may undershoot; radiance does not
-    final: NDArray[np.float32] = result if light_field.channels is not None else result[..., 0]
-    return replace(
-        light_field,
-        values=final,
-        frame=frame,
-        disparity_range=None,
-        disparity=None,
-        _shared_disparity=None,
-        _disparity_factor=1.0,
-        _whole_views=None,
-    )
-
-
-def projected(light_field: LightField, sensor: Sensor) -> Image:
-    """The picture on a sensor that lies in the light field's own plane; see `vcc.LightField.projected`."""
-    from vcc.camera import Camera
-
-    return Camera([], replace(sensor, z=0.0)).capture(light_field)
+    final: NDArray[np.float32] = result if light_field.grid.channels is not None else result[..., 0]
+    return replace(light_field, values=final, frame=frame, disparity_range=None, disparity=None, extent=None)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
+from vcc.fields.samples import Samples
 from vcc.image import Image
 from vcc.optics.electronics import Electronics, checked_seed
 from vcc.optics.sensor import Sensor
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
     from vcc.camera import Camera
     from vcc.files.pictures import SavedPicture
-    from vcc.light_field import LightField
-    from vcc.store import StoredLightField
 
 Demosaicing = Literal["menon", "malvar", "bilinear"]
 """Ways to fill in the channels that a pixel's filter keeps out; see `Recording.demosaiced`."""
@@ -226,7 +225,7 @@ class Recording:
 
 def expose(
     camera: Camera,
-    light_field: LightField | StoredLightField,
+    light_field: Samples,
     exposure: float | Literal["auto"],
     *,
     seed: int = 0,
@@ -240,7 +239,7 @@ def expose(
         _checked_exposure(exposure)
     checked_seed(seed)
     _checked_radiance(radiance)
-    electronics.check_channels(light_field.channels)
+    electronics.check_channels(light_field.grid.channels)
     image = camera.capture(light_field, seed=ray_seed, **options)
     return expose_image(image, camera.sensor, exposure, seed=seed, radiance=radiance)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.light_field import Sample
+from vcc.fields.grid import Sample
 
 FORMAT_VERSION = 1
 """Of the attributes and the layout below; a reader refuses what is newer than it knows."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +17,14 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
 from vcc.fields.disparity import Disparities, DisparityMaps
+from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, told_along_u
+from vcc.fields.parallax import Axis, disparity_range
 from vcc.fields.plane_sweep import disparity_maps
-from vcc.fields.sampled import Index
+from vcc.fields.sampled import Index, as_slice
 from vcc.files.transfer import decode
-from vcc.light_field import (
-    SAMPLES_IN_WORDS,
-    DisparityRange,
-    LightField,
-    Sample,
-    describe_geometry,
-    told_along_u,
-)
+from vcc.image import Image
+from vcc.light_field import LightField
 from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
-
-if TYPE_CHECKING:
-    from vcc.image import Image
 
 Progress = Callable[[int, int], None]
 
@@ -40,76 +34,6 @@ MEASURED_REACH = 3
 """How many views on either side of the middle one disparities are measured from; see `vcc.fields.parallax`."""
 NOT_THERE = 2**64 - 1
 """How the index of a Zarr shard says that a chunk was never written."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class OnDisk:
-    """Stands where the array of a light field stands, and holds no samples: a part of a store, not yet read.
-
-    Args:
-        store: whose samples.
-        ranges: which indices along each axis.
-    """
-
-    store: StoredLightField
-    ranges: tuple[range, ...]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """How many indices there are along each axis."""
-        return tuple(len(part) for part in self.ranges)
-
-    @property
-    def ndim(self) -> int:
-        """How many axes there are."""
-        return len(self.ranges)
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Of the samples once they are read."""
-        return self.store.read_dtype
-
-    def __getitem__(self, index: Any) -> OnDisk:
-        parts = list(index) if isinstance(index, tuple) else [index]
-        if Ellipsis in parts:
-            place = parts.index(Ellipsis)
-            parts[place : place + 1] = [slice(None)] * (self.ndim - len(parts) + 1)
-        if not all(isinstance(part, slice) for part in parts):
-            raise TypeError("samples on disk are indexed by slices")
-        parts += [slice(None)] * (self.ndim - len(parts))
-        return OnDisk(self.store, tuple(held[part] for held, part in zip(self.ranges, parts, strict=True)))
-
-    def __array__(self, *_: Any, **__: Any) -> Any:
-        raise TypeError(
-            f"the samples of {self.store.path} are on disk: read them with .read(), or a part by slicing"
-        )
-
-    def read(self, progress: Progress | None = None) -> NDArray[Any]:
-        """The samples, read now.
-
-        Raises:
-            InputError: what `StoredLightField` says of views, or more memory needed than there is.
-        """
-        rows, columns, pixel_rows, *rest = self.ranges
-        low, high = min(pixel_rows[0], pixel_rows[-1]), max(pixel_rows[0], pixel_rows[-1]) + 1
-        within = (
-            _slice(range(pixel_rows.start - low, pixel_rows.stop - low, pixel_rows.step)),
-            *map(_slice, rest),
-        )
-        try:
-            values: NDArray[Any] = np.empty(self.shape, self.dtype)
-        except MemoryError:
-            size = math.prod(self.shape) * self.dtype.itemsize / 1e9
-            raise InputError(
-                f"this part of {self.store.path} takes {size:.1f} GB of memory, more than there is: read less at "
-                "a time, or let camera.capture(stored, memory_limit=…) read it in pieces"
-            ) from None
-        total = len(rows) * len(columns)
-        for done, (j, i) in enumerate(np.ndindex(len(rows), len(columns)), start=1):
-            values[j, i] = self.store.linear_view(rows[j], columns[i], low, high)[within]
-            if progress is not None:
-                progress(done, total)
-        return values
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -128,14 +52,18 @@ class StoredLightField:
     path: Path
     attributes: Attributes
     array: Any
-    _disparity: DisparityRange | None = field(default=None, repr=False)
-    _maps: Disparities | None = field(default=None, repr=False)
 
-    def __post_init__(self) -> None:
-        if self._maps is None:
-            object.__setattr__(self, "_maps", Disparities(find=self._kept_or_found))
-        if self._disparity is None:
-            object.__setattr__(self, "_disparity", DisparityRange(self._measured))
+    @cached_property
+    def grid(self) -> Grid:
+        """The light field without its samples: cameras compile it, and a piece of it costs nothing."""
+        return Grid(
+            self.shape,
+            self.frame,
+            self.read_dtype,
+            self.sample,
+            self.disparity_range,
+            Disparities(find=self._kept_or_found, measure=self._measured),
+        )
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -186,8 +114,7 @@ class StoredLightField:
     @property
     def disparity(self) -> Disparities:
         """Maps of its pixels' disparities: kept in the store, or found when first asked for and then kept."""
-        assert self._maps is not None
-        return self._maps
+        return self.grid.disparities
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -220,18 +147,22 @@ class StoredLightField:
         files = (self.view_file(*view) for view in np.ndindex(*self.shape[:2]))
         return sum(file.stat().st_size for file in files if file.is_file())
 
-    @property
-    def outline(self) -> LightField:
-        """The light field with nothing read: cameras compile it, and slicing it costs nothing."""
-        return LightField(
-            OnDisk(self, tuple(map(range, self.shape))),
-            self.frame,
-            self.disparity_range,
-            self.sample,
-            disparity=self._maps,
-            _shared_disparity=self._disparity,
-            _checked=True,
-        )
+    def whole(self) -> None:
+        """Nothing is in memory."""
+
+    def read(self, block: Block | None = None, progress: Progress | None = None) -> Any:
+        """All of it as a `vcc.LightField` in memory; of a block, the samples alone.
+
+        Args:
+            block: which samples; None for all of them.
+            progress: called with (done, total) in views.
+
+        Raises:
+            InputError: as for a part.
+        """
+        if block is None:
+            return self._piece(Ellipsis, progress)
+        return self._samples(tuple(range(*ends) for ends in block.ranges), progress)
 
     def __getitem__(self, index: Index | tuple[Index, ...]) -> LightField:
         """A part of the light field, read now, in its place: slices along (v, u, t, s[, channel]).
@@ -240,18 +171,7 @@ class StoredLightField:
             InputError: no such part; a view that is missing, damaged or cut off, or that holds what is no
                 radiance, named with its file; more memory needed than there is.
         """
-        return self._read(self.outline[index])
-
-    def read(self, progress: Progress | None = None) -> LightField:
-        """All of it, in memory.
-
-        Args:
-            progress: called with (done, total) in views.
-
-        Raises:
-            InputError: as for a part.
-        """
-        return self._read(self.outline, progress)
+        return self._piece(index)
 
     def view(self, row: int, column: int) -> Image:
         """One view as a picture; only its file is read. See `vcc.LightField.view`.
@@ -267,19 +187,19 @@ class StoredLightField:
 
     def scaled(self, factor: float) -> StoredLightField:
         """The light field of the same scene in a larger world; nothing is read. See `vcc.LightField.scaled`."""
-        return replace(self, attributes=replace(self.attributes, frame=self.outline.scaled(factor).frame))
+        return replace(self, attributes=replace(self.attributes, frame=self._scaled(factor)))
 
     def measured_disparity_range(self) -> tuple[float, float] | None:
         """As stated, or else measured from up to seven views in the middle. See `vcc.LightField`."""
-        return self.outline.measured_disparity_range()
+        return self.grid.measured_disparity_range()
 
     def disparity_of(self, distance: float) -> float:
         """See `vcc.LightField.disparity_of`."""
-        return self.outline.disparity_of(distance)
+        return self.grid.disparity_of(distance)
 
     def distance_of(self, disparity: float) -> float:
         """See `vcc.LightField.distance_of`."""
-        return self.outline.distance_of(disparity)
+        return self.grid.distance_of(disparity)
 
     def missing(self) -> list[tuple[int, int]]:
         """(row, column) of the views that are not there."""
@@ -373,8 +293,39 @@ class StoredLightField:
             "part that is complete, stored[a:b, c:d]"
         )
 
-    def _read(self, outline: LightField, progress: Progress | None = None) -> LightField:
-        return replace(outline, values=outline.values.read(progress), _checked=True)
+    def _piece(self, index: Any, progress: Progress | None = None) -> LightField:
+        grid, ranges = self.grid.piece(index)
+        return LightField.of(self._samples(ranges, progress), grid)
+
+    def _samples(self, ranges: tuple[range, ...], progress: Progress | None = None) -> NDArray[Any]:
+        """The samples at these indices along each axis, read now."""
+        rows, columns, pixel_rows, *rest = ranges
+        low, high = min(pixel_rows[0], pixel_rows[-1]), max(pixel_rows[0], pixel_rows[-1]) + 1
+        within = (
+            as_slice(range(pixel_rows.start - low, pixel_rows.stop - low, pixel_rows.step)),
+            *map(as_slice, rest),
+        )
+        channels = self.shape[4:] if len(rest) == 1 else (len(rest[1]),)
+        shape = (len(rows), len(columns), len(pixel_rows), len(rest[0]), *channels)
+        try:
+            values: NDArray[Any] = np.empty(shape, self.read_dtype)
+        except MemoryError:
+            size = math.prod(shape) * self.read_dtype.itemsize / 1e9
+            raise InputError(
+                f"this part of {self.path} takes {size:.1f} GB of memory, more than there is: read less at "
+                "a time, or let camera.capture(stored, memory_limit=…) read it in pieces"
+            ) from None
+        total = len(rows) * len(columns)
+        for done, (j, i) in enumerate(np.ndindex(len(rows), len(columns)), start=1):
+            values[j, i] = self.linear_view(rows[j], columns[i], low, high)[within]
+            if progress is not None:
+                progress(done, total)
+        return values
+
+    def _scaled(self, factor: float) -> Affine:
+        if not (factor > 0 and math.isfinite(factor)):
+            raise InputError(f"a world is scaled by a finite factor greater than 0, not {factor}")
+        return Affine.scaling(factor, factor, 1, 1) @ self.frame
 
     def _kept_or_found(self, progress: Progress | None) -> DisparityMaps:
         import warnings
@@ -397,8 +348,6 @@ class StoredLightField:
         return found
 
     def _measured(self) -> tuple[float, float] | None:
-        from vcc.fields.parallax import Axis, disparity_range
-
         nt = self.shape[2]
         shown: list[tuple[float, float] | None] = [None, None]
         axes: tuple[tuple[int, Axis], ...] = ((1, "u"), (0, "v"))
@@ -411,7 +360,8 @@ class StoredLightField:
             views = min(n, 2 * MEASURED_REACH + 1)
             rows = min(nt, max(MEASURED_BYTES * nt // (views * self.view_bytes), 64))
             first = (nt - rows) // 2
-            values = self.outline[middle[0], middle[1], first : first + rows].values.read()
+            _, ranges = self.grid.piece((middle[0], middle[1], slice(first, first + rows)))
+            values = self._samples(ranges)
             shown[1 - along] = disparity_range(values, axis)
         return told_along_u(self.frame, *shown)
 
@@ -421,7 +371,7 @@ class StoredLightField:
         return (
             f"StoredLightField({self.path}: {sizes} {self.dtype}, {self.transfer}, "
             f"{SAMPLES_IN_WORDS[self.sample]}, "
-            f"{describe_geometry(self.outline)}{state})"
+            f"{self.grid.geometry}{state})"
         )
 
 
@@ -521,9 +471,3 @@ def _sharding(array: Any) -> dict[str, Any]:
         if codec["name"] == "sharding_indexed":
             return dict(codec["configuration"])
     return {}
-
-
-def _slice(part: range) -> slice:
-    """The slice that takes a range of indices from an axis that begins at 0."""
-    stop = None if part.stop < 0 else part.stop
-    return slice(part.start, stop, part.step)

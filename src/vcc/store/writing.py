@@ -19,7 +19,8 @@ from numpy.typing import DTypeLike, NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.disparity import DisparityMaps
-from vcc.light_field import LightField, Sample
+from vcc.fields.grid import Sample
+from vcc.light_field import LightField
 from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
 from vcc.store.compression import Compression, Lossless, Lossy, layout
 from vcc.store.disparity_maps import keep_maps

@@ -18,21 +18,16 @@ Where neither holds, rays are traced.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.fields.grid import Grid
+from vcc.optics.train import Stage, Train
 from vcc.plan.sharpening import along_axis
+from vcc.shapes.kernels import Kernel
 from vcc.shapes.sheets import clear_over
-
-if TYPE_CHECKING:
-    from vcc.camera import Camera
-    from vcc.light_field import LightField
-    from vcc.optics.train import Stage
-    from vcc.shapes.kernels import Kernel
 
 Array = NDArray[np.float64]
 
@@ -52,33 +47,33 @@ class Blurs:
     notes: tuple[str, ...] = ()
 
 
-def diffusers_as_blurs(camera: Camera, light_field: LightField, sharp: bool = True) -> Blurs | str:
+def diffusers_as_blurs(train: Train, grid: Grid, sharp: bool = True) -> Blurs | str:
     """The blurs by which the rules replace all diffusers of a camera, or why they do not.
 
     Args:
-        camera: with diffusers or without.
-        light_field: that it looks at.
+        train: with diffusers or without.
+        grid: that it looks at.
         sharp: whether the tent by which a kernel is shared out on its lattice is given back.
     """
     picture: Array | None = None
     views: Array | None = None
     notes = []
-    for n, stage in enumerate(camera.stages):
+    for n, stage in enumerate(train.stages):
         if stage.faces.spread is None:
             continue
         label = stage.element.label
         if not stage.faces.spread.uniform:
             return f"{label} scatters by a kernel that varies over its surface"
         kernel = stage.faces.spread.kernels[0]
-        obstacle = behind(camera, n, light_field)
+        obstacle = behind(train, n, grid)
         try:
             if obstacle is None:
-                picture = _convolved(picture, _on_lattice(kernel, _pixels_from_slopes(camera, n), sharp))
+                picture = _convolved(picture, _on_lattice(kernel, _pixels_from_slopes(train, n), sharp))
                 notes.append(
                     f"blur of the picture: {label}, since all behind it is affine and nothing there absorbs"
                 )
-            elif meets_views_in_points(camera, light_field, n):
-                views = _convolved(views, _on_lattice(kernel, _samples_from_slopes(camera, light_field, n), sharp))
+            elif meets_views_in_points(train, grid, n):
+                views = _convolved(views, _on_lattice(kernel, _samples_from_slopes(train, grid, n), sharp))
                 notes.append(f"blur of each view: {label}, since each view meets it in one place")
             else:
                 return f"{label} scatters, and {obstacle} behind it"
@@ -87,87 +82,68 @@ def diffusers_as_blurs(camera: Camera, light_field: LightField, sharp: bool = Tr
     return Blurs(picture, views, tuple(notes))
 
 
-def behind(camera: Camera, n: int, light_field: LightField) -> str | None:
+def behind(train: Train, n: int, grid: Grid) -> str | None:
     """What forbids rule 1 for the diffuser that is stage n, in words; None if nothing does.
 
     A stop or a mask that lets all light of the light field pass, scattered as far as it may be, forbids nothing.
     """
     same_plane = True
-    for stage in camera.stages[n + 1 :]:
+    for stage in train.stages[n + 1 :]:
         same_plane = same_plane and np.array_equal(stage.approach.matrix, np.eye(5))
         label = stage.element.label
         if same_plane and stage.faces.bending is None:
             continue
         if stage.faces.bending is not None:
             return f"{label} bends rays by a function of position that is not affine"
-        if stage.faces.pattern is not None and not _passes_all(camera, stage, light_field):
+        if stage.faces.pattern is not None and not _passes_all(train, stage, grid):
             return f"{label} absorbs"
         if stage.faces.spread is not None and not stage.faces.spread.uniform:
             return f"{label} scatters by a kernel that varies over its surface"
     return None
 
 
-def _passes_all(camera: Camera, stage: Stage, light_field: LightField) -> bool:
+def _passes_all(train: Train, stage: Stage, grid: Grid) -> bool:
     """Whether a stage behind affine optics and uniform diffusers absorbs none of the light field's rays."""
     assert stage.faces.pattern is not None
-    nv, nu, nt, ns = light_field.shape[:4]
+    nv, nu, nt, ns = grid.shape[:4]
     middle = (np.array([nu, nv, ns, nt]) - 1) / 2
     half = middle + np.array([1.0, 1.0, 2.0, 2.0])  # places between views and footprints reach beyond the samples
-    frame = light_field.frame
-    rays, slack = Affine.identity(), np.zeros(4)
-    for met in camera.stages:
-        rays, slack = met.approach @ rays, np.abs(met.approach.linear) @ slack
-        if met is stage:
-            break
+    slack = np.zeros(4)
+    for met in train.stages[: train.stages.index(stage)]:
         if met.faces.bending is not None:
             return False
-        if met.centred is not None:
-            rays, slack = met.centred @ rays, np.abs(met.centred.linear) @ slack
         if met.faces.spread is not None:
-            slack = slack + np.array([0.0, 0.0, *met.faces.spread.reach])
-    arriving = rays @ frame
+            onward = stage.arriving @ met.leaving.inverse()
+            slack = slack + np.abs(onward.linear) @ np.array([0.0, 0.0, *met.faces.spread.reach])
+    arriving = stage.arriving @ grid.frame
     centre = arriving(middle[None])[0][:2] - stage.element.decentre
     reach = np.abs(arriving.linear[:2]) @ half + slack[:2]
     return clear_over(stage.faces.pattern, centre - reach, centre + reach)
 
 
-def meets_views_in_points(camera: Camera, light_field: LightField, n: int) -> bool:
+def meets_views_in_points(train: Train, grid: Grid, n: int) -> bool:
     """Whether each view meets stage n, and all that absorbs before it, in one place (rule 2)."""
-    rays = Affine.identity()
-    size = np.array([light_field.shape[3], light_field.shape[2]])
-    for m, stage in enumerate(camera.stages[: n + 1]):
-        rays = stage.approach @ rays
+    size = np.array([grid.shape[3], grid.shape[2]])
+    for m, stage in enumerate(train.stages[: n + 1]):
         if stage.faces.bending is not None:
             return False
         if m == n or stage.faces.pattern is not None:
-            place = (rays @ light_field.frame).linear[:2]
+            place = (stage.arriving @ grid.frame).linear[:2]
             travel = np.abs(place[:, 2:]) @ size
             if (travel > 1e-6 * np.abs(place[:, :2]).sum(axis=1)).any():
                 return False
-        rays = _behind_lens(stage, rays)
     return True
 
 
-def _behind_lens(stage: Stage, rays: Affine) -> Affine:
-    return rays if stage.centred is None else stage.centred @ rays
-
-
-def _pixels_from_slopes(camera: Camera, n: int) -> Array:
+def _pixels_from_slopes(train: Train, n: int) -> Array:
     """2×2: pixels on the sensor by which a ray moves for a change of slope at stage n."""
-    rays = Affine.identity()
-    for stage in camera.stages[n + 1 :]:
-        rays = _behind_lens(stage, stage.approach @ rays)
-    to_sensor = camera.approach_to_sensor @ rays
-    return np.asarray(camera.sensor.frame.inverse().linear @ to_sensor.linear[:2, 2:])
+    onward = train.arriving_at_sensor @ train.stages[n].leaving.inverse()
+    return np.asarray(train.sensor.frame.inverse().linear @ onward.linear[:2, 2:])
 
 
-def _samples_from_slopes(camera: Camera, light_field: LightField, n: int) -> Array:
+def _samples_from_slopes(train: Train, grid: Grid, n: int) -> Array:
     """2×2: samples of a view by which a ray moves for a change of slope at stage n."""
-    rays = Affine.identity()
-    for stage in camera.stages[:n]:
-        rays = _behind_lens(stage, stage.approach @ rays)
-    rays = camera.stages[n].approach @ rays
-    return np.asarray((rays @ light_field.frame).inverse().linear[2:, 2:])
+    return np.asarray((train.stages[n].arriving @ grid.frame).inverse().linear[2:, 2:])
 
 
 def _on_lattice(kernel: Kernel, steps_from_slopes: Array, sharp: bool) -> Array:

@@ -1,6 +1,6 @@
-"""The plan: what is left of a camera once its optics are folded, as plain data for an engine.
+"""Footprints: a plan's core where optics fold into one matrix, as plain data for an engine.
 
-The image is one sum over the samples of the light field,
+The raster is one sum over the samples of the light field,
 
     I(x, y) = scale · Σ_q L(q) · w(view) · Π T(m(q)) · F(x; x(q)) · F(y; y(q)),
 
@@ -9,19 +9,22 @@ in which every place is an affine function of the sample's index. The engine kno
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.plan.depth_rule import ViewsBetween
+from vcc.base.values import Value
+from vcc.fields.grid import Block
 from vcc.plan.footprints.shares import Division
+from vcc.plan.protocol import Engine, Runner
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MaskLookup:
+class MaskLookup(Value):
     """A mask in mid-path, averaged over the cell of a sample: each sample looks its weight up here.
 
     Texture coordinates of sample (k, l) in view tap (b, a): (column, row) = (column[b, a], row[b, a])
@@ -54,19 +57,30 @@ class MaskLookup:
         below = dark_border[r + 1, c] * (1 - after_c) + dark_border[r + 1, c + 1] * after_c
         return np.asarray(above * (1 - after_r) + below * after_r)
 
+    def moved(self, k: int, l: int) -> MaskLookup:
+        """Looked up by samples that begin at sample (k, l) of those that it was made for."""
+        return replace(
+            self,
+            column=self.column + self.step[0] @ (k, l),
+            row=self.row + self.step[1] @ (k, l),
+        )
+
+    def of_taps(self, taps: tuple[NDArray[np.intp], ...]) -> MaskLookup:
+        """Looked up by some of the view taps only; ``taps`` is an open mesh of their (rows, columns)."""
+        return replace(self, column=self.column[taps], row=self.row[taps])
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan:
-    """How to make the picture of a light field.
+class Footprints(Value):
+    """How samples of a light field add up to a raster of pixels.
 
     A *view tap* (b, a) is a view, or where views are interpolated a place between views, that contributes
-    to the picture: it reads view (view_rows[b], view_columns[a]). Places on the sensor are in pixels of the
-    raster, which is the sensor with ``guard`` extra pixels on every side.
+    to the picture: it reads view (view_rows[b], view_columns[a]). Places are in pixels of the raster, which is the
+    sensor with some more pixels on every side.
 
     Args:
-        sensor_shape: (rows, columns) of the picture.
-        guard: extra pixels around it, for light that the smear brings in from outside.
-        interpolation: of footprints: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+        raster_shape: (rows, columns) of pixels.
+        interpolation: of footprints: ``"nearest"``, ``"linear"``, ``"cubic"`` or ``"spline"``.
         scale: turns stored samples times shares into irradiance.
         view_rows: row of views that each row of taps reads.
         view_columns: column of views that each column of taps reads.
@@ -74,33 +88,15 @@ class Plan:
         x: raster column of sample (0, 0) in each tap, (rows of taps, columns of taps).
         y: raster row, likewise.
         step: 2×2, pixels per index step: [[x/k, x/l], [y/k, y/l]], |y/l| the larger of its row.
+        samples: (rows, columns) of samples of a view.
         masks: masks in mid-path.
-        sensor_transmission: mean transmission of what lies against the sensor, (rows, columns), or None.
-        sensor_detail: what its variation within pixels adds, from the light of each pixel's 3×3 neighbours, (3, 3,
-            rows, columns): [dy, dx] is the share of the pixel dy − 1 rows down and dx − 1 columns on; or None.
         refine: how many finer samples replace one, along each pixel axis.
-        smear: (vertical, horizontal) half width in pixels of the tent that fills the gap between the
-            pictures of neighbouring views; 0 for none.
         opening: the share of a pixel's width, and of its height, that is sensitive ("nearest" ignores it).
-        blur: kernel that the picture is convolved with, odd rows × odd columns of sum 1 (a diffuser), or None.
-        view_blur: kernel that each view is convolved with before all else (a diffuser at the views), growing by
-            half the kernel on each side, or None; ``samples`` and places count what is there after that.
-        sharpen: weights (down, across), each an odd number of sum 1, by which the picture is filtered along its
-            columns and rows to give back what interpolation took from sharpness (`vcc.plan.sharpening`), or None.
         sharpen_samples: an odd number of weights by which samples are filtered along both axes where they are
             divided (``refine``), or None.
-        views_between: how views in between are made before all else, or None; taps count what is there after that.
-        swap_pixel_axes: whether rows and columns of pixels change places before all else.
-        samples: (rows, columns) of pixels of a view, after that change.
-        missing_rays: share of the rays asked for that the light field lacks.
-        missing_reason: in words.
-        notes: what was decided and why, in words.
-        expected_ghosting: largest gap in pixels between neighbouring views' pictures of the same thing
-            that is left unfilled.
     """
 
-    sensor_shape: tuple[int, int]
-    guard: int
+    raster_shape: tuple[int, int]
     interpolation: str
     scale: float
     view_rows: NDArray[np.int64]
@@ -109,43 +105,78 @@ class Plan:
     x: Array
     y: Array
     step: Array
-    masks: tuple[MaskLookup, ...]
-    sensor_transmission: Array | None
-    refine: int
-    smear: tuple[float, float]
-    swap_pixel_axes: bool
     samples: tuple[int, int]
-    missing_rays: float
-    missing_reason: str
-    notes: tuple[str, ...] = field(default=())
-    expected_ghosting: float = 0.0
+    masks: tuple[MaskLookup, ...] = ()
+    refine: int = 1
     opening: float = 1.0
-    blur: Array | None = None
-    view_blur: Array | None = None
-    sharpen: tuple[Array, Array] | None = None
     sharpen_samples: Array | None = None
-    sensor_detail: Array | None = None
-    views_between: ViewsBetween | None = None
+
+    method: ClassVar[str] = "footprints"
+    border: ClassVar[int] = 0
+    """Views around a block that are looked at with it."""
+
+    def by(self, engine: Engine) -> Runner:
+        """The engine's way to run it."""
+        return engine.footprints
 
     def division(self, samples: int) -> Division:
         """How ``samples`` samples along an axis are divided into ``refine`` finer ones each."""
         return Division.of(self.interpolation, samples, self.refine, self.sharpen_samples)
 
-    def columns(self, columns: NDArray[np.int64]) -> Plan:
-        """The plan with some of its columns of view taps only: pictures of such pieces add up."""
+    def part(self, block: Block) -> Footprints:
+        """What adds a block's samples: the rasters of all blocks of a light field sum to the raster of it."""
+        (a, b), (c, d) = block.rows, block.columns
+        (l, _), (k, _) = block.pixel_rows, block.pixel_columns
+        rows = np.flatnonzero((self.view_rows >= a) & (self.view_rows < b))
+        columns = np.flatnonzero((self.view_columns >= c) & (self.view_columns < d))
+        taps = np.ix_(rows, columns)
+        return replace(
+            self,
+            view_rows=self.view_rows[rows] - a,
+            view_columns=self.view_columns[columns] - c,
+            weights=self.weights[taps],
+            x=self.x[taps] + self.step[0] @ (k, l),
+            y=self.y[taps] + self.step[1] @ (k, l),
+            masks=tuple(mask.of_taps(taps).moved(k, l) for mask in self.masks),
+            samples=block.shape[2:],
+        )
+
+    def of_columns(self, columns: NDArray[np.intp]) -> Footprints:
+        """With some of its columns of view taps only."""
+        taps = np.ix_(np.arange(len(self.view_rows)), columns)
         return replace(
             self,
             view_columns=self.view_columns[columns],
-            weights=self.weights[:, columns],
-            x=self.x[:, columns],
-            y=self.y[:, columns],
-            masks=tuple(replace(m, column=m.column[:, columns], row=m.row[:, columns]) for m in self.masks),
+            weights=self.weights[taps],
+            x=self.x[taps],
+            y=self.y[taps],
+            masks=tuple(mask.of_taps(taps) for mask in self.masks),
         )
 
-    @property
-    def raster_shape(self) -> tuple[int, int]:
-        """(rows, columns) of the raster: the sensor and its guard."""
-        return self.sensor_shape[0] + 2 * self.guard, self.sensor_shape[1] + 2 * self.guard
+    def guarded(self, pixels: int) -> Footprints:
+        """With so many more pixels around the raster."""
+        rows, columns = self.raster_shape
+        shape = (rows + 2 * pixels, columns + 2 * pixels)
+        return replace(self, raster_shape=shape, x=self.x + pixels, y=self.y + pixels)
+
+    def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        """Which of the views of a light field of this shape are looked at, (v, u)."""
+        used = np.zeros(shape[:2], dtype=bool)
+        taps = np.nonzero(self.weights)
+        used[self.view_rows[taps[0]], self.view_columns[taps[1]]] = True
+        return used
+
+    def scaled(self, factor: float) -> Footprints:
+        """For samples whose numbers stand for ``factor`` times as much."""
+        return self if factor == 1 else replace(self, scale=self.scale * factor)
+
+    def more(self, samples: int) -> Footprints:
+        """No rays are traced: nothing is added."""
+        return self
+
+    def alone(self) -> Footprints:
+        """Nothing is told by a run without samples."""
+        return self
 
     @property
     def separable(self) -> bool:
@@ -194,30 +225,12 @@ class Plan:
         """How many samples, refined ones counted, an engine goes through."""
         return self.taps_used * self.samples[0] * self.samples[1] * self.refine**2
 
-    @property
-    def cautions(self) -> tuple[str, ...]:
-        """What a user should be warned of before a run: nothing, for footprints."""
-        return ()
-
-    @property
-    def _blurs(self) -> list[tuple[str, tuple[int, ...], str]]:
-        found = (("picture blurred", self.blur, "pixels"), ("views blurred", self.view_blur, "samples"))
-        return [(name, kernel.shape, unit) for name, kernel, unit in found if kernel is not None]
-
     def __repr__(self) -> str:
         rows, columns = self.weights.shape
-        lines = [
-            f"Plan for a picture of {self.sensor_shape[0]}×{self.sensor_shape[1]} pixels "
-            f"from {rows}×{columns} view taps ({self.taps_used} used) "
-            f"of {self.samples[0]}×{self.samples[1]} samples",
+        return (
+            f"{rows}×{columns} view taps ({self.taps_used} used) of {self.samples[0]}×{self.samples[1]} samples\n"
             f"  step on the sensor: {self.row_step:.4g} rows, {self.column_step:.4g} columns a sample "
-            f"({self.direction}, {self.interpolation}, {'separable' if self.separable else 'sheared'})",
+            f"({self.direction}, {self.interpolation}, {'separable' if self.separable else 'sheared'})\n"
             f"  masks in mid-path: {', '.join(mask.label for mask in self.masks) or 'none'}; "
-            f"samples refined ×{self.refine}; smear {self.smear[0]:.3g}×{self.smear[1]:.3g} pixels",
-            *(
-                f"  {name} by a diffuser's kernel of {size[0]}×{size[1]} {unit}"
-                for name, size, unit in self._blurs
-            ),
-            f"  missing rays: {self.missing_rays:.2%}",
-        ]
-        return "\n".join(lines + [f"  - {note}" for note in self.notes])
+            f"samples refined ×{self.refine}"
+        )

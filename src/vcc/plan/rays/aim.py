@@ -12,24 +12,21 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.fields.grid import Grid
 from vcc.optics.deflections import CellDeflection
 from vcc.optics.scatter import Scatter
+from vcc.optics.train import Stage, Train
 from vcc.plan.rays.beam import Beam
 from vcc.plan.rays.model import FIRST_COLUMNS, Aim, CellWindows, Window
 from vcc.shapes.lattice import CellApertures, Lattice
 from vcc.shapes.patterns import Bounded, Circle, Pattern
-
-if TYPE_CHECKING:
-    from vcc.camera import Camera
-    from vcc.light_field import LightField
-    from vcc.optics.train import Stage
 
 Array = NDArray[np.float64]
 
@@ -113,27 +110,27 @@ class Path:
     """A camera from the sensor back to the light field, and what bounds its rays.
 
     Args:
-        camera: whose elements rays meet.
-        light_field: that they end in.
+        train: whose elements rays meet.
+        grid: that they end in.
         motion: 2×2, along which they are interpolated between views (`RayPlan.motion`).
         samples: rays a pixel.
     """
 
-    def __init__(self, camera: Camera, light_field: LightField, motion: Array, samples: int) -> None:
-        self.camera, self.samples = camera, samples
+    def __init__(self, train: Train, grid: Grid, motion: Array, samples: int) -> None:
+        self.train, self.samples = train, samples
         self.legs: list[Leg] = []
-        here, undone = Affine.identity(), camera.approach_to_sensor.inverse()
-        stops = _stops(camera.stages)
-        for stage, stop in zip(reversed(camera.stages), reversed(stops), strict=True):
+        here, undone = Affine.identity(), train.approach_to_sensor.inverse()
+        stops = _stops(train.stages)
+        for stage, stop in zip(reversed(train.stages), reversed(stops), strict=True):
             here = undone @ here
             self.legs.append(Leg(stage, undone, here, stop))
             undone = stage.approach.inverse()
             if stage.centred is not None:
                 undone = undone @ stage.centred.inverse()
         self.last = undone
-        self.index_from_entrance = light_field.frame.inverse()
+        self.index_from_entrance = grid.frame.inverse()
         self.index_from_sensor = self.index_from_entrance @ undone @ here
-        nv, nu, nt, ns = light_field.shape[:4]
+        nv, nu, nt, ns = grid.shape[:4]
         self.size = np.array([nu, nv, ns, nt], dtype=np.float64)
         # Half of what finds light along each index. Half a cell beyond the border of a view linear interpolation
         # has faded to nothing, and the views on both sides of a ray are looked at up to one view's motion away.
@@ -336,7 +333,7 @@ class Path:
                 return None
             if _mixed(leg.from_sensor):
                 return None
-            pixel = np.array(self.camera.sensor.sensitive_pitches[::-1])
+            pixel = np.array(self.train.sensor.sensitive_pitches[::-1])
             found = [
                 windows
                 for bound in self.bounds_beyond(n, slack, everything)
@@ -384,7 +381,7 @@ class Path:
 
     def _areas(self, aim: CellWindows) -> Array:
         """Areas of the windows of cells seen from some places on the sensor, m², (places, cells)."""
-        sensor = self.camera.sensor
+        sensor = self.train.sensor
         height, width = sensor.size
         place = (np.arange(12) + 0.37) / 12 - 0.5
         x = (sensor.decentre[0] + width * place)[:, None, None]
@@ -404,7 +401,7 @@ class Path:
         nearer = itertools.takewhile(lambda other: other is not leg, self.legs)
         if not isinstance(aim, Window) or any(other.stage.faces.bending is not None for other in nearer):
             return None
-        pixel = np.array(self.camera.sensor.sensitive_pitches[::-1])
+        pixel = np.array(self.train.sensor.sensitive_pitches[::-1])
         beam = self.beam(aim, pixel / 2).moved(leg.from_sensor)
         return np.asarray(2 * np.abs(beam.basis[:2]).max(axis=1))
 
@@ -420,7 +417,7 @@ class Path:
 
     def beam(self, aim: Aim, half: Array | None = None) -> Beam:
         """All rays that an aim asks for, at the sensor; from all of it, or a rectangle of half sizes (x, y)."""
-        sensor = self.camera.sensor
+        sensor = self.train.sensor
         middle = np.array(sensor.decentre)
         half = np.array(sensor.size[::-1]) / 2 if half is None else half
         if isinstance(aim, Window):

@@ -6,31 +6,28 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError
 from vcc.base.units import short
+from vcc.fields.grid import Grid
 from vcc.optics.deflections import CellDeflection, FacetDeflection
-from vcc.optics.electronics import checked_seed
 from vcc.optics.scatter import Scatter, SheetMap
+from vcc.optics.train import Stage, Train
+from vcc.plan.how import How
+from vcc.plan.model import Plan
+from vcc.plan.operators import Before, SharpenViews
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import steps
 from vcc.plan.rays.aim import Aimed, Leg, Path, columns_of
-from vcc.plan.rays.model import DIGITS, FIRST_COLUMNS, TABLE, Aim, CellWindows, RayPlan, Window
+from vcc.plan.rays.model import DIGITS, FIRST_COLUMNS, TABLE, Aim, CellWindows, Rays, Window
 from vcc.plan.rays.sharpening import sharpening
 from vcc.plan.rays.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
 from vcc.shapes.lattice import CellApertures, CellBlock
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
 from vcc.shapes.sheets import Product
-
-if TYPE_CHECKING:
-    from vcc.camera import Camera
-    from vcc.light_field import LightField
-    from vcc.optics.train import Stage
 
 Array = NDArray[np.float64]
 
@@ -40,54 +37,44 @@ ASKING_PIXELS, ASKING_RAYS = 16, 2**16
 right to 1/2√n, 0.2 %, or better."""
 
 
-def compile_rays(
-    camera: Camera,
-    light_field: LightField,
-    *,
-    interpolation: str = "sharp",
-    between_views: str = "auto",
-    scene_distance: float | None = None,
-    samples: int | None = None,
-    seed: int = 0,
-    reason: str = "asked for",
-) -> RayPlan:
-    """The plan by which rays make the picture that ``camera`` records of ``light_field``.
+def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") -> Plan:
+    """The plan by which rays make the picture that an optical train makes of a light field.
 
-    Args: see `vcc.Camera.capture`; ``reason`` says why rays are needed, for the plan's notes.
+    Args:
+        train: the optics.
+        grid: of the light field.
+        how: what was chosen.
+        reason: why rays are needed, for the plan's notes.
 
     Raises:
-        InputError: an option that does not exist, an element that returns what it must not (named), or optics
-            through which no bound on the rays can be found.
+        InputError: an element that returns what it must not (named), or optics through which no bound on the rays
+            can be found.
     """
-    if between_views not in ("auto", "none"):
-        raise InputError(f"between_views is 'auto' or 'none', not {between_views!r}")
-    if interpolation not in ("sharp", "linear"):
-        raise InputError(f"interpolation by rays is 'sharp' or 'linear', not {interpolation!r}")
-    samples = _checked_samples(samples)
-    seed = checked_seed(seed)
-    motion, followed = _motion(light_field, scene_distance)
-    if between_views == "none":
+    samples = how.rays_a_pixel or DEFAULT_SAMPLES
+    motion, followed = _motion(grid, how.scene_distance)
+    if how.between_views == "none":
         motion = np.zeros((2, 2))
         followed = "each view stands for its cell of the aperture; views are not interpolated, as asked"
-    path = Path(camera, light_field, motion, samples)
+    path = Path(train, grid, motion, samples)
     aimed, asked = path.aimed()
     notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {aimed.aim.words}"]
     made, index_from_ray, scatters = _steps(path, aimed, notes)
-    rows, columns = camera.sensor.shape
-    vertical, horizontal = camera.sensor.pitches
-    high, wide = camera.sensor.sensitive_pitches
-    first = camera.sensor.frame(np.zeros((1, 2)))[0]
+    vertical, horizontal = train.sensor.pitches
+    high, wide = train.sensor.sensitive_pitches
+    first = train.sensor.frame(np.zeros((1, 2)))[0]
     notes.append(followed)
     if isinstance(aimed.aim, CellWindows):
         samples >>= aimed.aim.halvings
-    if interpolation == "sharp":
+    before: tuple[Before, ...] = ()
+    if how.interpolation == "sharp":
+        before = (SharpenViews(sharpening(grid.sample)),)
         notes.append(
             "views are made sharper by what interpolating between their samples takes"
-            + (", and by what their pixels' own averaging took" if light_field.sample == "mean" else "")
+            + (", and by what their pixels' own averaging took" if grid.sample == "mean" else "")
         )
-    nv, nu, nt, ns = light_field.shape[:4]
-    plan = RayPlan(
-        sensor_shape=(rows, columns),
+    nv, nu, nt, ns = grid.shape[:4]
+    core = Rays(
+        raster_shape=train.sensor.shape,
         first_pixel=(float(first[0]), float(first[1])),
         pitch=(horizontal, vertical),
         sensitive=(wide, high),
@@ -95,58 +82,56 @@ def compile_rays(
         steps=tuple(made),
         index_from_ray=index_from_ray,
         motion=motion,
-        between_views=between_views == "auto",
+        between_views=how.between_views == "auto",
         views=(nv, nu, nt, ns),
-        scale=1.0 / light_field.full_scale,
-        sharpening=sharpening(light_field.sample) if interpolation == "sharp" else None,
+        scale=1.0 / grid.full_scale,
         samples=samples,
-        seed=seed,
-        points=_table(seed, scatters, aimed.aim),
+        seed=how.seed,
+        points=_table(how.seed, scatters, aimed.aim),
         views_may_end=path.stop_at_views,
-        cautions=tuple(_cautions(camera)),
+    )
+    plan = Plan(
+        sensor_shape=train.sensor.shape,
+        grid_shape=grid.shape[:4],
+        core=core,
+        before=before,
+        missing_reason="they fall outside the grid of views or outside the views' pictures",
+        cautions=tuple(_cautions(train)),
         notes=tuple(notes),
     )
     if asked is None:
         return plan
-    missing = _missing(plan, path, asked)
+    missing = _missing(core, path, asked)
     more = f"the camera asks for light from {asked.aim.words}, of which the light field lacks {missing:.1%}"
     return replace(plan, missing_rays=missing, notes=(*plan.notes, more))
 
 
-def _missing(plan: RayPlan, path: Path, asked: Aimed) -> float:
-    """The share of the light asked for that the light field lacks, where the plan's aim is narrower than that.
+def _missing(core: Rays, path: Path, asked: Aimed) -> float:
+    """The share of the light asked for that the light field lacks, where the aim is narrower than that.
 
     By rays to all that is asked for, from pixels all over the sensor.
     """
     made, index_from_ray, scatters = _steps(path, asked, [], coarse=True)
-    rows, columns = (np.unique(np.arange(ASKING_PIXELS) * n // ASKING_PIXELS) for n in plan.sensor_shape)
-    pixel = (rows[:, None] * plan.sensor_shape[1] + columns).reshape(-1)
+    rows, columns = (np.unique(np.arange(ASKING_PIXELS) * n // ASKING_PIXELS) for n in core.raster_shape)
+    pixel = (rows[:, None] * core.raster_shape[1] + columns).reshape(-1)
     wide = replace(
-        plan,
+        core,
         aim=asked.aim,
         steps=tuple(made),
         index_from_ray=index_from_ray,
-        points=_table(plan.seed, scatters, asked.aim),
+        points=_table(core.seed, scatters, asked.aim),
         samples=2 ** int(math.log2(ASKING_RAYS // len(pixel))),
     )
     index, share = wide.looked_up(pixel, wide.block(pixel))
     inside, held = wide.held(index)
-    asked_for = share * (inside | plan.views_may_end)
+    asked_for = share * (inside | core.views_may_end)
     return float((asked_for * ~held).sum() / asked_for.sum()) if asked_for.any() else 0.0
 
 
-def _checked_samples(samples: int | None) -> int:
-    if samples is None:
-        return DEFAULT_SAMPLES
-    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or not 2 <= samples <= TABLE:
-        raise InputError(f"samples is a whole number of rays a pixel from 2 to {TABLE}, not {samples!r}")
-    return int(2 ** math.ceil(math.log2(samples)))
-
-
-def _cautions(camera: Camera) -> Iterator[str]:
+def _cautions(train: Train) -> Iterator[str]:
     """What the optics do that a picture can hardly show."""
-    pixel = max(camera.sensor.pitches)
-    for stage in camera.stages:
+    pixel = max(train.sensor.pitches)
+    for stage in train.stages:
         bending = stage.faces.bending
         if isinstance(bending, CellDeflection) and bending.lattice.pitch < pixel:
             yield (
@@ -334,7 +319,7 @@ def _sheet(given: object, met: _Met) -> steps.Texture:
 
 
 def _table(seed: int, scatters: list[Scatter], aim: Aim) -> NDArray[np.float32]:
-    """The points that all pixels share; see `RayPlan.points`."""
+    """The points that all pixels share; see `Rays.points`."""
     dimensions = FIRST_COLUMNS + sum(2 + (scatter.weights is not None) for scatter in scatters)
     even = _sobol(dimensions, seed)
     disc = isinstance(aim, Window) and aim.disc
@@ -395,14 +380,14 @@ def _on_disc(xi: Array, eta: Array) -> list[Array]:
 # --- between views ---
 
 
-def _motion(light_field: LightField, scene_distance: float | None) -> tuple[Array, str]:
+def _motion(grid: Grid, scene_distance: float | None) -> tuple[Array, str]:
     """How a point of the scene's middle depth moves from view to view, and what is done with it, in words."""
-    if max(light_field.whole_views) <= 1:
+    if max(grid.extent) <= 1:
         return np.zeros((2, 2)), "a single view: nothing between views"
-    known = vergences(light_field, scene_distance)
+    known = vergences(grid, scene_distance)
     if known is None:
         return np.zeros((2, 2)), "views are interpolated in place: the pictures show no parallax to follow"
-    motions = index_motions(light_field.frame, known)
+    motions = index_motions(grid.frame, known)
     middle = motions[np.abs(motions[:, 0, 0] - (motions[:, 0, 0].min() + motions[:, 0, 0].max()) / 2).argmin()]
     return middle, (
         "views are interpolated along the parallax of the scene's middle depth, "

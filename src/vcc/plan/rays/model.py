@@ -1,4 +1,4 @@
-"""The ray plan: how to make the picture of a light field by tracing rays back from the sensor.
+"""Rays: a plan's core where optics do not fold, which traces rays back from the sensor.
 
 For cameras whose optics do not fold into one matrix (arrays, plates, diffusers) the irradiance at a place x of
 the sensor is the integral over the slopes at which light arrives,
@@ -12,12 +12,16 @@ come through (the aim) and over what diffusers do. The engine knows nothing of o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.values import Value
+from vcc.fields.grid import Block
+from vcc.plan.protocol import Engine, Runner
 from vcc.plan.rays.steps import Bundle, Move, Packer, Step
 from vcc.shapes.lattice import Lattice
 
@@ -197,11 +201,11 @@ Aim = Window | CellWindows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RayPlan:
-    """How to make the picture of a light field by tracing rays.
+class Rays(Value):
+    """How rays traced back from a sensor make a picture of a light field.
 
     Args:
-        sensor_shape: (rows, columns) of the picture.
+        raster_shape: (rows, columns) of the picture.
         first_pixel: place (x, y) of the middle of pixel (0, 0), metres.
         pitch: distance between pixels along (x, y), metres.
         sensitive: size (x, y) of a pixel's sensitive area, metres.
@@ -212,20 +216,14 @@ class RayPlan:
         between_views: interpolate between views along the motion; else each view is its cell.
         views: (v, u, t, s) of the light field.
         scale: turns stored samples into radiance.
-        sharpening: weights of the filter by which views are made sharper before rays look them up, as
-            `vcc.plan.rays.sharpening.sharpening` gives them; None looks samples up as they are.
         samples: rays a pixel, a power of two (through an array: through each cell).
         seed: of the choice of points for each pixel.
         points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
             (0 … 1, twice, in `DIGITS` binary digits; of a disc −1 … 1), then what diffusers need.
         views_may_end: rays outside the grid of views are missing: a stop at the views says that they are wanted.
-        missing_rays: the share of the light asked for that the light field lacks, where the aim is narrower than
-            what is asked for; None where the rays that are traced tell.
-        cautions: what a user should be warned of, in words.
-        notes: what was decided and why, in words.
     """
 
-    sensor_shape: tuple[int, int]
+    raster_shape: tuple[int, int]
     first_pixel: tuple[float, float]
     pitch: tuple[float, float]
     sensitive: tuple[float, float]
@@ -236,24 +234,67 @@ class RayPlan:
     between_views: bool
     views: tuple[int, int, int, int]
     scale: float
-    sharpening: tuple[int, int, int] | None
     samples: int
     seed: int
     points: NDArray[np.float32]
     views_may_end: bool
-    missing_rays: float | None = None
-    cautions: tuple[str, ...] = field(default=())
-    notes: tuple[str, ...] = field(default=())
+
+    method: ClassVar[str] = "rays"
+    border: ClassVar[int] = 1
+    """Views around a block that a ray may look at with it."""
+
+    def by(self, engine: Engine) -> Runner:
+        """The engine's way to run it."""
+        return engine.rays
+
+    def part(self, block: Block) -> Rays:
+        """The same rays, looking at a block of the light field; what all blocks give adds up to the picture."""
+        (row, _), (column, _), (l, _), (k, _) = block.ranges
+        place = Affine.translation(-column, -row, -k, -l)
+        return replace(self, index_from_ray=place @ self.index_from_ray, views=block.shape)
+
+    def scaled(self, factor: float) -> Rays:
+        """For samples whose numbers stand for ``factor`` times as much."""
+        return self if factor == 1 else replace(self, scale=self.scale * factor)
+
+    def more(self, samples: int) -> Rays:
+        """With so many rays a pixel, to be taken beside as many that there are."""
+        return replace(self, samples=samples)
+
+    def alone(self) -> Rays:
+        """Rays that look at a light field of one sample as large as all of the light field.
+
+        They tell which share of the light asked for the whole light field holds, with nothing read.
+        """
+        nv, nu, nt, ns = self.views
+        sizes = np.array([nu, nv, ns, nt], dtype=np.float64)
+        onto_one = Affine.from_parts(np.diag(1 / sizes), 0.5 / sizes - 0.5)
+        return replace(
+            self,
+            index_from_ray=onto_one @ self.index_from_ray,
+            views=(1, 1, 1, 1),
+            between_views=False,
+            motion=np.zeros((2, 2)),
+        )
+
+    def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        """All views may be looked at."""
+        return np.ones(shape[:2], dtype=bool)
 
     @property
     def rays(self) -> int:
         """How many rays are aimed at one cell or window, over all pixels."""
-        return self.sensor_shape[0] * self.sensor_shape[1] * self.samples
+        return self.raster_shape[0] * self.raster_shape[1] * self.samples
 
     @property
     def samples_touched(self) -> int:
         """How many samples of the light field the rays look at, those that are looked at twice counted twice."""
         return 16 * self.rays
+
+    @property
+    def tables_bytes(self) -> int:
+        """Bytes of what the steps look up."""
+        return int(sum(table.nbytes for table in self.packed().arrays()))
 
     def block(self, pixel: NDArray[np.int64]) -> NDArray[np.int64]:
         """Which aligned block of ``samples`` points each pixel takes, by a hash of its number and the seed.
@@ -276,7 +317,7 @@ class RayPlan:
         """
         number = block[:, None] * self.samples + np.arange(self.samples)
         points = self.points[number][:, None]  # (pixels, 1, samples, columns)
-        row, column = np.divmod(pixel, self.sensor_shape[1])
+        row, column = np.divmod(pixel, self.raster_shape[1])
         middle_x = self.first_pixel[0] + column * self.pitch[0]
         middle_y = self.first_pixel[1] + row * self.pitch[1]
         shape = (-1, 1, 1)
@@ -349,13 +390,7 @@ class RayPlan:
         return packer
 
     def __repr__(self) -> str:
-        rows, columns = self.sensor_shape
-        lines = [
-            f"Ray plan for a picture of {rows}×{columns} pixels: {self.samples} rays a pixel",
-            f"  aimed at {self.aim.words}",
-            f"  met on the way back: {self.met}",
-        ]
-        return "\n".join(lines + [f"  - {note}" for note in self.notes])
+        return f"{self.samples} rays a pixel\n  aimed at {self.aim.words}\n  met on the way back: {self.met}"
 
 
 def hashed(number: NDArray[np.int64], seed: int) -> NDArray[np.uint32]:

@@ -1,14 +1,11 @@
-"""By how much views are made sharper before rays look them up; see `vcc.engines.sharpening`."""
+"""By how much views are made sharper before rays look them up; see `vcc.plan.operators.SharpenViews`."""
 
 from __future__ import annotations
 
-from vcc.light_field import Sample
+from vcc.fields.grid import Sample
+from vcc.plan.operators import WEIGHT_DIGITS
 from vcc.plan.sharpening import MEAN, TENT, along_axis
 
-DIGITS = 10
-"""Weights are whole numbers of 2⁻¹⁰: what is even stays so to the bit, and 8-bit samples are filtered exactly."""
-REACH = 2
-"""Samples on each side that a filtered sample takes in."""
 SOFTENED: dict[Sample, int] = {"point": TENT, "mean": TENT + MEAN}
 """How many times the averaging over a sample, sinc(f), stands in what is looked up: twice by interpolation, once
 more in samples that are means over their pixels."""
@@ -19,5 +16,5 @@ def sharpening(sample: Sample) -> tuple[int, int, int]:
 
     Those of a picture whose samples are as large as its pixels (`vcc.plan.sharpening`), rounded.
     """
-    outer, inner = (round(float(weight) * 2**DIGITS) for weight in along_axis(SOFTENED[sample], 1.0)[:2])
-    return 2**DIGITS - 2 * inner - 2 * outer, inner, outer
+    outer, inner = (round(float(weight) * 2**WEIGHT_DIGITS) for weight in along_axis(SOFTENED[sample], 1.0)[:2])
+    return 2**WEIGHT_DIGITS - 2 * inner - 2 * outer, inner, outer

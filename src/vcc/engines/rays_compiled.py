@@ -1,0 +1,125 @@
+"""Tracing rays by the compiled kernel, on several threads."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.engines import ray_kernels as kernels
+from vcc.engines import ray_tables as tables
+from vcc.plan.protocol import Partial, Progress
+from vcc.plan.rays.model import CellWindows, Rays, Window
+
+TILE = 32
+"""Pixels a side that a thread works on at once: what they look up in the light field stays in its cache."""
+
+_NOWHERE = (0.0, 0.0)
+NO_WINDOW = tables.Window(np.zeros((2, 2)), np.zeros((2, 2)), _NOWHERE, 0.0, False, np.zeros((0, 5)))
+NO_CELLS = tables.Cells(
+    0, np.zeros(6), np.zeros((0, 0, 3)), (0, 0), np.zeros((0, 2)), 0.0, False, *[_NOWHERE] * 10
+)
+
+
+def traced(
+    core: Rays, values: NDArray[Any], beside: int, threads: int, progress: Progress | None = None
+) -> Partial:
+    """The raster by one round of rays.
+
+    Args:
+        core: what is traced.
+        values: samples (v, u, t, s[, channels]).
+        beside: 0, or 1 for the blocks of points beside those of the first round.
+        threads: how many work at once. The picture is the same.
+        progress: called with (done, total) in tiles.
+    """
+    channels = values.shape[4] if values.ndim == 5 else 1
+    rows, columns = core.raster_shape
+    pictures = np.empty((2, rows, columns, channels), dtype=np.float32)
+    given = _field(core, values, channels), _sensor(core), _points(core, beside), _aim(core.aim), _steps(core)
+    add = partial(kernels.add_tile, *given, pictures)
+    tiles = [tables.Tile(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)]
+    tally = np.zeros(3)
+    with ThreadPoolExecutor(threads) as pool:
+        # Tallies are summed in the order of tiles: the same sums whatever the number of threads.
+        for done, part in enumerate(pool.map(add, tiles), start=1):
+            tally += part
+            if progress is not None:
+                progress(done, len(tiles))
+    asked, lacking, traced_rays = tally.tolist()
+    return Partial(pictures[0], pictures[1], asked, lacking, int(traced_rays), core.samples)
+
+
+def _field(core: Rays, values: NDArray[Any], channels: int) -> tables.LightField:
+    kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
+    return tables.LightField(
+        tables.Samples(np.ascontiguousarray(values, dtype=kind).reshape(-1), core.views, channels),
+        core.scale,
+        core.index_from_ray.matrix[:4].copy(),
+        np.ascontiguousarray(core.motion),
+        bool(core.between_views),
+        bool(core.views_may_end),
+    )
+
+
+def _sensor(core: Rays) -> tables.Sensor:
+    return tables.Sensor(*core.raster_shape, _pair(core.first_pixel), _pair(core.pitch), _pair(core.sensitive))
+
+
+def _points(core: Rays, beside: int) -> tables.Points:
+    seed = core.seed & 0xFFFFFFFF  # the hash takes no more of it
+    return tables.Points(np.ascontiguousarray(core.points.T), core.samples, beside, seed)
+
+
+def _steps(core: Rays) -> tables.Steps:
+    return tables.Steps(*core.packed().arrays())
+
+
+def _aim(aim: Window | CellWindows) -> tables.Aim:
+    if isinstance(aim, Window):
+        return tables.Aim(False, _window(aim), NO_CELLS)
+    return tables.Aim(True, NO_WINDOW, _cells(aim))
+
+
+def _window(aim: Window) -> tables.Window:
+    scatter = [[column, *matrix.reshape(-1)] for column, matrix in aim.slope_from_scatter]
+    return tables.Window(
+        np.ascontiguousarray(aim.slope_from_point),
+        np.ascontiguousarray(aim.slope_from_sensor),
+        _pair(aim.offset),
+        float(aim.solid_angle),
+        bool(aim.disc),
+        np.array(scatter).reshape(-1, 5),
+    )
+
+
+def _cells(aim: CellWindows) -> tables.Cells:
+    lattice = aim.lattice
+    turned = np.cos(lattice.rotation), np.sin(lattice.rotation)
+    return tables.Cells(
+        layout=int(lattice.layout == "hexagonal"),
+        turn=np.array([*turned, *lattice.offset, lattice.pitch, lattice.row_height]),
+        kinds=np.concatenate([aim.powers[..., None], aim.slopes], axis=-1),
+        reach=(int(aim.reach[0]), int(aim.reach[1])),
+        borders=np.ascontiguousarray(aim.borders),
+        opening_radius=float(aim.opening_radius),
+        disc=bool(aim.disc),
+        place_from_sensor=_pair(aim.place_from_sensor),
+        place_from_slope=_pair(aim.place_from_slope),
+        offset=_pair(aim.offset),
+        beyond=_pair(aim.beyond),
+        beyond_from_sensor=_pair(aim.beyond_from_sensor),
+        beyond_from_slope=_pair(aim.beyond_from_slope),
+        beyond_offset=_pair(aim.beyond_offset),
+        middle=_pair(aim.middle),
+        half=_pair(aim.half),
+        cell_half=_pair(aim.cell_half),
+    )
+
+
+def _pair(pair: ArrayLike) -> tuple[float, float]:
+    x, y = np.asarray(pair, dtype=float).tolist()
+    return x, y

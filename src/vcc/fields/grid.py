@@ -1,0 +1,269 @@
+"""A light field without its samples: which rays they are, how many, and what their numbers stand for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.units import short
+from vcc.base.values import Value
+from vcc.fields.disparity import Disparities, scaled
+from vcc.fields.sampled import LIGHT_FIELD_AXES, Index, indices
+
+Sample = Literal["mean", "point"]
+"""What a sample says of the scene: its mean over the cell of a pixel, or its value in the middle of the cell."""
+
+SAMPLES_IN_WORDS: dict[Sample, str] = {"mean": "means over pixels", "point": "values at points"}
+"""What samples are, for people."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A part of a grid: some views, of which some rows and columns of pixels.
+
+    Args:
+        rows: first row of views and the row after the last.
+        columns: likewise, of views.
+        pixel_rows: likewise, of pixels.
+        pixel_columns: likewise, of pixels.
+    """
+
+    rows: tuple[int, int]
+    columns: tuple[int, int]
+    pixel_rows: tuple[int, int]
+    pixel_columns: tuple[int, int]
+
+    @classmethod
+    def all_of(cls, shape: tuple[int, ...]) -> Block:
+        """All samples of a shape (v, u, t, s[, channels])."""
+        nv, nu, nt, ns = shape[:4]
+        return cls((0, nv), (0, nu), (0, nt), (0, ns))
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """(v, u, t, s) of its samples."""
+        nv, nu, nt, ns = (stop - first for first, stop in self.ranges)
+        return nv, nu, nt, ns
+
+    @property
+    def ranges(self) -> tuple[tuple[int, int], ...]:
+        """(first, stop) along (v, u, t, s)."""
+        return self.rows, self.columns, self.pixel_rows, self.pixel_columns
+
+    @property
+    def slices(self) -> tuple[slice, ...]:
+        """What takes it from an array (v, u, t, s[, channels])."""
+        return tuple(slice(first, stop) for first, stop in self.ranges)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Grid(Value):
+    """A light field without its samples.
+
+    Args:
+        shape: of the samples, (v, u, t, s) or (v, u, t, s, channels).
+        frame: maps (i, j, k, l, 1) to the ray (u, v, s, t, 1) in metres and slopes; i counts along u (axis 1), j
+            along v (axis 0), k along s (axis 3), l along t (axis 2).
+        kind: the NumPy type of the samples.
+        sample: what a sample says of the scene.
+        disparity_range: (lowest, highest) disparity of the scene in pixels per view along u, where stated.
+        disparities: what the samples show of depth, measured when first asked for.
+        extent: (rows, columns) of views of the light field that this is a piece of, counted in this piece's steps;
+            what a camera decides by the extent of the views it decides for all pieces alike.
+    """
+
+    shape: tuple[int, ...]
+    frame: Affine
+    kind: np.dtype[Any]
+    sample: Sample = "mean"
+    disparity_range: tuple[float, float] | None = None
+    disparities: Disparities = field(default_factory=Disparities)
+    extent: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check_frame(self.frame)
+        if not all(self.extent):
+            object.__setattr__(self, "extent", (float(self.shape[0]), float(self.shape[1])))
+
+    @property
+    def channels(self) -> int | None:
+        """How many colour channels there are; None without a channel axis."""
+        return self.shape[4] if len(self.shape) == 5 else None
+
+    @property
+    def full_scale(self) -> float:
+        """The stored value that stands for radiance 1: the largest integer, or 1 for floating point."""
+        return float(np.iinfo(self.kind).max) if self.kind.kind == "u" else 1.0
+
+    @property
+    def sample_volume(self) -> float:
+        """The phase-space volume du·dv·ds·dt of one sample's cell, m² (slopes have no unit)."""
+        return abs(self.frame.determinant)
+
+    def piece(self, index: Index | tuple[Index, ...]) -> tuple[Grid, tuple[range, ...]]:
+        """The grid of a piece, in its place, and the indices that it takes along each axis.
+
+        Where only every second pixel (or fewer) is kept along s and along t, means become ``"point"``: of a cell
+        n pixels wide each sample covers 1/n, and what that took from sharpness is 1/n² of what a mean over the
+        cell takes.
+
+        Args:
+            index: slices along (v, u, t, s[, channel]).
+
+        Raises:
+            InputError: what is no slice, too many of them, or nothing left.
+        """
+        frame, ranges = indices(self.shape, self.frame, index, LIGHT_FIELD_AXES, "a light field")
+        v, u, t, s = (part.step for part in ranges[:4])
+        stated = self.disparity_range
+        return replace(
+            self,
+            shape=tuple(map(len, ranges)),
+            frame=frame,
+            sample="point" if min(abs(t), abs(s)) > 1 else self.sample,
+            disparity_range=None if stated is None else scaled(stated, u / s),
+            disparities=self.disparities.piece(ranges),
+            extent=(self.extent[0] / abs(v), self.extent[1] / abs(u)),
+        ), ranges
+
+    def moved(self, rays: Affine) -> Grid:
+        """The same samples after a map of rays."""
+        return replace(self, frame=rays @ self.frame)
+
+    def grown(self, rows: int, columns: int) -> Grid:
+        """With so many more pixels on each side of every view."""
+        nv, nu, nt, ns = self.shape[:4]
+        shape = (nv, nu, nt + 2 * rows, ns + 2 * columns, *self.shape[4:])
+        return replace(self, shape=shape, frame=self.frame @ Affine.translation(0, 0, -columns, -rows))
+
+    def measured_disparity_range(self) -> tuple[float, float] | None:
+        """(lowest, highest) disparity in pixels per view along u, stated or else measured; None without any."""
+        return self.disparities.range() if self.disparity_range is None else self.disparity_range
+
+    def disparity_of(self, distance: float) -> float:
+        """The disparity, pixels per view along u, of a point ``distance`` metres before this plane (paper's Z).
+
+        The point is seen at pixel k − disparity·i in view i. For an array of cameras this is
+        du·(1/Z − 1/F)/ps, the formula of the HCI benchmark (Honauer et al. 2016).
+        """
+        position, slope = self.frame.linear[0], self.frame.linear[2]
+        vergence = 1.0 / distance
+        # A point at z = −Z sends rays with s − u/Z constant; follow that along i and k.
+        return float((slope[0] - position[0] * vergence) / (slope[2] - position[2] * vergence))
+
+    def distance_of(self, disparity: float) -> float:
+        """The distance in metres of what shows ``disparity`` pixels per view along u: `disparity_of` undone."""
+        position, slope = self.frame.linear[0], self.frame.linear[2]
+        numerator = position[0] - disparity * position[2]
+        denominator = slope[0] - disparity * slope[2]
+        return math.inf if denominator == 0 else float(numerator / denominator)
+
+    @property
+    def geometry(self) -> str:
+        """The geometry in words, for people: spacing, slope per pixel, convergence."""
+        linear = self.frame.linear
+        if not np.allclose(linear[[0, 0, 0, 1, 1, 1], [1, 2, 3, 0, 2, 3]], 0):
+            return "general frame"
+        # What turns the outermost views by less than a millionth of a pixel is rounding.
+        parallel = abs(linear[2, 0]) * self.shape[1] < 1e-6 * abs(linear[2, 2])
+        converging = "parallel views" if parallel else f"converging at {short(linear[0, 0] / linear[2, 0])}"
+        return f"spacing {short(abs(linear[0, 0]))}, slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
+
+    def __repr__(self) -> str:
+        sizes = "×".join(map(str, self.shape))
+        return f"Grid({sizes} {self.kind} {SAMPLES_IN_WORDS[self.sample]}, {self.geometry})"
+
+
+def check_shape(shape: tuple[int, ...]) -> None:
+    """Refuse what is no shape of a light field.
+
+    Raises:
+        InputError: not 4-D or 5-D, or an empty axis.
+    """
+    if len(shape) not in (4, 5):
+        raise InputError(
+            f"a light field has the axes (v, u, t, s) or (v, u, t, s, channel); this array has {len(shape)}: "
+            f"shape {shape}. For one view, use values[None, None]"
+        )
+    if 0 in shape:
+        raise InputError(f"a light field of shape {shape} holds no samples")
+
+
+def check_frame(frame: Affine) -> None:
+    """Refuse what is no frame of a light field.
+
+    Raises:
+        InputError: not 5×5, or not invertible.
+    """
+    if frame.dimensions != 4:
+        raise InputError("a light field needs a 5×5 frame, from (i, j, k, l, 1) to (u, v, s, t, 1)")
+    if not frame.is_invertible():
+        raise InputError(
+            "the frame of a light field must be invertible: each sample is another ray. This one is not:\n"
+            f"{frame!r}"
+        )
+
+
+def camera_array_frame(
+    shape: tuple[int, ...],
+    spacing: float | tuple[float, float],
+    slope_per_pixel: float | tuple[float, float],
+    focus_distance: float = math.inf,
+) -> Affine:
+    """The frame of pictures taken by a planar array of parallel cameras; see `vcc.LightField.from_views`.
+
+    Args:
+        shape: of the pictures, (rows of views, columns of views, rows, columns[, channels]).
+        spacing: distance between neighbouring views, metres: one number or (dv, du).
+        slope_per_pixel: pixel pitch over focal length of the cameras: one number or (pt, ps).
+        focus_distance: where the views converge, metres; infinite if their axes are parallel.
+
+    Raises:
+        InputError: another number of axes, or a spacing, slope or focus distance of zero or less.
+    """
+    dv, du = spacing if isinstance(spacing, tuple) else (spacing, spacing)
+    pt, ps = slope_per_pixel if isinstance(slope_per_pixel, tuple) else (slope_per_pixel, slope_per_pixel)
+    for name, value in (
+        ("spacing", du),
+        ("spacing", dv),
+        ("slope_per_pixel", ps),
+        ("slope_per_pixel", pt),
+        ("focus_distance", focus_distance),
+    ):
+        if not value > 0:
+            raise InputError(f"{name} must be greater than 0, not {value}")
+    check_shape(shape)
+    nv, nu, nt, ns = shape[:4]
+    matrix = np.zeros((5, 5))
+    matrix[4, 4] = 1.0
+    matrix[0, 0], matrix[1, 1] = du, dv
+    matrix[2, 0], matrix[3, 1] = du / focus_distance, dv / focus_distance
+    matrix[2, 2], matrix[3, 3] = -ps, -pt
+    return Affine(matrix) @ Affine.translation(-(nu - 1) / 2, -(nv - 1) / 2, -(ns - 1) / 2, -(nt - 1) / 2)
+
+
+def told_along_u(
+    frame: Affine, across: tuple[float, float] | None, down: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """(lowest, highest) disparity along u of what views show along both axes: turned by 90°, the same scene.
+
+    Args:
+        frame: of the light field.
+        across: what is shown along u, pixels per view, or None.
+        down: what is shown along v, or None.
+    """
+    position, slope = frame.linear[1], frame.linear[3]
+    place, angle = frame.linear[0], frame.linear[2]
+    found = list(across or ())
+    for disparity in down or ():
+        numerator, denominator = slope[1] - disparity * slope[3], position[1] - disparity * position[3]
+        # 1/Z = numerator / denominator; as `Grid.disparity_of`, without the quotient, which may be infinite
+        moved = angle[2] * denominator - place[2] * numerator
+        if moved != 0:
+            found.append(float((angle[0] * denominator - place[0] * numerator) / moved))
+    return (min(found), max(found)) if found else None

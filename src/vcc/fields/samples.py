@@ -1,0 +1,229 @@
+"""What every light field with samples can do, wherever they are; and samples in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any, Protocol, Self, get_args
+
+import numpy as np
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.fields.disparity import Disparities, DisparityMaps
+from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, check_frame, check_shape, told_along_u
+from vcc.fields.parallax import disparity_range
+from vcc.fields.plane_sweep import disparity_maps
+from vcc.fields.sampled import Index, has_values, taken, to_dtype, to_numpy
+
+Progress = Callable[[int, int], None]
+
+
+class Samples(Protocol):
+    """A light field with its samples: in memory, in a store, or made when they are asked for; all alike."""
+
+    @property
+    def grid(self) -> Grid:
+        """Which rays the samples are, and what their numbers stand for."""
+        ...
+
+    @property
+    def stored_bytes(self) -> int:
+        """Bytes that they take where they are read from; 0 in memory."""
+        ...
+
+    def whole(self) -> Any | None:
+        """All samples, an array (v, u, t, s[, channels]) of any library, where they are in memory; else None."""
+        ...
+
+    def check_complete(self) -> None:
+        """Refuse a light field of which views are missing, before long work on it."""
+        ...
+
+    def read(self, block: Block) -> Any:
+        """The samples of a block, (v, u, t, s[, channels])."""
+        ...
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InMemory:
+    """Radiance samples in memory and the frame that says which ray each of them is.
+
+    Args:
+        values: radiance, shape (v, u, t, s) or (v, u, t, s, channels): rows of views, columns of views,
+            rows of pixels, columns of pixels. A NumPy array, or one of PyTorch, JAX or another array-API
+            library. Floating-point values are radiance in any unit; unsigned integers are fractions of
+            their largest value (8-bit 255 is radiance 1). Linear in light, not display-referred.
+        frame: maps (i, j, k, l, 1) to the ray (u, v, s, t, 1) in metres and slopes at the plane where the
+            light field is given; i counts along u (axis 1), j along v (axis 0), k along s (axis 3), l along
+            t (axis 2). A camera takes this plane to be its entrance plane z = 0.
+        disparity_range: (lowest, highest) disparity of the scene in pixels per view along u, positive =
+            nearer than the plane on which the views converge, where known. It decides how views are
+            interpolated under strong defocus; unknown, it is measured from the pictures when needed.
+        sample: what a sample says of the scene: ``"mean"``, the mean radiance over the cell of its pixel, as
+            cameras and renderers give it; ``"point"``, the radiance of the ray in the middle of the cell, as a
+            formula evaluated there gives it. A camera undoes what the samples' own averaging took from sharpness.
+        disparity: pixels per view along u of each pixel, (v, u, t, s) for all views or (t, s) for the middle one,
+            which is ((rows − 1) // 2, (columns − 1) // 2), where known: what ``between_views="depth"`` of
+            `vcc.Camera.capture` goes by. None finds it when it is first asked for. The attribute is a
+            `vcc.fields.disparity.Disparities`.
+        extent: (rows, columns) of views of the light field that this is a piece of, counted in this piece's steps;
+            None for a whole one.
+
+    Raises:
+        InputError: not 4-D or 5-D, an empty axis, a dtype that is not unsigned integer or floating point,
+            samples that are NaN, infinite or negative, a frame that is not 5×5 and invertible, another word for
+            ``sample``, or a disparity of another shape or that is not finite.
+    """
+
+    values: Any
+    frame: Affine
+    disparity_range: tuple[float, float] | None = None
+    sample: Sample = "mean"
+    disparity: Any = None
+    extent: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        check_shape(tuple(self.values.shape))
+        check_frame(self.frame)
+        if self.disparity_range is not None and not self.disparity_range[0] <= self.disparity_range[1]:
+            raise InputError(f"disparity_range is (lowest, highest), not {self.disparity_range}")
+        if self.sample not in get_args(Sample):
+            raise InputError(
+                f"sample is 'mean' (over a pixel, as of cameras and renderers) or 'point', not {self.sample!r}"
+            )
+        check_samples(self.values)
+        self._complete()
+
+    def _complete(self) -> None:
+        """What was left out, filled in."""
+        if self.extent is None:
+            object.__setattr__(self, "extent", (float(self.values.shape[0]), float(self.values.shape[1])))
+        shown = self.disparity
+        if not isinstance(shown, Disparities):
+            shown = Disparities(None if shown is None else DisparityMaps.given(shown, self.values.shape))
+        shown = shown.completed(partial(maps_of, self), partial(_range_of, self.values, self.frame))
+        object.__setattr__(self, "disparity", shown)
+
+    @classmethod
+    def of(cls, values: Any, grid: Grid) -> Self:
+        """Samples of a grid that are known to be sound, such as a part of others: they are not looked at again.
+
+        Args:
+            values: (v, u, t, s[, channels]).
+            grid: whose shape is theirs.
+        """
+        made = object.__new__(cls)
+        parts = (values, grid.frame, grid.disparity_range, grid.sample, grid.disparities, grid.extent)
+        names = ("values", "frame", "disparity_range", "sample", "disparity", "extent")
+        for name, part in zip(names, parts, strict=True):
+            object.__setattr__(made, name, part)
+        made._complete()
+        return made
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The light field without its samples."""
+        return Grid(
+            self.shape,
+            self.frame,
+            to_dtype(self.values),
+            self.sample,
+            self.disparity_range,
+            self.disparity,
+            self.extent or (0.0, 0.0),
+        )
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the values: (v, u, t, s) or (v, u, t, s, channels)."""
+        return tuple(self.values.shape)
+
+    @property
+    def stored_bytes(self) -> int:
+        """Bytes to be read from elsewhere: none."""
+        return 0
+
+    def whole(self) -> Any:
+        """All samples."""
+        return self.values
+
+    def check_complete(self) -> None:
+        """All views are there."""
+
+    def read(self, block: Block) -> Any:
+        """The samples of a block, not copied."""
+        return self.values[(*block.slices, ...)]
+
+    def __getitem__(self, index: Index | tuple[Index, ...]) -> Self:
+        """A piece of the light field, in its place: slices along (v, u, t, s[, channel]).
+
+        Where only every second pixel (or fewer) is kept along s and along t, means become ``"point"``: of a cell
+        n pixels wide each sample covers 1/n, and what that took from sharpness is 1/n² of what a mean over the
+        cell takes.
+        """
+        grid, ranges = self.grid.piece(index)
+        return self.of(taken(self.values, ranges), grid)
+
+    def with_values(self, values: Any) -> Self:
+        """Other samples of the same scene on the same views and pixels, checked.
+
+        Raises:
+            InputError: another grid of samples, or what `vcc.LightField` refuses.
+        """
+        if tuple(values.shape)[:4] != self.shape[:4]:
+            raise InputError(
+                f"samples of shape {tuple(values.shape)} do not fit a light field of shape {self.shape}"
+            )
+        return replace(self, values=values)
+
+    def __repr__(self) -> str:
+        sizes = "×".join(map(str, self.shape))
+        samples = f"{to_dtype(self.values)} {SAMPLES_IN_WORDS[self.sample]}"
+        return f"{type(self).__name__}({sizes} {samples}, {self.grid.geometry})"
+
+
+def check_samples(values: Any) -> None:
+    """Refuse what is no radiance; arrays under a tracer are not looked at.
+
+    Raises:
+        InputError: another type than unsigned integer or floating point; NaN, infinite or negative samples.
+    """
+    kind = to_dtype(values)
+    if kind.kind not in "uf":
+        raise InputError(
+            f"light-field samples are floating point or unsigned integers, not {kind}: "
+            "convert them, e.g. with values.astype('float32')"
+        )
+    if kind.kind == "u" or not has_values(values):
+        return  # integers are neither negative nor NaN by construction
+    samples = to_numpy(values)
+    lowest, highest = samples.min(), samples.max()  # a NaN anywhere makes both NaN
+    if not (np.isfinite(lowest) and np.isfinite(highest)):
+        bad = tuple(int(n) for n in np.argwhere(~np.isfinite(samples))[0])
+        raise InputError(
+            f"a light field needs finite samples; at index {bad} (v, u, t, s, …) it has {samples[bad]}"
+        )
+    if lowest < 0:
+        bad = tuple(int(n) for n in np.unravel_index(samples.argmin(), samples.shape))
+        raise InputError(f"radiance is not negative; at index {bad} (v, u, t, s, …) it is {lowest}")
+
+
+def _range_of(values: Any, frame: Affine) -> tuple[float, float] | None:
+    """The disparities that samples show, measured from the views near the middle; None under a tracer."""
+    # Views near the middle are all that is looked at: no need to bring the others from another device.
+    rows, columns = (slice(max(n // 2 - 4, 0), n // 2 + 5) for n in values.shape[:2])
+    if not has_values(values):
+        return None
+    views = to_numpy(values[rows, columns, ...])
+    return told_along_u(
+        frame,
+        disparity_range(views, "u") if views.shape[1] > 1 else None,
+        disparity_range(views, "v") if views.shape[0] > 1 else None,
+    )
+
+
+def maps_of(samples: InMemory, progress: Progress | None) -> DisparityMaps:
+    """The maps of disparities that samples show, found now."""
+    return disparity_maps(samples, progress=progress)

@@ -1,0 +1,78 @@
+"""What was decided about a picture by footprints, in words."""
+
+from __future__ import annotations
+
+from vcc.base.affine import Affine
+from vcc.optics.train import Train
+from vcc.plan.footprints.cells import CORRELATED, LARGEST_CHOSEN_REFINEMENT, CellDivision
+from vcc.plan.footprints.model import MaskLookup
+from vcc.plan.footprints.planes import Plane, texture_error
+from vcc.plan.how import LARGEST_REFINEMENT
+from vcc.plan.parallax_rule import BetweenViews
+
+COARSE_TEXTURE = 5e-3
+"""Error of a mask's texture between its points, as a share of its largest value, from which on a plan says it."""
+
+
+def notes_of(
+    train: Train,
+    view_planes: list[Plane],
+    path_planes: list[Plane],
+    against_sensor: list[Plane],
+    between: BetweenViews,
+    division: CellDivision,
+    fine: int,
+    swapped: bool,
+) -> tuple[str, ...]:
+    """What was folded, pulled to the samples and to the sensor, and how finely cells are divided."""
+    linear = [
+        element.label
+        for element in train.elements
+        if any(isinstance(part, Affine) or part.affine is not None for part in element.parts())
+    ]
+    notes = [
+        f"folded into one matrix: {', '.join(linear) or 'no linear element'}, and the flight to the sensor at "
+        f"z = {train.sensor.z * 1e3:g} mm"
+    ]
+    if view_planes:
+        notes.append(
+            f"one weight a view, the open share of its cell: {', '.join(plane.label for plane in view_planes)}"
+        )
+    if path_planes:
+        notes.append(
+            f"one weight a sample, its mean over the sample's footprint, pulled from mid-path: "
+            f"{', '.join(plane.label for plane in path_planes)}"
+        )
+    if against_sensor:
+        notes.append(f"multiplied into the picture: {', '.join(plane.label for plane in against_sensor)}")
+    if swapped:
+        notes.append("pixel rows and columns of the views change places: the frame turns them")
+    notes.append(between.reason)
+    parts = division.parts
+    if parts > 1:
+        finer = "a mask is" if division.spread else "several masks are"
+        notes.append(f"cells of views divided {parts}×{parts}: {finer} finer than a view's cell")
+    if division.left > CORRELATED:
+        notes.append(
+            f"masks in different planes still vary together inside these cells, by up to {division.left:.0%} of "
+            "their contrast, and are taken as independent there: more views would tell them apart"
+        )
+    if fine > 1:
+        further = (
+            f"; finer ones, up to refine={LARGEST_REFINEMENT}, are made when asked for"
+            if fine == LARGEST_CHOSEN_REFINEMENT
+            else ""
+        )
+        notes.append(f"samples divided {fine}×{fine}: a mask near the sensor is finer than a sample{further}")
+    return tuple(notes)
+
+
+def coarse_textures(lookups: tuple[MaskLookup, ...]) -> tuple[str, ...]:
+    """Which masks are finer than their textures show, and by how much."""
+    found = [(lookup, texture_error(lookup.texture)) for lookup in lookups]
+    return tuple(
+        f"{lookup.label} is finer than its texture of {'×'.join(map(str, lookup.texture.shape))} points shows: "
+        f"{error:.1%} root mean square of its largest value"
+        for lookup, error in found
+        if error > COARSE_TEXTURE
+    )

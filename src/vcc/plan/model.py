@@ -1,0 +1,140 @@
+"""The plan: what is left of a camera seen from a light field, as pure numbers for an engine.
+
+    picture = after ∘ core ∘ before (samples)
+
+Every step is linear in the samples, so the picture is the sum of the pictures of parts of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vcc.base.errors import InputError
+from vcc.base.values import Value
+from vcc.fields.grid import Block, Grid
+from vcc.plan.depth_rule import ViewsBetween
+from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews
+from vcc.plan.protocol import Core
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Value):
+    """How to make the picture of a light field.
+
+    Plans of equal content are equal, and can be keys of a cache.
+
+    Args:
+        sensor_shape: (rows, columns) of the picture.
+        grid_shape: (v, u, t, s) of the light field's samples.
+        core: what turns samples into a raster: `vcc.plan.footprints.model.Footprints` or
+            `vcc.plan.rays.model.Rays`.
+        before: what is done to samples before that, in order.
+        after: what is done to the raster, in order.
+        views_between: how views in between are made before all else, or None; the rest counts what is there then.
+        missing_rays: share of the rays asked for that the light field lacks; None where the run tells.
+        missing_reason: in words.
+        expected_ghosting: largest gap in pixels between neighbouring views' pictures of the same thing that is
+            left unfilled.
+        cautions: what a user should be warned of before a run, in words.
+        notes: what was decided and why, in words.
+    """
+
+    sensor_shape: tuple[int, int]
+    grid_shape: tuple[int, ...]
+    core: Core
+    before: tuple[Before, ...] = ()
+    after: tuple[After, ...] = ()
+    views_between: ViewsBetween | None = None
+    missing_rays: float | None = None
+    missing_reason: str = ""
+    expected_ghosting: float = 0.0
+    cautions: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def by_rays(self) -> bool:
+        """Whether rays are traced, rather than footprints summed."""
+        return self.core.method == "rays"
+
+    @property
+    def samples_touched(self) -> int:
+        """How many samples an engine goes through, refined ones and those looked at twice counted."""
+        return self.core.samples_touched
+
+    @property
+    def reach(self) -> int:
+        """Rows of pixels on each side of a block that are read with it."""
+        return max((operator.reach for operator in self.before), default=0)
+
+    @property
+    def smear(self) -> tuple[float, float]:
+        """(vertical, horizontal) half width in pixels of the tent that fills gaps between views; 0 for none."""
+        return next((o.half_widths for o in self.after if isinstance(o, AlongAxes)), (0.0, 0.0))
+
+    def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
+        """The shape of the samples that the core takes of those of a shape (v, u, t, s[, channels])."""
+        for operator in self.before:
+            shape = operator.shape(shape)
+        return shape
+
+    def block(self, block: Block) -> Block:
+        """Which of the samples that the core takes come from a block of those that there are."""
+        for operator in self.before:
+            block = operator.block(block)
+        return block
+
+    def prepared(self, values: Any) -> Any:
+        """Samples as the core takes them."""
+        for operator in self.before:
+            values = operator.apply(values)
+        return values
+
+    def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
+        """The type that samples of a NumPy type have in memory, and what a number of theirs stands for."""
+        factor = 1.0
+        for operator in self.before:
+            kind, one = operator.kept_as(kind)
+            factor *= one
+        return (np.dtype(np.float32) if kind == np.float16 else kind), factor  # compiled code takes no half
+
+    def check_fits(self, sensor_shape: tuple[int, int], grid: Grid) -> None:
+        """Refuse a plan that was made for something else.
+
+        Raises:
+            InputError: another size of sensor, or another shape of light field.
+        """
+        if self.sensor_shape != sensor_shape or self.grid_shape != grid.shape[:4]:
+            raise InputError(
+                f"this plan is for a sensor of {_sizes(self.sensor_shape)} pixels and a light field of "
+                f"{_sizes(self.grid_shape)} samples, not {_sizes(sensor_shape)} and {_sizes(grid.shape[:4])}: "
+                "make it anew with camera.compile(light_field)"
+            )
+
+    def __repr__(self) -> str:
+        rows, columns = self.sensor_shape
+        lines = [f"Plan for a picture of {rows}×{columns} pixels by {self.core.method}: {self.core!r}"]
+        lines += [f"  {words}" for words in self._filters()]
+        if self.missing_rays is not None:
+            lines.append(f"  missing rays: {self.missing_rays:.2%}")
+        return "\n".join(lines + [f"  - {note}" for note in self.notes])
+
+    def _filters(self) -> list[str]:
+        found = []
+        for operator in (*self.before, *self.after):
+            match operator:
+                case BlurViews(kernel):
+                    found.append(f"views blurred by a kernel of {kernel.shape[0]}×{kernel.shape[1]} samples")
+                case Blur(kernel, words):
+                    found.append(f"{words}: a kernel of {kernel.shape[0]}×{kernel.shape[1]} pixels")
+                case AlongAxes(down, across, words):
+                    found.append(f"{words}: {len(down)}×{len(across)} pixels")
+                case _:
+                    pass
+        return found
+
+
+def _sizes(shape: tuple[int, ...]) -> str:
+    return "×".join(map(str, shape))

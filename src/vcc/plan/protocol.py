@@ -1,0 +1,154 @@
+"""What plans and engines owe one another: cores say what is computed, engines compute it, parts add up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.fields.grid import Block
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Partial:
+    """A raster of part of the light: sums that add up.
+
+    Args:
+        values: irradiance, (rows, columns, channels), an array of the library of the samples.
+        difference: what the two halves of a pixel's rays found, one minus the other, like ``values``; None where
+            nothing is sampled.
+        asked: light asked for, in any unit.
+        lacking: of that, what lies beside the light field.
+        rays: how many were traced; 0 for footprints.
+        samples: rays a pixel; 0 for footprints.
+    """
+
+    values: Any
+    difference: Any = None
+    asked: float = 0.0
+    lacking: float = 0.0
+    rays: int = 0
+    samples: int = 0
+
+    def __add__(self, other: Partial) -> Partial:
+        """The raster of more of the samples, by the same rays."""
+        return replace(
+            self,
+            values=self.values + other.values,
+            difference=None if self.difference is None else self.difference + other.difference,
+        )
+
+    def with_rays(self, other: Partial) -> Partial:
+        """The raster of the same samples by as many other rays, beside those there are."""
+        return Partial(
+            values=(self.values + other.values) / 2,
+            difference=self.values - other.values,
+            asked=self.asked + other.asked,
+            lacking=self.lacking + other.lacking,
+            rays=self.rays + other.rays,
+            samples=self.samples + other.samples,
+        )
+
+    @property
+    def missing(self) -> float:
+        """The share of the light asked for that the light field does not hold."""
+        return self.lacking / self.asked if self.asked > 0 else 0.0
+
+
+class Runner(Protocol):
+    """How an engine runs a core."""
+
+    def __call__(
+        self, core: Any, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
+    ) -> Partial:
+        """The raster of samples (v, u, t, s[, channels]).
+
+        Args:
+            core: what is computed.
+            values: the samples.
+            beside: 0, or 1 for as many other rays, of the neighbouring block of points.
+            threads: how many work at once.
+            progress: called with (done, total).
+        """
+        ...
+
+
+class Engine(Protocol):
+    """What computes: a module with these functions."""
+
+    footprints: Runner
+    rays: Runner
+
+    def takes(self, values: Any) -> bool:
+        """Whether it computes with arrays of this kind."""
+        ...
+
+    def prepared(self, before: Sequence[Any], values: Any, threads: int) -> Any:
+        """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it."""
+        ...
+
+    def finished(self, after: Sequence[Any], raster: Any, threads: int) -> Any:
+        """The picture (rows, columns, channels), float32, of a raster after all operators."""
+        ...
+
+    def memory(self, core: Any, channels: int, threads: int) -> int:
+        """Bytes that a run takes beside the samples and the raster, estimated."""
+        ...
+
+
+class Core(Protocol):
+    """The middle of a plan: what turns samples into a raster."""
+
+    @property
+    def method(self) -> str:
+        """``"footprints"`` or ``"rays"``."""
+        ...
+
+    @property
+    def border(self) -> int:
+        """Views around a block that are looked at with it."""
+        ...
+
+    @property
+    def scale(self) -> float:
+        """Turns stored samples into radiance, or into irradiance times shares."""
+        ...
+
+    @property
+    def raster_shape(self) -> tuple[int, int]:
+        """(rows, columns) of what it makes."""
+        ...
+
+    def by(self, engine: Engine) -> Runner:
+        """The engine's way to run it."""
+        ...
+
+    def part(self, block: Block) -> Any:
+        """What runs on a block of samples; the parts' rasters add up."""
+        ...
+
+    def scaled(self, factor: float) -> Any:
+        """For samples whose numbers stand for ``factor`` times as much."""
+        ...
+
+    def more(self, samples: int) -> Any:
+        """With so many rays a pixel, to be taken beside as many that there are; the same where none are traced."""
+        ...
+
+    def alone(self) -> Any:
+        """What tells of all rays without samples, run on a light field of one."""
+        ...
+
+    def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        """Which of the views of a light field of this shape are looked at, (v, u)."""
+        ...
+
+    @property
+    def samples_touched(self) -> int:
+        """How many samples an engine goes through, those that it goes through twice counted twice."""
+        ...

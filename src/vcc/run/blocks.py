@@ -1,0 +1,155 @@
+"""How a light field that is not in memory is cut into blocks that fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vcc.base.errors import InputError
+from vcc.fields.grid import Block, Grid
+from vcc.plan.model import Plan
+
+SMALLEST_BLOCK = 1
+"""Rows of pixels."""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """How a light field is cut so that each block fits the memory.
+
+    Args:
+        rows: the rows of views that are looked at: the first, and the row after the last.
+        columns: likewise.
+        pixel_rows: rows of pixels of a view.
+        pixel_columns: columns of pixels of a view.
+        rows_each: rows of views in a block.
+        columns_each: columns of views in a block; fewer than there are only where a row is too large.
+        pixel_rows_each: rows of pixels in a block; fewer than there are only where a view is too large.
+    """
+
+    rows: tuple[int, int]
+    columns: tuple[int, int]
+    pixel_rows: int
+    pixel_columns: int
+    rows_each: int
+    columns_each: int
+    pixel_rows_each: int
+
+    @classmethod
+    def one(cls, grid: Grid) -> Blocks:
+        """All of a light field at once."""
+        nv, nu, nt, ns = grid.shape[:4]
+        return cls((0, nv), (0, nu), nt, ns, nv, nu, nt)
+
+    @classmethod
+    def by_column(cls, grid: Grid) -> Blocks:
+        """A column of views at a time."""
+        nv, nu, nt, ns = grid.shape[:4]
+        return cls((0, nv), (0, nu), nt, ns, nv, 1, nt)
+
+    def __iter__(self) -> Iterator[Block]:
+        for rows in _parts(*self.rows, self.rows_each):
+            for columns in _parts(*self.columns, self.columns_each):
+                for pixel_rows in _parts(0, self.pixel_rows, self.pixel_rows_each):
+                    yield Block(rows, columns, pixel_rows, (0, self.pixel_columns))
+
+    @property
+    def words(self) -> str:
+        """How many blocks there are of what."""
+        count = sum(1 for _ in self)
+        if self.pixel_rows_each < self.pixel_rows:
+            return f"{count} blocks of {self.pixel_rows_each} rows of pixels of a view"
+        views = f"{self.rows_each}×{self.columns_each} views"
+        return f"one block of {views}" if count == 1 else f"{count} blocks of up to {views}"
+
+
+def _parts(first: int, stop: int, each: int) -> Iterator[tuple[int, int]]:
+    """(first, stop) cut evenly into parts of at most ``each``."""
+    count = math.ceil((stop - first) / each)
+    for n in range(count):
+        yield first + (stop - first) * n // count, first + (stop - first) * (n + 1) // count
+
+
+@dataclass(frozen=True)
+class Need:
+    """What a block takes of memory.
+
+    Args:
+        fixed: bytes that are taken whatever the blocks are: sums, a block's raster, and what the engine needs.
+        view: bytes of a view as it is kept.
+        times: how many times a block's samples are in memory.
+        border: dark views on each side of a block.
+    """
+
+    fixed: int
+    view: float
+    times: float
+    border: int
+
+    @classmethod
+    def of(cls, plan: Plan, grid: Grid, engine_memory: int, copies: bool) -> Need:
+        """What a plan's blocks take.
+
+        Args:
+            plan: whose parts run.
+            grid: of the light field.
+            engine_memory: bytes that the engine states.
+            copies: whether the engine converts all that it is given, as those in NumPy do.
+        """
+        kept = plan.kept_as(grid.kind)[0].itemsize
+        pixels = math.prod(plan.core.raster_shape) * (grid.channels or 1)
+        grown = math.prod(plan.shape(grid.shape)[2:]) * kept
+        times = 1 + 16 / kept if copies else 1.0
+        return cls((36 if plan.by_rays else 16) * pixels + engine_memory, grown, times, 2 * plan.core.border)
+
+    @property
+    def least_for_views(self) -> int:
+        """Bytes within which blocks are whole views."""
+        return math.ceil(self.fixed + 8 * self.view)
+
+
+def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
+    """The largest blocks that keep to a memory limit.
+
+    Args:
+        plan: whose parts run.
+        grid: of the light field.
+        need: what the blocks take.
+        limit: bytes.
+
+    Raises:
+        InputError: a limit that a single row of pixels does not fit.
+    """
+    _, _, nt, ns = grid.shape[:4]
+    used = plan.core.used_views(grid.shape)
+    rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
+    high, wide = rows[1] - rows[0], columns[1] - columns[0]
+    view, times, border = need.view, need.times, need.border
+    # A view is read, unpacked and converted before it has its place.
+    spare = limit - need.fixed - 3 * view
+    rows_each = int(spare / times // (view * (wide + border))) - border
+    if spare > 0 and (rows_each >= 1 or (border and spare >= times * view * high * wide)):
+        whole = spare >= times * view * high * wide  # a single block has no neighbours and needs no border
+        return Blocks(rows, columns, nt, ns, high if whole else min(rows_each, high), wide, nt)
+    columns_each = int(spare / times // (view * (1 + border))) - border
+    if spare > 0 and columns_each >= 1:
+        return Blocks(rows, columns, nt, ns, 1, min(columns_each, wide), nt)
+    each = view / nt * (3 + times * (1 + border) ** 2)
+    pixel_rows_each = int((limit - need.fixed) // each) if limit > need.fixed else 0
+    if pixel_rows_each >= SMALLEST_BLOCK:
+        return Blocks(rows, columns, nt, ns, 1, 1, min(pixel_rows_each, nt))
+    least = need.fixed + each * SMALLEST_BLOCK
+    raise InputError(
+        f"memory_limit={math.ceil(limit)} bytes is too little: this picture takes {math.ceil(least / 1e6)} MB "
+        f"however small the blocks are, and about {math.ceil(need.least_for_views / 1e6)} MB to go well"
+    )
+
+
+def _span(used: Any) -> tuple[int, int]:
+    """The first of those that are used, and the one after the last; the first of all where none is."""
+    found = np.flatnonzero(used)
+    return (int(found[0]), int(found[-1]) + 1) if found.size else (0, 1)

@@ -1,0 +1,293 @@
+"""The driver: a plan run by an engine on the samples of a light field, in memory or block by block.
+
+A picture is linear in the samples, so it is the sum of the pictures of blocks: in memory there is one block, a
+store is a sum over blocks, a tolerance is a sum over rounds of rays. A ray looks at up to four neighbouring views:
+a block is then run with a border of dark views where it has neighbours, so that a ray between two blocks finds in
+each the share that is there, and each block meets the same rays.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.memory import MEMORY_LIMIT
+from vcc.engines import chosen, engine
+from vcc.fields.grid import Block
+from vcc.fields.sampled import has_values, to_dtype, to_numpy
+from vcc.fields.samples import Samples
+from vcc.plan.how import LARGEST_SAMPLES, How
+from vcc.plan.model import Plan
+from vcc.plan.protocol import Partial, Progress
+from vcc.run.blocks import Blocks, Need, cut
+
+HELD = 0.25
+"""Share of the memory that views and maps, kept to be used again, may take where views in between are made."""
+IN_MEMORY = 2**28
+"""Bytes of denser views that are there at a time, of a light field in memory."""
+MUCH_UNSEEN = 0.01
+"""Share of the samples between views that no view shows, from which on a warning says it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A picture and what is known about it.
+
+    Args:
+        values: irradiance (rows, columns[, channels]), float32; an array of the library of the samples with the
+            ``array_api`` engine, else of NumPy.
+        missing_rays: the share of the rays asked for that the light field does not hold.
+        missing_reason: in words.
+        sampling_error: root mean square over the pixels, in units of the values; 0 for footprints.
+        rays: how many were traced; 0 for footprints.
+        samples: rays a pixel; 0 for footprints.
+    """
+
+    values: Any
+    missing_rays: float
+    missing_reason: str
+    sampling_error: float = 0.0
+    rays: int = 0
+    samples: int = 0
+
+
+def drive(plan: Plan, samples: Samples, how: How | None = None, progress: Progress | None = None) -> Recorded:
+    """The picture that a plan makes of a light field.
+
+    Args:
+        plan: made for its grid, or for another of the same shape and frame.
+        samples: in memory, or read block by block (by rays once for each doubling that a tolerance asks for).
+        how: engine, threads, tolerance and memory; the rest is the plan's.
+        progress: called with (done, total).
+
+    Raises:
+        InputError: an engine that does not take these arrays; of samples that are read, views that are missing or
+            damaged, or a memory limit that is too small.
+    """
+    return Drive(plan, samples, how or How()).recorded(progress)
+
+
+class Drive:
+    """A plan on its way through an engine.
+
+    Args:
+        plan: what is computed.
+        samples: of what.
+        how: by what, and within what.
+
+    Raises:
+        InputError: see `drive`.
+    """
+
+    def __init__(self, plan: Plan, samples: Samples, how: How) -> None:
+        samples.check_complete()
+        self.plan, self.how = plan, how
+        self.name = chosen(how.engine, samples.whole())
+        self.engine, self.threads = engine(self.name), how.workers
+        self.given = samples
+        self.samples: Samples = samples
+        self.limit: float = MEMORY_LIMIT // 4 if how.memory_limit is None else how.memory_limit
+        if plan.views_between is not None:
+            self._make_views_between(samples)
+        kind = to_dtype(samples.whole()) if self.in_memory else self.samples.grid.kind
+        self.kind, factor = plan.kept_as(kind)
+        self.core = plan.core.scaled(factor)
+        self.runner = plan.core.by(self.engine)
+        self._ready: Any = None
+
+    @property
+    def in_memory(self) -> bool:
+        """Whether all samples are there already."""
+        return self.samples.whole() is not None
+
+    @property
+    def channels(self) -> int:
+        """How many there are, 1 without a channel axis."""
+        return self.samples.grid.channels or 1
+
+    @cached_property
+    def need(self) -> Need:
+        """What blocks take of memory."""
+        taken = self.engine.memory(self.plan.core, self.channels, self.threads)
+        return Need.of(self.plan, self.samples.grid, taken, self.name != "numba")
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """The blocks that the light field is cut into.
+
+        Raises:
+            InputError: a memory limit that a single row of pixels does not fit.
+        """
+        grid = self.samples.grid
+        if not self.in_memory:
+            return cut(self.plan, grid, self.need, self.limit)
+        copied = self.plan.core.border == 0 and any(operator.copies for operator in self.plan.before)
+        return Blocks.by_column(grid) if copied else Blocks.one(grid)
+
+    def recorded(self, progress: Progress | None = None) -> Recorded:
+        """The picture, all rounds of rays and all blocks summed."""
+        try:
+            found = self.rounds(progress)
+        except MemoryError:
+            if self.in_memory:
+                raise
+            raise InputError(
+                f"memory ran out within memory_limit={math.ceil(self.limit)} bytes: there is less than that. Pass "
+                "a smaller one"
+            ) from None
+        picture = self.engine.finished(self.plan.after, found.values, self.threads)
+        if self.plan.views_between is not None:
+            _warn_of_unseen(self.samples)
+        missing = found.missing if self.plan.missing_rays is None else self.plan.missing_rays
+        return Recorded(
+            picture if self.samples.grid.channels is not None else picture[..., 0],
+            missing,
+            self.plan.missing_reason,
+            sampling_error(found),
+            found.rays,
+            found.samples,
+        )
+
+    def rounds(self, progress: Progress | None = None) -> Partial:
+        """The raster by as many rays as a tolerance asks for; each round takes as many again as there are."""
+        found = self.summed(self.blocks, progress=progress)
+        tolerance = self.how.tolerance
+        while tolerance is not None and sampling_error(found) > tolerance * abs(_mean(found.values)):
+            if found.samples * 2 > LARGEST_SAMPLES:
+                error = sampling_error(found) / abs(_mean(found.values))
+                error = sampling_error(found) / abs(_mean(found.values))
+                warnings.warn(
+                    f"the sampling error is {error:.2g} of the picture's mean after {found.samples} rays a pixel, "
+                    f"the most there are; {tolerance:g} was asked for",
+                    ResultWarning,
+                    stacklevel=6,
+                )
+                break
+            # From the block of points beside those taken: together they are one larger even set.
+            found = found.with_rays(self.summed(self.blocks, found.samples, progress))
+        return found
+
+    def summed(self, blocks: Iterable[Block], beside: int = 0, progress: Progress | None = None) -> Partial:
+        """The raster of some blocks, one after the other.
+
+        Args:
+            blocks: of the light field.
+            beside: 0, or rays a pixel that there are already: then as many others.
+            progress: called with (done, total).
+        """
+        core = self.core.more(beside) if beside else self.core
+        run = partial(self.runner, beside=int(beside > 0), threads=self.threads)
+        listed = list(blocks)
+        if self.in_memory and len(listed) == 1:
+            if self._ready is None:
+                self._ready = self.engine.prepared(self.plan.before, self.samples.whole(), self.threads)
+            return run(core, self._ready, progress=progress)
+        used = self.plan.core.used_views(self.samples.grid.shape)
+        counted = _Counted(progress, sum(int(used[slice(*b.rows), slice(*b.columns)].sum()) for b in listed))
+        total: Partial | None = None
+        for block in listed:
+            (a, b), (c, d) = block.rows, block.columns
+            if total is not None and not used[a:b, c:d].any():
+                continue
+            values, around = self._values(block, used, counted)
+            part = run(core.part(self.plan.block(around)), values)
+            del values
+            wide = self._in_double(part)
+            total = wide if total is None else total + wide
+        assert total is not None
+        if not self.plan.by_rays or self.in_memory:
+            return total
+        # Each block knows of its own rays only: a light field of one sample tells which of all are missing.
+        whole = run(core.alone(), np.zeros((1, 1, 1, 1), self.kind))
+        return replace(total, asked=whole.asked, lacking=whole.lacking, rays=whole.rays)
+
+    def _values(self, block: Block, used: NDArray[np.bool_], counted: _Counted) -> tuple[Any, Block]:
+        """A block's samples as the core takes them, with a border of dark views towards its neighbours."""
+        if self.in_memory:
+            counted.add(int(used[slice(*block.rows), slice(*block.columns)].sum()))
+            return self.engine.prepared(self.plan.before, self.samples.read(block), self.threads), block
+        grid, border = self.samples.grid, self.plan.core.border
+        (a, b), (c, d), (first, stop) = block.rows, block.columns, block.pixel_rows
+        around = replace(
+            block,
+            rows=(max(a - border, 0), min(b + border, grid.shape[0])),
+            columns=(max(c - border, 0), min(d + border, grid.shape[1])),
+        )
+        above, below = min(self.plan.reach, first), min(self.plan.reach, grid.shape[2] - stop)
+        room = np.zeros(self.plan.shape((*around.shape, *grid.shape[4:])), dtype=self.kind)
+        for j, i in zip(*np.nonzero(used[a:b, c:d]), strict=True):
+            row, column = a + int(j), c + int(i)
+            one = Block((row, row + 1), (column, column + 1), (first - above, stop + below), block.pixel_columns)
+            view = self.engine.prepared(self.plan.before, self.samples.read(one), self.threads)
+            if above or below:
+                view = view[:, :, above : view.shape[2] - below]
+            room[row - around.rows[0], column - around.columns[0]] = view[0, 0]
+            counted.add(1)
+        return room, around
+
+    def _in_double(self, part: Partial) -> Partial:
+        """Sums of many parts are kept in double precision."""
+        if not isinstance(part.values, np.ndarray):
+            return part
+        difference = None if part.difference is None else part.difference.astype(np.float64)
+        return replace(part, values=part.values.astype(np.float64), difference=difference)
+
+    def _make_views_between(self, samples: Samples) -> None:
+        """Look at the denser light field instead, whose views are made when they are read."""
+        whole = samples.whole()
+        if whole is not None and not isinstance(whole, np.ndarray):
+            raise InputError(
+                f"between_views='depth' takes NumPy arrays, not {type(whole).__module__}.{type(whole).__name__}: "
+                "pass light_field.replaced(numpy.asarray(values)), or between_views='auto', which carries "
+                "gradients"
+            )
+        made = importlib.import_module("vcc.engines.depth_views").DenserViews
+        self.samples = made(samples, self.plan.views_between, self.threads, IN_MEMORY)
+        if whole is not None:
+            # As few bytes as serve well, and as many as a block of one view takes.
+            self.limit = max(IN_MEMORY, math.ceil(self.need.least_for_views / (1 - HELD)))
+        self.samples = made(samples, self.plan.views_between, self.threads, self.limit)
+        self.limit = math.ceil(self.limit * (1 - HELD))
+
+
+class _Counted:
+    """Views counted as they are read."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress, self._total, self._done = progress, total, 0
+
+    def add(self, views: int) -> None:
+        self._done += views
+        if self._progress is not None:
+            self._progress(self._done, self._total)
+
+
+def _warn_of_unseen(views: Any) -> None:
+    """Say it if much of what lies between views is seen by none."""
+    if views.made and views.unseen > MUCH_UNSEEN * views.made:
+        warnings.warn(
+            f"{views.unseen / views.made:.1%} of the samples between views show what none of the views around "
+            "them shows (it is hidden there, or outside their pictures): borders go on there",
+            ResultWarning,
+            stacklevel=6,
+        )
+
+
+def sampling_error(found: Partial) -> float:
+    """The sampling error, root mean square over the pixels, by what the two halves of the rays differ."""
+    if found.difference is None:
+        return 0.0
+    return math.sqrt(_mean(found.difference * found.difference)) / 2
+
+
+def _mean(values: Any) -> float:
+    return float(np.mean(to_numpy(values), dtype=np.float64)) if has_values(values) else math.nan
