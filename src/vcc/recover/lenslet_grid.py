@@ -95,7 +95,7 @@ class LensletGrid:
             lattice: where micro-images are centred on the sensor.
             sensor: whose pixels are counted.
         """
-        return cls.of_map(lattice.layout, sensor.frame.inverse() @ lattice.place_from_steps)
+        return grid_of(lattice.layout, sensor.frame.inverse() @ lattice.place_from_steps)
 
     @classmethod
     def of_camera(cls, camera: Camera) -> LensletGrid:
@@ -108,19 +108,7 @@ class LensletGrid:
             InputError: no lens array, something behind it, or one at the sensor.
         """
         optics = LensletOptics.of(camera)
-        return cls.of_map(optics.array.layout, camera.sensor.frame.inverse() @ optics.micro_image_from_steps)
-
-    @classmethod
-    def of_map(cls, layout: str, pixel_from_steps: Affine, residual: float = 0.0) -> LensletGrid:
-        """The grid that a map from steps along the lattice to pixels makes.
-
-        Args:
-            layout: ``"square"`` or ``"hexagonal"``.
-            pixel_from_steps: from (a, b) to (x, y), pixels.
-            residual: of the centres that it was fitted to, pixels.
-        """
-        across, down = map(_pair, pixel_from_steps.linear.T)
-        return cls(layout, _pair(pixel_from_steps.offset), (across, down), residual)
+        return grid_of(optics.array.layout, camera.sensor.frame.inverse() @ optics.micro_image_from_steps)
 
     @classmethod
     def from_centres(cls, centres: ArrayLike) -> LensletGrid:
@@ -141,50 +129,14 @@ class LensletGrid:
         points = points.reshape(-1, 2)
         if not np.isfinite(points).all():
             raise InputError("centres of micro-images must be finite numbers of pixels")
-        lattice = _looked_up(points)
-        grid, used = cls.of_map(lattice.layout, lattice.place_from_steps)._fitted_outwards(points)
+        lattice = _lattice_near(points)
+        grid, used = _fitted_outwards(grid_of(lattice.layout, lattice.place_from_steps), points)
         if used < 0.9 * len(points):
             raise InputError(
                 f"only {used} of {len(points)} centres fit one {lattice.layout} lattice of pitch "
                 f"{grid.pitch:.2f} pixels"
             )
         return grid
-
-    def _fitted_outwards(self, points: Array) -> tuple[LensletGrid, int]:
-        """Fitted to points near the origin, then further out: an error of the steps grows with the distance."""
-        grid, used = self, 0
-        away = np.linalg.norm(points - self.origin, axis=1)
-        radius = 3 * self.pitch
-        while True:
-            radius = min(2 * radius, float(away.max()) + 1)
-            near = points[away <= radius]
-            for _ in range(2):
-                index = grid.index_of(near)
-                label = np.rint(index)
-                good = np.abs(index - label).max(axis=1) < 0.25
-                if good.sum() < 6:
-                    raise InputError(f"the centres do not stand on a {self.layout} lattice")
-                grid = grid.fitted(label[good], near[good])
-                used = int(good.sum())
-            if radius > away.max():
-                return grid, used
-
-    def fitted(self, labels: Array, points: Array) -> LensletGrid:
-        """The grid of the same layout that fits centres best, in the sense of least squares.
-
-        Args:
-            labels: (a, b) of the micro-images, shape (n, 2).
-            points: (x, y) of their centres, pixels, shape (n, 2).
-
-        Raises:
-            InputError: they stand along one line.
-        """
-        design = np.column_stack([labels, np.ones(len(labels))])
-        solution, _, rank, _ = np.linalg.lstsq(design, points, rcond=None)
-        if rank < 3:
-            raise InputError("the centres of micro-images stand along one line: no lattice follows from them")
-        residual = float(np.sqrt(np.mean(np.sum((points - design @ solution) ** 2, axis=1))))
-        return self.of_map(self.layout, Affine.from_parts(solution[:2].T, solution[2]), residual)
 
     def within(self, shape: tuple[int, int], margin: float) -> NDArray[np.int64]:
         """(a, b) of all micro-images centred at least ``margin`` pixels inside a recording, shape (n, 2).
@@ -203,11 +155,61 @@ class LensletGrid:
         return np.asarray(index[inside.all(axis=1)], dtype=np.int64)
 
 
+def grid_of(layout: str, pixel_from_steps: Affine, residual: float = 0.0) -> LensletGrid:
+    """The grid that a map from steps along the lattice to pixels makes.
+
+    Args:
+        layout: ``"square"`` or ``"hexagonal"``.
+        pixel_from_steps: from (a, b) to (x, y), pixels.
+        residual: of the centres that it was fitted to, pixels.
+    """
+    across, down = map(_pair, pixel_from_steps.linear.T)
+    return LensletGrid(layout, _pair(pixel_from_steps.offset), (across, down), residual)
+
+
+def fitted(layout: str, labels: Array, points: Array) -> LensletGrid:
+    """The grid that fits centres best, in the sense of least squares.
+
+    Args:
+        layout: ``"square"`` or ``"hexagonal"``.
+        labels: (a, b) of the micro-images, shape (n, 2).
+        points: (x, y) of their centres, pixels, shape (n, 2).
+
+    Raises:
+        InputError: they stand along one line.
+    """
+    design = np.column_stack([labels, np.ones(len(labels))])
+    solution, _, rank, _ = np.linalg.lstsq(design, points, rcond=None)
+    if rank < 3:
+        raise InputError("the centres of micro-images stand along one line: no lattice follows from them")
+    residual = float(np.sqrt(np.mean(np.sum((points - design @ solution) ** 2, axis=1))))
+    return grid_of(layout, Affine.from_parts(solution[:2].T, solution[2]), residual)
+
+
+def _fitted_outwards(grid: LensletGrid, points: Array) -> tuple[LensletGrid, int]:
+    """Fitted to points near the origin, then further out: an error of the steps grows with the distance."""
+    away = np.linalg.norm(points - grid.origin, axis=1)
+    radius, used = 3 * grid.pitch, 0
+    while True:
+        radius = min(2 * radius, float(away.max()) + 1)
+        near = points[away <= radius]
+        for _ in range(2):
+            index = grid.index_of(near)
+            label = np.rint(index)
+            good = np.abs(index - label).max(axis=1) < 0.25
+            if good.sum() < 6:
+                raise InputError(f"the centres do not stand on a {grid.layout} lattice")
+            grid = fitted(grid.layout, label[good], near[good])
+            used = int(good.sum())
+        if radius > away.max():
+            return grid, used
+
+
 def _pair(numbers: Array) -> Pair:
     return float(numbers[0]), float(numbers[1])
 
 
-def _looked_up(points: Array) -> Lattice:
+def _lattice_near(points: Array) -> Lattice:
     """The lattice that the nearest neighbours of points show, its cell (0, 0) at the point in their middle.
 
     Raises:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.image import Image
-from vcc.recover.lenslet_grid import LensletGrid
+from vcc.recover.lenslet_grid import LensletGrid, fitted, grid_of
 from vcc.recover.recorded import grey, has_mosaic, numbers_of
 from vcc.run.recording import Recording
 from vcc.shapes.lattice import Lattice
@@ -184,7 +184,7 @@ def _from_spectrum(light: Array) -> LensletGrid:
     origin = np.linalg.solve(frequencies, -np.array(phases) / (2 * np.pi))
     # Steps e and frequencies f are each other's reciprocals: e·f is 1 for one of the f and 0 for the other.
     layout, steps = _reduced(np.asarray(np.linalg.inv(frequencies).T, np.float64))
-    grid = LensletGrid.of_map(layout, Affine.from_parts(steps.T, origin))
+    grid = grid_of(layout, Affine.from_parts(steps.T, origin))
     middle = grid.nearest_to(((columns - 1) / 2, (rows - 1) / 2))
     return _moved_to(grid, _brightest(light, grid, middle))
 
@@ -300,11 +300,11 @@ def _fitted_once(light: Array, grid: LensletGrid, index: NDArray[np.int64]) -> L
     bright = mass > 0.1 * np.quantile(mass, 0.9)
     if bright.sum() < 9:
         raise InputError("fewer than 9 micro-images of the white image are bright enough to be fitted")
-    fitted = grid.fitted(index[bright].astype(float), places[bright])
-    off = np.linalg.norm(places - fitted.pixel_from_steps(index), axis=1)
+    found = fitted(grid.layout, index[bright].astype(float), places[bright])
+    off = np.linalg.norm(places - found.pixel_from_steps(index), axis=1)
     # Dust and dead pixels: beyond three times what most are off by.
     kept = bright & (off <= max(3 * float(np.median(off[bright])), 1e-6))
-    return grid.fitted(index[kept].astype(float), places[kept]) if kept.sum() >= 9 else fitted
+    return fitted(grid.layout, index[kept].astype(float), places[kept]) if kept.sum() >= 9 else found
 
 
 def _evenly_lit(light: Array, grid: LensletGrid, index: NDArray[np.int64]) -> Array:
