@@ -77,7 +77,7 @@ def reading(values: np.ndarray, kind: type = np.uint64) -> Step:
 
 def places(field: vcc.LightField, camera: vcc.Camera) -> tuple[np.ndarray, np.ndarray, float]:
     """Where sample (0, 0) of each view falls on the sensor, and the step: what the peers need to know."""
-    plan = camera.compile(field, between_views="none", refine=1, interpolation="linear")
+    plan = camera.compile(field, between_views="none", refine=1, interpolation="linear").core
     return plan.x, plan.y, plan.row_step
 
 
@@ -87,7 +87,7 @@ def with_opencv(field: vcc.LightField, camera: vcc.Camera, masked: bool) -> Step
 
     cv2.setNumThreads(THREADS)
     values = field.values
-    plan = camera.compile(field, between_views="none", refine=1, interpolation="linear")
+    plan = camera.compile(field, between_views="none", refine=1, interpolation="linear").core
     size = camera.sensor.shape[::-1]
 
     def run() -> np.ndarray:
@@ -250,7 +250,7 @@ def refinement() -> None:
         explained = camera.explain(field)
         taken = seconds(lambda c=camera: c.capture(field), 1)  # type: ignore[misc]
         foretold = explained.expected_seconds or float("nan")
-        plan = explained.plan
+        plan = explained.plan.core
         print(
             f"| {name} | {plan.taps_used} | {plan.refine}×{plan.refine} | {foretold:.3f} s | {taken:.3f} s "
             f"| {taken / foretold:.2f} |",

@@ -27,8 +27,8 @@ from scipy.ndimage import map_coordinates
 
 import vcc
 from vcc import kernels, patterns
-from vcc.engines import record
-from vcc.plan.rays.model import RayPlan
+from vcc.plan.rays.model import Rays
+from vcc.run.drive import drive
 from vcc.units import mm, um
 
 LENS = vcc.Lens(focal_length=50 * mm, diameter=20 * mm)
@@ -76,9 +76,9 @@ def seconds(step: Callable[[], object], runs: int) -> float:
     return statistics.median(times)
 
 
-def lookups_in_scipy(field: vcc.LightField, plan: RayPlan, threads: int, runs: int) -> float:
+def lookups_in_scipy(field: vcc.LightField, plan: Rays, threads: int, runs: int) -> float:
     """Seconds a ray of SciPy's linear 4-D lookups in three channels, places given; with so many threads."""
-    columns = plan.sensor_shape[1]
+    columns = plan.raster_shape[1]
     rows = np.arange(100, 120)  # some rows of pixels, as rays meet them
     pixel = (rows[:, None] * columns + np.arange(columns)).reshape(-1)
     pieces = []
@@ -106,16 +106,15 @@ def table(field: vcc.LightField, runs: int) -> None:
     for name, camera in cameras().items():
         plan = camera.compile(field, method="rays")
         foretold = camera.explain(field, method="rays").expected_seconds or float("nan")
-        rays = record(plan, field.values).rays
-        taken = seconds(lambda p=plan: record(p, field.values), runs)  # type: ignore[misc]
-        ours = ours or (taken / rays, plan)
+        rays = drive(plan, field).rays
+        taken = seconds(lambda p=plan: drive(p, field), runs)  # type: ignore[misc]
+        ours = ours or (taken / rays, plan.core)
         print(
             f"| {name} | {rays / 1e6:.1f} million | {taken:.2f} s | {rays / taken / 1e6:.1f} | {foretold:.2f} s |",
             flush=True,
         )
     assert ours is not None
     per_ray, plan = ours
-    assert isinstance(plan, RayPlan)
     print(
         "\n| the lookups alone, places given, `scipy.ndimage.map_coordinates(order=1)` | million rays a second |"
     )
@@ -130,7 +129,6 @@ _CHILD = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
 import rays as bench
-from vcc.engines import record
 def peak():
     with open("/proc/self/status") as status:  # Linux; counts from the start of this very process
         return next(int(line.split()[1]) / 1024 for line in status if line.startswith("VmHWM"))

@@ -13,6 +13,8 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
 
+from vcc.cli.app import COMMANDS, RENDERERS, app
+
 ROOT = Path(__file__).parents[1]
 ELSEWHERE = "repository"
 """The site's folder for files of the repository that pages link to."""
@@ -100,13 +102,13 @@ def _without_code(text: str) -> str:
 
 
 def _command_line() -> str:
-    """Help on every command, as Markdown by typer itself."""
-    from typer import Context
-    from typer.cli import get_docs_for_click
-    from typer.main import get_command
-
-    from vcc.cli.commands import app
-
-    command = get_command(app)
-    text = get_docs_for_click(obj=command, ctx=Context(command, info_name="vcc"), name="vcc")
-    return text.partition("\n")[2]  # the page has a title
+    """Help on every command, as Markdown by cyclopts itself, with the examples that it leaves out."""
+    text = app.generate_docs(output_format="markdown")
+    contents, commands = text.index("## Table of Contents"), text.index("**Commands**")  # the site has its own
+    text = text[text.index("\n") : contents] + text[commands:]  # and the page its title
+    for group, listed in (("vcc", COMMANDS), ("vcc synth", RENDERERS)):
+        for name, (_, *examples) in listed.items():
+            usage = re.compile(rf"```console\n{group} {name}[ \n].*?```\n", re.DOTALL)
+            shown = "\nFor example:\n\n```\n" + "\n".join(examples) + "\n```\n"
+            text = usage.sub(lambda found, shown=shown: found[0] + shown, text, count=1)
+    return text

@@ -12,7 +12,6 @@ import torch
 import vcc
 from vcc import Affine, LightField
 from vcc.base.units import mm
-
 from vcc.shapes.kernels import Gaussian
 
 FRAME = Affine.scaling(1e-3, 1e-3, -1e-3, -1e-3)

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from vcc.optics import Pyramid as Pyramid
     from vcc.optics.electronics import Electronics as Electronics
     from vcc.optics.sensor import Sensor as Sensor
+    from vcc.plan.how import How as How
     from vcc.prescriptions import load_lens as load_lens
     from vcc.run.recording import Recording as Recording
     from vcc.run.recording import expose_image as expose_image
@@ -51,6 +52,7 @@ _HOMES = {
     "Element": "vcc.optics",
     "Faces": "vcc.optics",
     "FirstOrder": "vcc.optics",
+    "How": "vcc.plan.how",
     "Image": "vcc.image",
     "InputError": "vcc.base.errors",
     "Lens": "vcc.optics",

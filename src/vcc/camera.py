@@ -41,16 +41,27 @@ class Camera(Train):
         InputError: an element before the entrance plane or behind the sensor, two elements of one name.
     """
 
-    def compile(self, light_field: Samples, how: How | None = None, **options: Unpack[Options]) -> Plan:
+    def compile(
+        self,
+        light_field: Samples,
+        how: How | None = None,
+        *,
+        progress: Progress | None = None,
+        **options: Unpack[Options],
+    ) -> Plan:
         """The plan by which an engine makes the picture; `capture` does this for you.
 
         Args:
             light_field: as in `capture`; its samples are looked at only to measure their disparities.
             how: as in `capture`.
+            progress: called with (done, total) while disparities are found, where they are needed.
             options: as in `capture`.
         """
         light_field.check_complete()
-        return compile_best(self, light_field.grid, How.of(how, options))
+        chosen = How.of(how, options)
+        if chosen.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
+            light_field.grid.disparities.maps(progress)  # found now, so that progress is seen
+        return compile_best(self, light_field.grid, chosen)
 
     def capture(
         self,
@@ -89,9 +100,7 @@ class Camera(Train):
         """
         chosen = How.of(how, options)
         if plan is None:
-            if chosen.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
-                light_field.grid.disparities.maps(progress)  # found now, so that progress is seen
-            plan = self.compile(light_field, chosen)
+            plan = self.compile(light_field, chosen, progress=progress)
         else:
             plan.check_fits(self.sensor.shape, light_field.grid)
         for caution in plan.cautions:
@@ -169,9 +178,7 @@ class Camera(Train):
             options: as in `capture`.
         """
         chosen = How.of(how, options)
-        if chosen.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
-            light_field.grid.disparities.maps(progress)
-        return explained(self, light_field, self.compile(light_field, chosen), chosen)
+        return explained(self, light_field, self.compile(light_field, chosen, progress=progress), chosen)
 
     def light_field_at(
         self,

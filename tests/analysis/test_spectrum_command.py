@@ -3,10 +3,9 @@
 import imagecodecs
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import vcc
-from vcc.cli.commands import app
+from command_line import run as run_command
 from vcc.store import save_store
 
 
@@ -18,7 +17,7 @@ def store(tmp_path):
 
 
 def run(*arguments):
-    result = CliRunner().invoke(app, ["spectrum", *map(str, arguments)])
+    result = run_command("spectrum", *arguments)
     assert "Traceback" not in result.output
     return result
 

@@ -1,17 +1,13 @@
-"""Imports run one way, and importing is cheap. The oracle is the source itself, read with `ast`.
+"""Imports run one way and in no circle, and importing is cheap. The oracle is the source, read with `ast`.
 
-Layers, lowest first; a module may import from its own layer and from those below::
-
-    errors < units, memory < describe, electronics < affine < sampled, disparity < light_field, image, sensor
-    < patterns, kernels, surfaces < sheets < optics < camera < plan < engines < operators, formats, sources,
-    parallax, plot, cli, demo, ...
-
-Imports inside functions that go up are allowed only from the list below, each with its reason.
+Every import of ours counts: those inside functions, those for types, and modules that strings name to load them by
+name. A room is a folder of src/vcc, or a file beside the folders; it may import from rooms before it in `ROOMS`.
 """
 
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -22,37 +18,48 @@ import vcc
 
 ROOT = Path(vcc.__file__).parent
 
-LAYERS: list[set[str]] = [
-    {"errors"},
-    {"units", "memory"},
-    {"describe", "electronics"},
-    {"affine"},
-    {"sampled", "disparity"},
-    {"light_field", "image", "sensor"},
-    {"patterns", "kernels", "surfaces"},
-    {"sheets"},
-    {"optics"},
-    {"camera"},
-    {"plan"},
-    {"engines"},
+ROOMS = [
+    "base",
+    "shapes",
+    "fields",
+    "optics",
+    "plan",
+    "engines",
+    "run",
+    "files",
+    "advice",
+    "plot",
+    "image",
+    "camera",
+    "light_field",
+    "store",
+    "prescriptions",
+    "formats",
+    "sources",
+    "analysis",
+    "recover",
+    "showcase",
+    "gallery",
+    "demo",
+    "cli",
 ]
-TOP = len(LAYERS)
-"""The layer of everything that is not listed: what is built on the core."""
+"""From the ground up: data and what is computed of it, the facades, and what is built on them."""
 
-ALLOWED_UP = {
-    ("light_field", "operators"): "the paper's operators are methods of a light field; their work is elsewhere",
-    ("light_field", "parallax"): "disparity is measured from the samples when first asked for",
-    ("light_field", "recover"): "maps of disparity are found from the samples when first asked for",
-    ("image", "formats"): "image.save(path) writes through the formats",
-    ("camera", "plan"): "camera.compile and explain make the plan",
-    ("camera", "engines"): "camera.capture runs the plan",
-    ("plan", "engines"): "explain foretells an engine's memory and times a small run of it",
-    ("camera", "operators"): "camera.light_field_at masks on the way",
-    ("camera", "plot"): "camera.plot draws",
-    ("camera", "camera_file"): "camera.save writes a camera file",
-    ("camera", "recording"): "camera.expose records what capture gives",
+FACADES = {"image", "camera", "light_field"}
+"""The classes that users meet: verbs on data below. Nothing before them in `ROOMS` knows of them."""
+
+FACES = {"affine", "camera_file", "errors", "kernels", "operators", "patterns", "surfaces", "units"}
+"""Modules by which users import what stands in a folder: nothing of ours imports them."""
+
+BY_NAME = {
+    "": "names of `vcc` are loaded when they are first used",
+    "engines": "an engine is loaded when it is first used: Numba takes a second",
+    "run.drive": "views in between need Numba",
+    "cli": "a command is loaded when it is called",
+    "gallery.listing": "an entry is loaded when it is asked for",
+    "showcase.listing": "an entry is loaded when it is asked for",
 }
-"""(from, to): why, for imports inside functions."""
+"""Modules that load others by names in strings, and why."""
 
 NEVER = {"torch", "jax", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""
@@ -61,7 +68,8 @@ LATE = {
     "numba",
     "scipy",
     "matplotlib",
-    "typer",
+    "PIL",
+    "mpl_toolkits",
     "rich",
     "pint",
     "tifffile",
@@ -72,11 +80,14 @@ LATE = {
     "zarr",
     "h5py",
     "mitsuba",
+    "drjit",
     "moderngl",
     "trimesh",
     "av",
+    "jinja2",
+    "cyclopts",
 }
-"""Not loaded by making a camera."""
+"""Libraries that take long to load, or need not be there: these may be imported inside functions."""
 
 
 def modules() -> dict[str, Path]:
@@ -89,24 +100,21 @@ def modules() -> dict[str, Path]:
 
 
 MODULES = modules()
+INSIDE = [module for module in MODULES if module and not module.endswith("__main__")]
 
 
-def unit(module: str) -> str:
+def room(module: str) -> str:
     """The file or folder of src/vcc that a module belongs to."""
     return module.split(".")[0]
 
 
-def layer(module: str) -> int:
-    return next((n for n, names in enumerate(LAYERS) if unit(module) in names), TOP)
-
-
-def imports(path: Path) -> list[tuple[str, bool, bool]]:
-    """(module, late, for types only) of each import: late is inside a function."""
+def imports(path: Path) -> list[tuple[str, bool]]:
+    """(full name, inside a function) of each import, those for types included."""
     found = []
 
-    def visit(node: ast.AST, late: bool, typing: bool) -> None:
+    def visit(node: ast.AST, late: bool) -> None:
         if isinstance(node, ast.Import):
-            found.extend((alias.name, late, typing) for alias in node.names)
+            found.extend((alias.name, late) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path} imports relatively"
             base = node.module or ""
@@ -114,18 +122,23 @@ def imports(path: Path) -> list[tuple[str, bool, bool]]:
                 # `from vcc.engines import numba_kernels` imports a module
                 full = f"{base}.{alias.name}"
                 is_module = base.split(".")[0] == "vcc" and full.removeprefix("vcc.") in MODULES
-                found.append((full if is_module else base, late, typing))
+                found.append((full if is_module else base, late))
         inside = late or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-        if isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING"):
-            for child in node.body:
-                visit(child, inside, True)
-            for child in node.orelse:
-                visit(child, inside, typing)
-            return
         for child in ast.iter_child_nodes(node):
-            visit(child, inside, typing)
+            visit(child, inside)
 
-    visit(ast.parse(path.read_text(encoding="utf-8")), False, False)
+    visit(ast.parse(path.read_text(encoding="utf-8")), False)
+    return found
+
+
+def named(path: Path) -> set[str]:
+    """Modules of ours that strings name to load them: "vcc.engines.numba_cpu", or "vcc.cli.capture:capture"."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            match = re.fullmatch(r"vcc\.([\w.]+)(:\w+)?", node.value)
+            if match and match[1] in MODULES:
+                found.add(match[1])
     return found
 
 
@@ -134,63 +147,72 @@ def own(name: str) -> str | None:
     return name.removeprefix("vcc").lstrip(".") if name.split(".")[0] == "vcc" else None
 
 
+def graph() -> dict[str, set[str]]:
+    """Module → modules of ours that it imports, late, for types or by name; but for vcc's own lists of names."""
+    found = {}
+    for module in INSIDE:
+        listed = {target for name, _ in imports(MODULES[module]) if (target := own(name))}
+        by_name = named(MODULES[module]) if module in BY_NAME else set()
+        found[module] = {target for target in listed | by_name if target in MODULES and target != module}
+    return found
+
+
+GRAPH = graph()
+
+
 def test_there_is_something_to_read():
-    assert {"affine", "camera", "optics.lens", "plan.compiler", "engines.numba_cpu"} <= set(MODULES)
-    assert ("vcc.errors", False, False) in imports(MODULES["affine"])
-    assert all(any(unit(m) in names for m in MODULES) for names in LAYERS)
+    assert {"base.affine", "camera", "optics.lens", "plan.choice", "engines.numba_cpu"} <= set(MODULES)
+    assert ("vcc.base.errors", False) in imports(MODULES["base.affine"])
+    assert GRAPH["plan.choice"] >= {"optics.train", "plan.how"}
+    assert {room(module) for module in INSIDE} - FACES == set(ROOMS)
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m])
-def test_imports_run_downwards(module):
-    wrong = []
-    for name, late, typing in imports(MODULES[module]):
-        target = own(name)
-        if not target or typing or unit(target) == unit(module) or layer(target) < layer(module):
-            continue
-        if layer(target) == layer(module) == TOP:
-            continue  # what is built on the core may use each other, without circles (below)
-        if late and (layer(target) == layer(module) or (unit(module), unit(target)) in ALLOWED_UP):
-            continue
-        wrong.append(f"{name}{' (late)' if late else ''}")
-    assert not wrong, f"vcc.{module} imports upwards: {', '.join(wrong)}"
+@pytest.mark.parametrize("module", [module for module in INSIDE if module not in FACES])
+def test_imports_run_one_way(module):
+    here = ROOMS.index(room(module))
+    for target in GRAPH[module]:
+        assert target not in FACES, f"vcc.{module} imports vcc.{target}, which is there for users"
+        assert target, f"vcc.{module} imports vcc itself"
+        assert ROOMS.index(room(target)) <= here, f"vcc.{module} imports vcc.{target}, which stands above it"
 
 
-def test_every_allowed_import_upwards_is_still_there():
-    used = {
-        (unit(module), unit(own(name) or ""))
-        for module, path in MODULES.items()
-        for name, late, typing in imports(path)
-        if late and not typing and own(name)
-    }
-    assert set(ALLOWED_UP) <= used, f"no longer needed: {set(ALLOWED_UP) - used}"
+def test_below_the_facades_nothing_knows_of_them():
+    first = min(ROOMS.index(facade) for facade in FACADES)
+    for module in INSIDE:
+        if module not in FACES and ROOMS.index(room(module)) < first:
+            assert not FACADES & {room(target) for target in GRAPH[module]}, module
 
 
-def test_no_circles_at_import_time():
-    graph = {
-        module: {
-            target
-            for name, late, typing in imports(path)
-            if not late and not typing and (target := own(name)) and target != module
-        }
-        for module, path in MODULES.items()
-    }
+def test_no_file_imports_itself_by_way_of_others():
     done: set[str] = set()
 
     def visit(module: str, path: tuple[str, ...]) -> None:
-        assert module not in path, f"a circle of imports: {' → '.join((*path, module))}"
+        assert module not in path, f"a circle of imports: {' → '.join((*path[path.index(module) :], module))}"
         if module in done:
             return
-        for target in graph.get(module, ()):
+        for target in sorted(GRAPH.get(module, ())):
             visit(target, (*path, module))
         done.add(module)
 
-    for module in graph:
+    for module in GRAPH:
         visit(module, ())
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m])
+@pytest.mark.parametrize("module", INSIDE)
+def test_imports_inside_functions_are_of_heavy_libraries(module):
+    late = {name for name, inside in imports(MODULES[module]) if inside}
+    assert {name.split(".")[0] for name in late} <= LATE, f"vcc.{module}: {sorted(late)}"
+
+
+def test_only_those_listed_load_modules_by_name():
+    for module, path in MODULES.items():
+        if "import_module" in path.read_text(encoding="utf-8"):
+            assert module in BY_NAME, f"vcc.{module} loads modules by name"
+
+
+@pytest.mark.parametrize("module", INSIDE)
 def test_heavy_libraries_are_never_imported(module):
-    heavy = {name.split(".")[0] for name, _, _ in imports(MODULES[module])} & NEVER
+    heavy = {name.split(".")[0] for name, _ in imports(MODULES[module])} & NEVER
     assert not heavy
 
 

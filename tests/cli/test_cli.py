@@ -1,5 +1,7 @@
 """The command line: what it writes and says, its exit codes, and that asking for help is quick."""
 
+import dataclasses
+import importlib
 import subprocess
 import sys
 import warnings
@@ -10,7 +12,9 @@ import pytest
 
 import vcc
 from command_line import KNOWN, refused, run, write_views
+from vcc.cli.app import COMMANDS, RENDERERS
 from vcc.cli.console import as_options
+from vcc.plan.how import How
 
 CAMERA = """
 [[elements]]
@@ -68,9 +72,9 @@ def test_capture_takes_all_options(folder):
 
 
 def test_progress_is_asked_for_where_work_is_long(folder, monkeypatch):
-    from vcc.cli import commands
+    from vcc.cli import camera_verbs
 
-    monkeypatch.setattr(commands, "SAMPLES_WORTH_A_BAR", 0)
+    monkeypatch.setattr(camera_verbs, "SAMPLES_WORTH_A_BAR", 0)
     assert run("capture", "camera.toml", "views", "-o", "picture.npy", *KNOWN).exit_code == 0
 
 
@@ -130,32 +134,69 @@ def test_demo_is_called_with_a_folder_that_is_there(folder, monkeypatch):
     assert "cannot be used as a folder" in refused("demo", "--output", "file")
 
 
-def test_errors_name_what_is_wrong(folder):
-    capture = ["capture", "camera.toml", "views"]
-    assert 'Error: "p.jpg" cannot be written' in refused(*capture, "-o", "p.jpg")
-    assert "there is no folder lost" in refused(*capture, "-o", "lost/p.png")
-    (folder / "p.png").mkdir()
-    assert "is a folder" in refused(*capture, "-o", "p.png")
-    assert "there is no camera file" in refused("capture", "lost.toml", "views", "-o", "p.npy")
-    assert "there is no folder" in refused("capture", "camera.toml", "lost", "-o", "p.npy")
-    assert "--exposure is" in refused(*capture, "-o", "a.png", "--exposure", "bright")
-    assert "--exposure is" in refused(*capture, "-o", "a.png", "--exposure", "0")
-    message = refused(*capture, "-o", "a.png", "--scene-distance", "1.2")
-    assert '--scene-distance is "1.2": a length needs a unit' in message
-    assert "--spacing is" in refused(*capture, "-o", "a.png", "--spacing", "1 mm, 1 mm, 1 mm")
-    assert "--spacing is" in refused(*capture, "-o", "a.png", "--spacing", "1")
-    assert "--phase-space" in refused("plot", "camera.toml", "--phase-space")
-    assert "--slice" in refused("plot", "camera.toml", "--slice", "uv")
-    assert "object distance" in refused("plot", "camera.toml", "--object-distance", "0 m")
-    (folder / "camera.toml").write_text(CAMERA.replace('"1 mm"', "1"))
-    message = refused("plot", "camera.toml")
-    assert "camera.toml: sensor: pitch is 1: a length needs a unit" in message
+CAPTURE = "capture", "camera.toml", "views"
 
 
-def test_faulty_usage_exits_with_2(folder):
-    assert "Missing option" in refused("capture", "camera.toml", "views")
-    refused("capture", "camera.toml", "views", "-o", "a.png", "--interpolation", "fine")
-    refused("nonsense")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((*CAPTURE, "-o", "p.jpg"), 'Error: "p.jpg" cannot be written'),
+        ((*CAPTURE, "-o", "lost/p.png"), "there is no folder lost"),
+        ((*CAPTURE, "-o", "folder.png"), "is a folder"),
+        (("capture", "lost.toml", "views", "-o", "p.npy"), "there is no camera file"),
+        (("capture", "camera.toml", "lost", "-o", "p.npy"), "there is no folder"),
+        ((*CAPTURE, "-o", "a.png", "--exposure", "bright"), "--exposure is"),
+        ((*CAPTURE, "-o", "a.png", "--exposure", "0"), "--exposure is"),
+        ((*CAPTURE, "-o", "a.png", "--scene-distance", "1.2"), '--scene-distance is "1.2": a length needs a unit'),
+        ((*CAPTURE, "-o", "a.png", "--scene-distance", "-1 m"), "greater than 0 m, not -1"),
+        ((*CAPTURE, "-o", "a.png", "--spacing", "1 mm, 1 mm, 1 mm"), "--spacing is"),
+        ((*CAPTURE, "-o", "a.png", "--spacing", "1"), "--spacing is"),
+        ((*CAPTURE, "-o", "a.png", "--refine", "2.5"), '--refine is "2.5": it is a whole number, like 3, or auto'),
+        ((*CAPTURE, "-o", "a.png", "--samples", "1"), "samples is a whole number of rays a pixel from 2"),
+        ((*CAPTURE, "-o", "a.png", "--threads", "0"), "threads is a whole number, 1 or more"),
+        ((*CAPTURE, "-o", "a.png", "--memory-limit", "much"), "a size has a number and a unit"),
+        (("plot", "camera.toml", "--phase-space"), "--phase-space"),
+        (("plot", "camera.toml", "--slice", "uv"), "--slice"),
+        (("plot", "camera.toml", "--object-distance", "0 m"), "object distance"),
+        (("plot", "camera.toml", "--object-distance", "1"), '--object-distance is "1": a length needs a unit'),
+        (("plot", "unitless.toml"), "unitless.toml: sensor: pitch is 1: a length needs a unit"),
+        (CAPTURE, "Missing option --output / -o"),
+        (("capture",), "Missing argument CAMERA"),
+        ((*CAPTURE, "and", "more", "-o", "a.png"), "Unexpected and more"),
+        ((*CAPTURE, "-o", "a.png", "--interpolation", "shrap"), 'Did you mean "sharp"?'),
+        ((*CAPTURE, "-o", "a.png", "--interpolaton", "sharp"), "Did you mean --interpolation?"),
+        (("captur",), 'There is no command "captur": did you mean capture?'),
+        (("nonsense",), "there are capture, expose, explain, info, plot"),
+        (("synth", "nonsense"), "there are mitsuba, demo, planes"),
+    ],
+)
+def test_errors_name_what_is_wrong(folder, arguments, words):
+    (folder / "folder.png").mkdir()
+    (folder / "unitless.toml").write_text(CAMERA.replace('"1 mm"', "1"))
+    assert words in refused(*arguments)
+
+
+def test_the_way_to_help_is_named():
+    assert refused("capture").endswith("Help:  vcc capture --help\n")
+    assert refused("synth", "planes").endswith("Help:  vcc synth planes --help\n")
+
+
+def test_options_given_twice(folder):
+    """The last one counts; distances to draw are all drawn: a ray's colour for each."""
+    result = run("plot", "camera.toml", "-o", "one.svg", "-o", "other.svg", "--object-distance", "1.2 m")
+    assert result.stdout == "other.svg: written\n"
+    run("plot", "camera.toml", "-o", "two.svg", "--object-distance", "1.2 m", "--object-distance", "3 m")
+    one, two = ((folder / name).read_text() for name in ("other.svg", "two.svg"))
+    assert two.count("stroke:") > one.count("stroke:")
+
+
+def test_a_reader_who_has_seen_enough_is_no_fault(folder):
+    command = [sys.executable, "-m", "vcc", "plot", "camera.toml", "-o", "side.svg"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        running.stdout.close()
+        assert running.wait() == 1
+        assert not running.stderr.read()
+    assert (folder / "side.svg").exists()
 
 
 def test_faults_of_the_program_exit_with_1_and_a_traceback(tmp_path):
@@ -178,25 +219,70 @@ def test_as_a_module():
         assert result.stdout.strip() == f"vcc {vcc.__version__}"
 
 
-@pytest.mark.parametrize("command", ["", "capture", "explain", "info", "plot", "demo"])
+LISTED = [("", COMMANDS), ("synth ", RENDERERS)]
+EVERY = [f"{group}{name}" for group, commands in LISTED for name in commands]
+
+
+@pytest.mark.parametrize("command", EVERY)
 def test_help_teaches(command):
     result = run(*command.split(), "--help")
     assert result.exit_code == 0
-    assert "Example:" in result.stdout or not command
+    assert "Example:" in result.stdout
     if command == "capture":
         assert "1.2 m" in result.stdout
 
 
-def test_help_loads_nothing_heavy():
+def test_help_on_making_a_picture_is_that_of_the_record_in_words_for_people():
+    said = " ".join(run("capture", "--help").stdout.replace("│", "").split())
+    for field in dataclasses.fields(How):
+        option = "--ray-seed" if field.name == "seed" else f"--{field.name.replace('_', '-')}"
+        assert f"{option} " in said
+    assert "--samples NUMBER Rays a pixel, rounded up to a power of two" in said
+    assert "Default: 64." in said
+    assert "None" not in said
+    assert "``" not in said
+
+
+@pytest.mark.parametrize("command", EVERY)
+def test_the_list_of_commands_says_what_the_commands_say(command):
+    *group, name = command.split()
+    words = (RENDERERS if group else COMMANDS)[name][0]
+    function = name.replace("-", "_")
+    documented = getattr(importlib.import_module(".".join(["vcc.cli", *group, function])), function).__doc__
+    assert documented.splitlines()[0] == words.split("\n\n")[0]
+
+
+def loaded_by(*arguments):
+    """What packages a command loads."""
     code = (
-        "import sys; from vcc.cli import main; sys.argv = ['vcc', '--help']\n"
-        "try: main()\n"
-        "except SystemExit: pass\n"
-        "print(*({'numpy', 'numba', 'scipy', 'matplotlib', 'pint', 'imagecodecs'} "
-        "& set(sys.modules)), 'are loaded')"
+        "import sys; from vcc.cli.app import run\n"
+        "run(sys.argv[1:])\n"
+        "print(*{name.partition('.')[0] for name in sys.modules})"
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.splitlines()[-1].strip() == "are loaded"
+    command = [sys.executable, "-c", code, *arguments]
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    return set(result.stdout.splitlines()[-1].split())
+
+
+HEAVY = {
+    "numba",
+    "scipy",
+    "matplotlib",
+    "pint",
+    "imagecodecs",
+    "zarr",
+    "tifffile",
+    "mitsuba",
+    "moderngl",
+    "trimesh",
+}
+
+
+@pytest.mark.parametrize("command", ["", "capture", "decode", "synth mitsuba"])
+def test_help_loads_nothing_heavy(command):
+    loaded = loaded_by(*command.split(), "--help")
+    assert not loaded & HEAVY
+    assert command or "numpy" not in loaded
 
 
 def test_messages_speak_of_options():

@@ -74,6 +74,7 @@ def test_a_camera_without_electronics_is_refused_before_the_light_field_is_read(
         (["--exposure", "10 mm"], "--exposure"),
         (["--exposure", "0 ms"], "above 0"),
         (["--seed", "-1"], "seed is -1"),
+        (["--seed", "1.5"], '--seed is "1.5": it is a whole number'),
         (["--radiance", "0"], "radiance is 0"),
         (["-o", "raw.exr"], ".tif, .tiff, .png, .npy"),
         (["--picture", "raw.gif"], ".png"),
@@ -82,7 +83,3 @@ def test_a_camera_without_electronics_is_refused_before_the_light_field_is_read(
 def test_bad_options_are_refused(arguments, message):
     output = [] if "-o" in arguments else ["-o", "raw.tif"]
     assert message in refused("expose", "camera.toml", "views", *output, *KNOWN, *arguments)
-
-
-def test_seeds_that_are_not_whole_numbers_are_no_options():
-    assert run("expose", "camera.toml", "views", "-o", "raw.tif", "--seed", "1.5").exit_code == 2

@@ -7,17 +7,17 @@ from dataclasses import replace
 import imagecodecs
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import vcc
-from vcc.cli import info
-from vcc.cli.commands import app
+from command_line import run as run_command
+from vcc.cli.brightness import brightness, histogram
+from vcc.cli.view_grid import grid_figure
 from vcc.files import transfer
 from vcc.formats.writing import save_light_field
 
 
 def run(*arguments):
-    result = CliRunner().invoke(app, ["info", *map(str, arguments)])
+    result = run_command("info", *arguments)
     assert "Traceback" not in result.output
     return result
 
@@ -92,7 +92,7 @@ def test_a_complete_row_is_enough_to_measure(folder):
 def test_the_picture_shows_each_view_in_its_place(tmp_path):
     """Views of one brightness each: what is drawn grows brighter from view to view, and one is missing."""
     shades = np.linspace(0.2, 1, 12).reshape(3, 4)
-    drawn = info.grid_figure(
+    drawn = grid_figure(
         lambda place: None if place == (1, 2) else np.full((20, 30), shades[place], np.float32),
         (3, 4),
         vcc.LightField.from_views(np.zeros((3, 4, 20, 30), np.float32), (2e-3, 1e-3), 0.01).frame,
@@ -130,12 +130,12 @@ def test_views_of_any_size_and_kind_are_drawn(size):
     for kind, channels in ((np.uint8, 3), (np.uint16, None), (np.float16, 5)):
         view = np.full(size if channels is None else (*size, channels), 3).astype(kind)
         frame = vcc.LightField.from_views(np.zeros((1, 1, 2, 2), np.uint8), 1e-3, 0.01).frame
-        drawn = info.grid_figure(lambda place, view=view: view, (1, 1), frame, "linear")
+        drawn = grid_figure(lambda place, view=view: view, (1, 1), frame, "linear")
         height, width = drawn.axes[0].images[0].get_array().shape[:2]
         assert height <= 260
         assert height / width == pytest.approx(size[0] / size[1], rel=0.02)
     with pytest.raises(vcc.InputError, match="no view to draw"):
-        info.grid_figure(lambda place: None, (1, 1), frame)
+        grid_figure(lambda place: None, (1, 1), frame)
 
 
 @pytest.mark.parametrize(
@@ -154,14 +154,13 @@ def test_views_of_any_size_and_kind_are_drawn(size):
     ],
 )
 def test_brightness(views, curve, words):
-    assert re.match(words, info._brightness(views, curve))
+    assert re.match(words, brightness(views, curve))
 
 
-def test_many_samples_are_thinned(monkeypatch):
-    monkeypatch.setattr(info, "_MOST_SAMPLES", 1000)
+def test_many_samples_are_thinned():
     rng = np.random.default_rng(1)
     views = [rng.uniform(1, 2, (40, 50)).astype(np.float32) for _ in range(10)]
-    levels, counts = info._histogram(views, "linear")
+    levels, counts = histogram(views, "linear", most=1000)
     assert 400 < counts.sum() <= 1000
     # Uniform between 1 and 2: the mean of 400 or more is right within 5 of its deviations, 0.289/√400.
     assert (levels * counts).sum() / counts.sum() == pytest.approx(1.5, abs=5 * 0.289 / 20)

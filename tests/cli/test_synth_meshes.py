@@ -5,25 +5,13 @@ import ast
 import imagecodecs
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import vcc
+from command_line import refused, run
 from vcc.base.units import deg, mm
-from vcc.cli.commands import app
 from vcc.sources import CameraArray
 
 SMALL = ("--views", 2, 3)
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-
-def refused(*arguments):
-    """What is said of bad input."""
-    result = run(*arguments)
-    assert result.exit_code == 2, result.output
-    return result.output
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ import torch
 import vcc
 from vcc import Affine
 from vcc.base.units import mm
+from vcc.plan.operators import SwapPixelAxes
 from vcc.shapes.patterns import CosineSum
 
 # Cameras here ask for what they like.
@@ -168,7 +169,7 @@ def turned(lf: vcc.LightField, angle: float) -> vcc.LightField:
 def test_rolled_frames(name, angle, interpolation):
     lf = turned(field(samples()), angle)
     camera = CAMERAS[name]
-    assert not camera.compile(lf).separable
+    assert not camera.compile(lf).core.separable
     assert_engines_agree(camera, lf, ("numpy", "torch"), interpolation=interpolation)
 
 
@@ -186,7 +187,7 @@ def test_rolled_frames_on_every_library(library):
 def test_frames_rolled_by_a_right_angle_swap_the_pixel_axes(name):
     lf = turned(field(samples()), np.pi / 2)
     camera = CAMERAS[name]
-    assert camera.compile(lf).swap_pixel_axes
+    assert SwapPixelAxes() in camera.compile(lf).before
     assert_engines_agree(camera, lf)
 
 
@@ -222,7 +223,7 @@ def test_divided_views():
     stop = vcc.Mask(pattern=board, width=9 * mm)
     camera = vcc.Camera([vcc.Lens(focal_length=50 * mm), stop], vcc.Sensor(44 * mm, (14, 15), 90e-6))
     lf = field(samples())
-    assert len(camera.compile(lf).view_rows) > SHAPE[0]
+    assert len(camera.compile(lf).core.view_rows) > SHAPE[0]
     assert_engines_agree(camera, lf)
 
 

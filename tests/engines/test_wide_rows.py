@@ -16,10 +16,13 @@ import pytest
 
 import vcc
 from vcc.base.units import mm
-from vcc.engines import run_plan
-from vcc.engines.smear import band_matrix
-from vcc.plan.footprints.model import MaskLookup, Plan
+from vcc.fields.samples import InMemory
+from vcc.plan.footprints.model import MaskLookup
 from vcc.plan.footprints.shares import shares
+from vcc.plan.how import How
+from vcc.plan.model import Plan
+from vcc.plan.operators import AlongAxes, OnSensor
+from vcc.run.drive import drive
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
@@ -48,35 +51,57 @@ def looked_up(mask: MaskLookup, b: int, a: int, k: np.ndarray, l: np.ndarray) ->
     return np.einsum("rl,ck,rc->lk", down, across, mask.texture.astype(float), optimize=True)
 
 
+def filters(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
+    """Weights down and across by which the raster is filtered."""
+    return next(((one.down, one.across) for one in plan.after if isinstance(one, AlongAxes)), (np.ones(1),) * 2)
+
+
+def band_matrix(weights: np.ndarray, pixels: int, guard: int) -> np.ndarray:
+    """An odd number of weights as a matrix from raster to sensor pixels along one axis, guard cut off."""
+    matrix = np.zeros((pixels, pixels + 2 * guard))
+    for shift, weight in zip(range(-(len(weights) // 2), len(weights) // 2 + 1), weights, strict=True):
+        for here in range(pixels):
+            if 0 <= here + guard - shift < pixels + 2 * guard:
+                matrix[here, here + guard - shift] += weight
+    return matrix
+
+
 def expected(plan: Plan, values: np.ndarray) -> np.ndarray:
     """The picture of a plan whose rows and columns part and whose samples are not divided, by matrices."""
-    nt, ns = plan.samples
+    core = plan.core
+    nt, ns = core.samples
     samples = values.reshape(*values.shape[:2], nt, ns, -1).astype(float)
     k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
-    row, column = (np.arange(n, dtype=float)[:, None] for n in plan.raster_shape)
-    raster = np.zeros((*plan.raster_shape, samples.shape[-1]))
-    for b, a in zip(*np.nonzero(plan.weights), strict=True):
-        down = shares(plan.interpolation, row, plan.y[b, a] + plan.row_step * l, plan.row_step)
-        across = shares(plan.interpolation, column, plan.x[b, a] + plan.column_step * k, plan.column_step)
-        weight = plan.weights[b, a] * np.ones((nt, ns))
-        for mask in plan.masks:
+    row, column = (np.arange(n, dtype=float)[:, None] for n in core.raster_shape)
+    raster = np.zeros((*core.raster_shape, samples.shape[-1]))
+    for b, a in zip(*np.nonzero(core.weights), strict=True):
+        down = shares(core.interpolation, row, core.y[b, a] + core.row_step * l, core.row_step)
+        across = shares(core.interpolation, column, core.x[b, a] + core.column_step * k, core.column_step)
+        weight = core.weights[b, a] * np.ones((nt, ns))
+        for mask in core.masks:
             weight = weight * looked_up(mask, b, a, k, l)
-        view = samples[plan.view_rows[b], plan.view_columns[a]] * weight[..., None]
+        view = samples[core.view_rows[b], core.view_columns[a]] * weight[..., None]
         raster += np.einsum("yl,xk,lkc->yxc", down, across, view, optimize=True)
-    filters = (np.ones(1), np.ones(1)) if plan.sharpen is None else plan.sharpen
-    down, across = (band_matrix(w, n, plan.guard) for w, n in zip(filters, plan.sensor_shape, strict=True))
-    picture = plan.scale * np.einsum("py,qx,yxc->pqc", down, across, raster, optimize=True)
+    guard = (core.raster_shape[0] - plan.sensor_shape[0]) // 2
+    down, across = (band_matrix(w, n, guard) for w, n in zip(filters(plan), plan.sensor_shape, strict=True))
+    picture = core.scale * np.einsum("py,qx,yxc->pqc", down, across, raster, optimize=True)
     return picture.reshape(*plan.sensor_shape, *values.shape[4:])
+
+
+def picture_of(plan: Plan, values: np.ndarray, engine: str = "numba") -> np.ndarray:
+    return drive(plan, InMemory(values, vcc.Affine.identity()), How(engine=engine)).values
+
+
+def with_core(plan: Plan, **changes) -> Plan:
+    return replace(plan, core=replace(plan.core, **changes))
 
 
 def assert_as_expected(plan: Plan, values: np.ndarray) -> None:
     truth = expected(plan, values)
     assert truth.any()
-    picture = run_plan(plan, values, engine="numba")
-    filters = () if plan.sharpen is None else plan.sharpen
-    rounding = max(1e-6, 6e-7 * np.prod([np.linalg.norm(weights) for weights in filters]))
+    rounding = max(1e-6, 6e-7 * np.prod([np.linalg.norm(weights) for weights in filters(plan)]))
     assert rounding < 3e-6
-    np.testing.assert_allclose(picture, truth, rtol=0, atol=rounding * np.abs(truth).max())
+    np.testing.assert_allclose(picture_of(plan, values), truth, rtol=0, atol=rounding * np.abs(truth).max())
 
 
 @pytest.mark.parametrize("masks", [0, 1, 2])
@@ -105,7 +130,7 @@ def test_pixels_of_any_size_on_bands_of_rows(size, inverted, masks):
         lf = lf[:, :, ::-1, ::-1]
         lf = lf.replaced(np.ascontiguousarray(lf.values))
     plan = camera((149, 101), size, masks).compile(lf, refine=1, between_views="none")
-    assert (plan.row_step < 0) == inverted
+    assert (plan.core.row_step < 0) == inverted
     assert_as_expected(plan, lf.values)
 
 
@@ -116,12 +141,12 @@ def test_taps_that_look_masks_up_where_others_do_not(channels):
     plan = camera((22, 67), 1.07, 2).compile(lf, refine=1)
     rng = np.random.default_rng(1)
     shifted = []
-    for mask in plan.masks:
+    for mask in plan.core.masks:
         cut = rng.random(mask.column.shape) < 0.3
         move = [np.where(cut, rng.normal(size=cut.shape), 0.0) for _ in range(2)]
         shifted.append(replace(mask, column=mask.column + move[0], row=mask.row + move[1]))
-    plan = replace(plan, masks=tuple(shifted))
-    assert plan.separable
+    plan = with_core(plan, masks=tuple(shifted))
+    assert plan.core.separable
     assert_as_expected(plan, lf.values)
 
 
@@ -129,14 +154,14 @@ def test_taps_that_look_masks_up_where_others_do_not(channels):
 def test_masks_that_end_within_the_picture(shift):
     lf = field((3, 3, 30, 70, 3))
     plan = camera((31, 71), 1.0, 2).compile(lf, refine=1)
-    first, second = plan.masks
+    first, second = plan.core.masks
     first = replace(first, row=first.row + np.where(np.arange(3)[:, None] == 1, shift, 0))
     second = replace(second, column=second.column - np.where(np.arange(3) == 2, shift, 0))
-    plan = replace(plan, masks=(first, second))
+    plan = with_core(plan, masks=(first, second))
     assert_as_expected(plan, lf.values)
     for engine in ("reference", "array_api"):
         truth = expected(plan, lf.values)
-        picture = run_plan(plan, lf.values, engine=engine)
+        picture = picture_of(plan, lf.values, engine)
         np.testing.assert_allclose(picture, truth, rtol=0, atol=2e-6 * np.abs(truth).max())
 
 
@@ -150,11 +175,11 @@ def test_sharpening(lengths, against_sensor):
     sharpen = weights[0] / weights[0].sum(), weights[1] / weights[1].sum()
     transmission = rng.random(plan.sensor_shape) if against_sensor else None
     guard = max(lengths) // 2
-    plan = replace(plan, sharpen=sharpen, guard=guard, x=plan.x + guard, y=plan.y + guard)
+    along = AlongAxes(*sharpen, "sharpness given back")
+    plan = replace(plan, core=plan.core.guarded(guard), after=(along, OnSensor(guard, transmission)))
     truth = expected(plan, lf.values)
     if transmission is not None:
-        plan = replace(plan, sensor_transmission=transmission)
         truth = truth * transmission[..., None]
     for engine in ("numba", "reference", "array_api"):
-        picture = run_plan(plan, lf.values, engine=engine)
+        picture = picture_of(plan, lf.values, engine)
         np.testing.assert_allclose(picture, truth, rtol=0, atol=2e-6 * np.abs(truth).max())

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import vcc
+from command_line import run
 from vcc.base.units import mm
-from vcc.cli import commands
 from vcc.files.pictures import read_picture
 from vcc.formats.writing import save_light_field
 from vcc.gallery import ENTRIES, Entry, Finding, Picture, Result, entries, entry, extended_depth, write_entry
@@ -85,15 +84,11 @@ def test_a_folder_that_is_a_file_is_refused(tmp_path):
 
 def test_command_lists_and_runs(tmp_path, light_field):
     save_light_field(light_field, tmp_path / "field.npz")
-    runner = CliRunner()
-    listed = runner.invoke(commands.app, ["gallery"])
+    listed = run("gallery")
     assert all(name in listed.output for name in ENTRIES)
-    refused = runner.invoke(commands.app, ["gallery", "pinhole"])
+    refused = run("gallery", "pinhole")
     assert refused.exit_code == 2
-    ran = runner.invoke(
-        commands.app,
-        ["gallery", "conventional", "--light-field", str(tmp_path / "field.npz"), "-o", str(tmp_path / "page")],
-    )
+    ran = run("gallery", "conventional", "--light-field", tmp_path / "field.npz", "-o", tmp_path / "page")
     assert ran.exit_code == 0, ran.output
     assert "blur of a point" in ran.output
     for picture in (tmp_path / "page").glob("*.png"):

@@ -16,7 +16,7 @@ import pytest
 
 import vcc
 from vcc.base.units import mm
-from vcc.plan.rays.model import RayPlan, Window
+from vcc.plan.rays.model import Window
 from vcc.shapes.patterns import Cells, Circle
 
 
@@ -182,8 +182,8 @@ def test_a_light_field_that_was_flown_is_aimed_at_where_its_views_are(flown):
     camera, lf = biprism_camera(flown)
     image = camera.capture(lf, samples=16384)
     plan = camera.compile(lf)
-    assert isinstance(plan, RayPlan)
-    assert plan.aim.words == "the grid of views"
+    assert plan.by_rays
+    assert plan.core.aim.words == "the grid of views"
     line = 1.8 * mm / math.cos(0.3)  # the sensor is 1.8 mm high and 2 mm wide
     both = 2 * 0.02 * 0.05 * mm * line / (1.8 * mm * 2 * mm)
     # Pixels err independently; their noise is known to a factor of 2 (test_ray_pictures).
@@ -239,17 +239,17 @@ def test_bounds_of_different_planes_are_taken_together():
         [vcc.Lens(70 * mm), clear(1 * mm, 40 * mm, z=30 * mm)], vcc.Sensor(50 * mm, (8, 9), 0.3 * mm)
     )
     plan = camera.compile(ones(10, 1 * mm, 0.4), method="rays")
-    assert isinstance(plan, RayPlan)
-    assert isinstance(plan.aim, Window)
-    assert plan.aim.solid_angle == pytest.approx(1 / 20 * 10 / 50)
-    assert plan.aim.words == "mask at z = 30 mm and the grid of views"
+    assert plan.by_rays
+    assert isinstance(plan.core.aim, Window)
+    assert plan.core.aim.solid_angle == pytest.approx(1 / 20 * 10 / 50)
+    assert plan.core.aim.words == "mask at z = 30 mm and the grid of views"
     turned = vcc.Camera(
         [vcc.Lens(70 * mm), clear(40 * mm, 1 * mm, z=30 * mm)], vcc.Sensor(50 * mm, (9, 8), 0.3 * mm)
     ).compile(ones(10, 1 * mm, 0.4), method="rays")
-    assert isinstance(turned, RayPlan)
-    assert isinstance(turned.aim, Window)
-    widths = np.abs(np.diag(plan.aim.slope_from_point))
-    np.testing.assert_allclose(np.abs(np.diag(turned.aim.slope_from_point)), widths[::-1])
+    assert turned.by_rays
+    assert isinstance(turned.core.aim, Window)
+    widths = np.abs(np.diag(plan.core.aim.slope_from_point))
+    np.testing.assert_allclose(np.abs(np.diag(turned.core.aim.slope_from_point)), widths[::-1])
 
 
 def test_lenslets_without_a_main_lens_are_looked_through_one_by_one():
@@ -282,8 +282,8 @@ def test_all_light_arrives_where_views_are_aimed_at_by_their_pictures(elements, 
     camera = vcc.Camera(elements, vcc.Sensor(2 * mm, (9, 8), 0.8 * mm))
     image = captured(camera, lf, method="rays", samples=8192)
     plan = camera.compile(lf, method="rays")
-    assert isinstance(plan, RayPlan)
-    assert plan.aim.words == "the views' pictures"
+    assert plan.by_rays
+    assert plan.core.aim.words == "the views' pictures"
     light = image.values.sum(dtype=np.float64) * (0.8 * mm) ** 2
     noise = 3 * 2 * image.sampling_error * math.sqrt(image.values.size) * (0.8 * mm) ** 2
     assert noise < 0.01 * light

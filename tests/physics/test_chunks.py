@@ -84,9 +84,9 @@ def test_the_cameras_here_do_what_their_names_say(light_field):
     plans = {name: camera.compile(light_field) for name, camera in CAMERAS.items()}
     assert max(plans["strong defocus"].smear) > 1
     assert max(plans["in focus"].smear) == 0
-    assert plans["fine mask near the sensor"].refine > 1
-    assert len(plans["two masks and a mask on the sensor"].masks) == 2
-    assert plans["mask just behind the lens"].masks
+    assert plans["fine mask near the sensor"].core.refine > 1
+    assert len(plans["two masks and a mask on the sensor"].core.masks) == 2
+    assert plans["mask just behind the lens"].core.masks
 
 
 @pytest.mark.parametrize("axis", range(4), ids=["v", "u", "t", "s"])

@@ -11,7 +11,6 @@ import pytest
 import vcc
 from vcc.base.units import mm
 from vcc.optics import CellDeflection, Faces, FacetDeflection, Lattice
-from vcc.plan.footprints.model import Plan
 from vcc.shapes.surfaces import Axicon, Cubic, HeightMap, PathMap, Rough, Tilt, Zernike
 
 D = 1 / (1 / 50e-3 - 1)
@@ -34,7 +33,7 @@ def capture(*elements: vcc.Element) -> np.ndarray:
     values = np.random.default_rng(0).random((6, 6, 20, 20)).astype(np.float32)
     lf = vcc.LightField.from_views(values, 1 * mm, 4e-3, 1.0, disparity_range=(-0.2, 0.4))
     camera = vcc.Camera([vcc.Lens(50 * mm, diameter=5 * mm), *elements], vcc.Sensor(D, (9, 10), D * 6e-3))
-    assert isinstance(camera.compile(lf), Plan)
+    assert not camera.compile(lf).by_rays
     return np.asarray(camera.capture(lf).values)
 
 

@@ -6,7 +6,6 @@ shows a point; pictures of very many rays, for the error of few.
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from functools import cache
 
@@ -365,12 +364,11 @@ def test_a_tolerance_out_of_reach_is_said():
 
 
 @pytest.mark.parametrize("case", NOISY)
-def test_a_seed_fixes_every_bit_whatever_the_number_of_threads(case, monkeypatch):
+def test_a_seed_fixes_every_bit_whatever_the_number_of_threads(case):
     sensor = replace(PICTURE, shape=(45, 40), pitch=1.2 * D * SLOPE)  # several tiles
     pictures = []
     for threads in (1, 2, 5):
-        monkeypatch.setattr(os, "cpu_count", lambda threads=threads: threads)
-        image = rays(NOISY[case], sensor=sensor, samples=32, seed=7)
+        image = rays(NOISY[case], sensor=sensor, samples=32, seed=7, threads=threads)
         pictures.append((image.values.tobytes(), image.sampling_error, image.missing_rays))
     assert pictures[0] == pictures[1] == pictures[2]
 

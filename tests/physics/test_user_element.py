@@ -17,7 +17,8 @@ from two_planes import TwoPlanes
 
 import vcc
 from vcc.base.units import m, mm, nm
-from vcc.engines import record
+from vcc.plan.how import How
+from vcc.run.drive import drive
 from vcc.shapes.kernels import Gaussian
 from vcc.shapes.patterns import Circle
 
@@ -160,9 +161,9 @@ def test_every_engine_makes_the_same_picture(camera):
     values = np.asarray(PLANES.light_field.values)[..., None] * np.array([1.0, 0.5, 0.2], dtype=np.float32)
     lf = PLANES.light_field.replaced(values)
     plan = vcc.Camera(CAMERAS[camera], sensor).compile(lf, samples=64)
-    pictures = {name: record(plan, values, engine=name).values for name in ENGINES}
+    pictures = {name: drive(plan, lf, How(engine=name)).values for name in ENGINES}
     expected = pictures["reference"]
-    in_torch = record(plan, torch.asarray(values)).values
+    in_torch = drive(plan, lf.replaced(torch.asarray(values))).values
     assert isinstance(in_torch, torch.Tensor)
     pictures["torch"] = in_torch.numpy()
     for name, picture in pictures.items():

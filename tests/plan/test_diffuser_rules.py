@@ -8,8 +8,7 @@ import pytest
 import vcc
 from vcc.base.units import mm
 from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
-from vcc.plan.footprints.model import Plan
-from vcc.plan.rays.model import RayPlan
+from vcc.plan.operators import Blur, BlurViews
 from vcc.shapes import kernels, surfaces
 from vcc.shapes.patterns import CosineSum, Open
 
@@ -113,7 +112,7 @@ def test_neither(elements, reason):
     assert isinstance(blurs, str)
     assert reason in blurs
     plan = vcc.Camera(elements, SENSOR).compile(field())
-    assert isinstance(plan, RayPlan)
+    assert plan.by_rays
     assert any(reason in note for note in plan.notes)
 
 
@@ -121,7 +120,7 @@ def test_a_plate_behind_the_diffuser_forbids_the_blur():
     camera = vcc.Camera(
         [STOPPED, diffuser(0.0), vcc.PhasePlate(surfaces.Cubic(20.0), diameter=20 * mm, z=9 * mm)], SENSOR
     )
-    assert isinstance(camera.compile(field()), RayPlan)
+    assert camera.compile(field()).by_rays
 
 
 def test_a_view_that_meets_the_diffuser_in_many_places_is_not_blurred_by_itself():
@@ -148,8 +147,9 @@ def test_engines_agree_on_blurs(shape, dtype, z_mask):
     elements = [STOPPED, diffuser(0.0, lopsided), *([] if z_mask is None else [mask(z_mask)])]
     camera = vcc.Camera(elements, SENSOR)
     plan = camera.compile(lf)
-    assert isinstance(plan, Plan)
-    assert (plan.blur is None) == (z_mask is not None)
+    assert not plan.by_rays
+    assert any(isinstance(one, Blur) and one.scatters for one in plan.after) == (z_mask is None)
+    assert any(isinstance(one, BlurViews) for one in plan.before) == (z_mask is not None)
     truth = camera.capture(lf, engine="reference").values.astype(float)
     for engine in ("numba", "array_api"):
         assert np.abs(camera.capture(lf, engine=engine).values - truth).max() < 1e-5 * truth.max()

@@ -24,7 +24,7 @@ def test_a_field_taken_to_the_sensor_is_summed_as_the_camera_does(z, disparity_r
     moved = vcc.Camera([], vcc.Sensor(z=0.0, shape=(24, 24), pitch=0.01 * z)).compile(at_sensor)
     assert moved.smear == pytest.approx(plan.smear, abs=1e-9)
     assert moved.expected_ghosting == pytest.approx(plan.expected_ghosting, abs=1e-9)
-    assert np.allclose(moved.x, plan.x)
+    assert np.allclose(moved.core.x, plan.core.x)
 
 
 def test_gaps_are_the_difference_between_disparity_and_focus():

@@ -14,7 +14,7 @@ import pytest
 import vcc
 from vcc.base.units import mm
 from vcc.plan.rays import steps
-from vcc.plan.rays.model import RayPlan
+from vcc.plan.rays.model import Rays
 from vcc.shapes.patterns import Cells
 from vcc.shapes.surfaces import PathMap
 
@@ -41,8 +41,8 @@ def camera(mask: vcc.Mask) -> vcc.Camera:
 
 
 def texture_of(plan) -> steps.Texture:
-    assert isinstance(plan, RayPlan)
-    (weigh,) = (step for step in plan.steps if isinstance(step, steps.TextureShares))
+    assert isinstance(plan.core, Rays)
+    (weigh,) = (step for step in plan.core.steps if isinstance(step, steps.TextureShares))
     return weigh.texture
 
 
@@ -110,8 +110,8 @@ def test_a_bend_may_err_by_a_thousandth_of_a_sample():
     lf = field()
     for surface, lens in ((PathMap(paths, 10 * mm), True), (PathMap(paths + bumps, 10 * mm), False)):
         plan = vcc.Camera([LENS, vcc.PhasePlate(surface)], sensor).compile(lf, samples=512)
-        assert isinstance(plan, RayPlan)
-        (bend,) = (step for step in plan.steps if isinstance(step, steps.TextureUnbend))
+        assert isinstance(plan.core, Rays)
+        (bend,) = (step for step in plan.core.steps if isinstance(step, steps.TextureUnbend))
         x, y = np.random.default_rng(3).uniform(-3 * mm, 3 * mm, (2, 4000))
         if lens:
             truth = np.stack([-x / 0.3, -y / 0.3], axis=-1)

@@ -10,10 +10,13 @@ import pytest
 import vcc
 from vcc.base.units import mm, um
 from vcc.optics import Element, Faces
+from vcc.plan.how import How
+from vcc.plan.model import Plan
 from vcc.plan.rays import steps
 from vcc.plan.rays.compile import compile_rays
-from vcc.plan.rays.model import TABLE, CellWindows, RayPlan, Window, hashed
+from vcc.plan.rays.model import TABLE, CellWindows, Rays, Window, hashed
 from vcc.plan.rays.steps import Bundle
+from vcc.run.drive import drive
 from vcc.shapes import kernels, surfaces
 from vcc.shapes.patterns import Circle, CosineSum
 
@@ -27,13 +30,17 @@ def field(shape=(7, 7, 9, 11), **options) -> vcc.LightField:
     return vcc.LightField.from_views(values, **(defaults | options))
 
 
-def plan_of(*elements: Element, sensor: vcc.Sensor | None = None, **options) -> RayPlan:
+def made_of(*elements: Element, sensor: vcc.Sensor | None = None, **options) -> Plan:
     sensor = sensor or vcc.Sensor(D, (7, 8), D * 2e-3)
-    return compile_rays(vcc.Camera(elements, sensor), field(), **options)
+    return compile_rays(vcc.Camera(elements, sensor), field().grid, How(**options))
 
 
-def rays_of(plan: RayPlan):
-    pixel = np.arange(plan.sensor_shape[0] * plan.sensor_shape[1])
+def plan_of(*elements: Element, sensor: vcc.Sensor | None = None, **options) -> Rays:
+    return made_of(*elements, sensor=sensor, **options).core
+
+
+def rays_of(plan: Rays):
+    pixel = np.arange(plan.raster_shape[0] * plan.raster_shape[1])
     return plan.looked_up(pixel, plan.block(pixel))
 
 
@@ -250,14 +257,14 @@ def test_cosines_are_exact_however_many_periods_there_are():
     theta = 2 * np.pi * (x - 3e-6) / 20e-6 + 0.4
     dirichlet = np.sin(5.5 * theta) / (2 * np.sin(theta / 2)) - 0.5
     np.testing.assert_allclose(rays.share, 0.5 + dirichlet / 10, atol=1e-9)
-    assert not any("texture" in note for note in plan.notes)
+    assert not any("texture" in note for note in made_of(LENS, vcc.Mask(pattern, z=2 * mm)).notes)
 
 
 def test_what_is_too_fine_for_a_texture_is_said():
-    plan = plan_of(LENS, vcc.PhasePlate(lambda x, y: (0.01 * np.sin(4e6 * x), 0 * y), diameter=6 * mm))
+    plan = made_of(LENS, vcc.PhasePlate(lambda x, y: (0.01 * np.sin(4e6 * x), 0 * y), diameter=6 * mm))
     assert any("phase plate" in note and "root mean square" in note for note in plan.notes)
     # Of a mask, too, whose texture holds means: they are wrong alike at its points and between them.
-    plan = plan_of(LENS, vcc.Mask(lambda x, y: 0.5 + 0.5 * np.sin(4e6 * x) + 0 * y, width=6 * mm))
+    plan = made_of(LENS, vcc.Mask(lambda x, y: 0.5 + 0.5 * np.sin(4e6 * x) + 0 * y, width=6 * mm))
     (note,) = (note for note in plan.notes if "mask" in note and "finer than its texture" in note)
     # A sine of which nothing is left is off by its own root mean square, of a largest value between ½ and 1.
     assert 35 < float(note.split(": ")[1].split("%")[0]) < 72
@@ -326,17 +333,14 @@ def test_what_explain_says_of_rays():
         "s expected",
     ):
         assert words in on_one_line
-    assert isinstance(text.plan, RayPlan)
+    assert isinstance(text.plan.core, Rays)
     assert text.expected_seconds > 0
 
 
 def test_explain_foretells_the_sampling_error_and_the_rays():
     array = vcc.LensArray(pitch=0.5 * mm, focal_length=4 * mm, z=D)
     camera = vcc.Camera([LENS, array], vcc.Sensor(D + 4 * mm, (70, 80), 0.05 * mm))
-    from vcc.engines import record
-
-    plan = camera.compile(field())
-    recorded = record(plan, field().values)
+    recorded = drive(camera.compile(field()), field())
     text = str(camera.explain(field()))
     foretold = float(text.split("expected sampling error: ")[1].split()[0])
     assert foretold == pytest.approx(recorded.sampling_error / recorded.values.mean(), rel=0.4)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import vcc
+from command_line import run
 from vcc.base.affine import Affine
 from vcc.base.measures import psnr
-from vcc.cli.commands import app
 from vcc.recover.focal_stack import FocalStack, focal_stack, focus_distances
 from vcc.recover.refocus import refocused
 from vcc.showcase.scene import demo_scene
@@ -136,7 +135,7 @@ def test_the_command_makes_pictures_and_films(tmp_path, demo_field):
         (["--stack", "0.8 m", "3 m", "4", "--all-in-focus"], "sharp.png"),
         (["--all-in-focus"], "sharp.npy"),
     ):
-        done = CliRunner().invoke(app, ["refocus", str(views), *arguments, "-o", str(tmp_path / name)])
+        done = run("refocus", views, *arguments, "-o", tmp_path / name)
         assert done.exit_code == 0, done.output
         assert name in done.output
         assert (tmp_path / name).stat().st_size > 0
@@ -149,7 +148,7 @@ def test_the_command_makes_pictures_and_films(tmp_path, demo_field):
         (["--stack", "1 m", "3 m", "0"], "stack.mp4", "1 or more, not 0"),
         (["--stack", "1 m", "3 m", "4"], "stack.png", "cannot be written"),
     ):
-        done = CliRunner().invoke(app, ["refocus", str(views), *arguments, "-o", str(tmp_path / name)])
+        done = run("refocus", views, *arguments, "-o", tmp_path / name)
         assert done.exit_code == 2, done.output
         assert words in done.output
 

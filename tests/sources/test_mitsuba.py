@@ -7,12 +7,11 @@ import subprocess
 import imagecodecs
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import vcc
+from command_line import run
 from vcc import InputError
 from vcc.base.units import mm
-from vcc.cli.commands import app
 from vcc.sources import CameraArray
 from vcc.sources.textures import Waves
 
@@ -309,12 +308,12 @@ def test_on_the_command_line(folder):
         *("synth", "mitsuba", folder / "a scene ü.xml", "-o", path, "--views", 2, 3, "--pixels", 4, 5),
         *("--samples", 2, "--variant", PLAIN, "--set", "paint=two"),
     ]
-    done = CliRunner().invoke(app, list(map(str, arguments)))
+    done = run(*arguments)
     assert done.exit_code == 0, done.output
     assert "2×3 views of 4×5 pixels, 3 channels, float16, linear" in done.stdout
     made = open_store(path)
     assert np.allclose(made.read().values, 0.8, atol=1e-3)
     assert made.provenance["renderer"]["scene"]["file"] == "a scene ü.xml"
-    refused = CliRunner().invoke(app, [*map(str, arguments), "--seed", "1"])
+    refused = run(*arguments, "--seed", 1)
     assert refused.exit_code == 2
     assert "out.zarr" in refused.stderr

@@ -10,11 +10,10 @@ import shutil
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from command_line import run
 from vcc import InputError
 from vcc.base.units import mm
-from vcc.cli.commands import app
 from vcc.sources import CameraArray
 from vcc.sources.pbrt import PbrtRenderer, PbrtScene, pbrt_program
 
@@ -188,7 +187,7 @@ def test_without_the_program(tmp_path, monkeypatch):
     path = written(tmp_path)
     with pytest.raises(InputError, match="environment variable PBRT"):
         PbrtRenderer(path)
-    done = CliRunner().invoke(app, ["synth", "pbrt", str(path), "-o", str(tmp_path / "out.zarr")])
+    done = run("synth", "pbrt", path, "-o", tmp_path / "out.zarr")
     assert done.exit_code == 2
     assert "build PBRT version 4" in done.stderr
 

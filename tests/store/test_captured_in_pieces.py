@@ -10,11 +10,11 @@ import warnings
 
 import numpy as np
 import pytest
+from vcc.run.pieces import Block, Blocks
 
 import vcc
 from vcc.base.units import mm
 from vcc.run import pieces
-from vcc.run.pieces import Block, Blocks
 from vcc.shapes.patterns import CosineSum
 from vcc.store import open_store, save_store
 

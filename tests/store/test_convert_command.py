@@ -115,23 +115,36 @@ def test_other_formats_are_made_from_a_store(codes):
     assert read.frame.isclose(open_store("a.zarr").frame)
 
 
-def test_bad_input_is_refused(codes):
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["views", "a.zarr", *KNOWN], "is there already"),
+        (["views", "lost/a.zarr"], "no folder lost"),
+        (["views", "b.zarr", "--quality", "50"], "--quality is for --lossy"),
+        (["views", "b.zarr", "--lossy", "avif", "--level", "2"], "leave them out with --lossy"),
+        (["views", "b.zarr", "--lossy", "avif", "--quality", "100"], "whole number from 1 to 99"),
+        (["views", "b.zarr", "--kind", "hci"], "--kind is for folders of views"),
+        (["views", "b.npz", "--dtype", "uint8"], "--dtype is for stores"),
+        (["views", "b.npz", "--dtype", "uint8", "--level", "2"], "--dtype, --level are for stores"),
+        (["lost", "b.zarr"], "there is no"),
+        (["c.zarr", "d.zarr"], "9 of its 9 views are missing"),
+    ],
+)
+def test_bad_input_is_refused(codes, arguments, words):
     done("convert", "views", "a.zarr", *KNOWN)
-    assert "is there already" in refused("convert", "views", "a.zarr", *KNOWN)
+    create_store("c.zarr", open_store("a.zarr").frame, (3, 3, 4, 4), "uint8", provenance={})
+    assert words in refused("convert", *arguments)
+
+
+def test_a_store_is_replaced_where_that_is_said(codes):
+    done("convert", "views", "a.zarr", *KNOWN)
     done("convert", "views", "a.zarr", "--overwrite", "--dtype", "uint16", *KNOWN)
     assert open_store("a.zarr").dtype == np.uint16
-    assert "no folder lost" in refused("convert", "views", "lost/a.zarr")
-    assert "--quality is for --lossy" in refused("convert", "views", "b.zarr", "--quality", "50")
-    assert "leave them out with --lossy" in refused(
-        "convert", "views", "b.zarr", "--lossy", "avif", "--level", "2"
-    )
-    assert "whole number from 1 to 99" in refused(
-        "convert", "views", "b.zarr", "--lossy", "avif", "--quality", "100"
-    )
-    assert "--dtype is for stores" in refused("convert", "views", "b.npz", "--dtype", "uint8")
-    assert "there is no" in refused("convert", "lost", "b.zarr")
+
+
+def test_info_says_that_a_store_is_not_finished(codes):
+    done("convert", "views", "a.zarr", *KNOWN)
     create_store("c.zarr", open_store("a.zarr").frame, (3, 3, 4, 4), "uint8", provenance={})
-    assert "9 of its 9 views are missing" in refused("convert", "c.zarr", "d.zarr")
     assert "not finished" in done("info", "c.zarr", "--quick")
 
 

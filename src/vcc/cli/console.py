@@ -5,43 +5,36 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import typer
-from typer.core import TyperGroup
-
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress
+from vcc.files.atomic import atomic_path
 
 _LIBRARY_OPTION = re.compile(
     r"\b(transfer|spacing|slope_per_pixel|focus_distance|orientation|scene_distance|interpolation"
-    r"|between_views|memory_limit|engine|exposure|radiance|seed|method|samples|tolerance|refine)=(?=\S)"
+    r"|between_views|memory_limit|engine|exposure|radiance|seed|method|samples|tolerance|refine|threads)=(?=\S)"
 )
 
 
-class Commands(TyperGroup):
-    """A group of commands that all report errors and warnings alike."""
+@contextmanager
+def notes() -> Iterator[None]:
+    """Warnings about results become lines on standard error while this lasts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", ResultWarning)
+        show_others = warnings.showwarning
 
-    def invoke(self, ctx: Any) -> Any:
-        """Run a command; bad input becomes a message and exit code 2, a warning a line."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("always", ResultWarning)
-            show = warnings.showwarning
+        def show_note(message: Any, category: type[Warning], *rest: Any, **named: Any) -> None:
+            if issubclass(category, ResultWarning):
+                say("Note:", "yellow", str(message))
+            else:
+                show_others(message, category, *rest, **named)
 
-            def show_note(message: Any, category: type[Warning], *rest: Any, **named: Any) -> None:
-                if issubclass(category, ResultWarning):
-                    say("Note:", "yellow", str(message))
-                else:
-                    show(message, category, *rest, **named)
-
-            warnings.showwarning = show_note
-            try:
-                return super().invoke(ctx)
-            except InputError as error:
-                say("Error:", "bold red", str(error))
-                raise typer.Exit(2) from None
+        warnings.showwarning = show_note
+        yield
 
 
 def say(word: str, colour: str, message: str) -> None:
@@ -64,23 +57,34 @@ def as_options(message: str) -> str:
 
 def show(message: str) -> None:
     """Text on standard output as it is: no markup, no breaking of lines."""
-    typer.echo(message)
+    print(message, flush=True)
 
 
 @contextmanager
-def progress(task: str) -> Iterator[Callable[[int, int], None]]:
+def progress(task: str) -> Iterator[Progress]:
     """A bar on standard error while something runs, if people watch; yields what to call to move it.
 
     Args:
         task: what is being done, in a few words.
     """
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress as Bars
 
     console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Bars(console=console, transient=True, disable=not console.is_terminal) as bar:
         running = bar.add_task(task, total=None)
         yield lambda done, total: bar.update(running, completed=done, total=total)
+
+
+DRAWINGS = (".png", ".svg", ".pdf")
+"""How names of drawings end."""
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a Matplotlib figure, and say so."""
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary)
+    show(f"{path}: written")
 
 
 def check_output(path: Path, endings: tuple[str, ...]) -> Path:
@@ -105,6 +109,16 @@ def check_output(path: Path, endings: tuple[str, ...]) -> Path:
     if not os.access(folder, os.W_OK):
         raise InputError(f"{path} cannot be written: no permission to write to {folder}")
     return path
+
+
+def free_output(output: Path, overwrite: bool) -> Path:
+    """A path that may be written to, before the work that it is for."""
+    output = output.expanduser()
+    if not output.parent.is_dir():
+        raise InputError(f"{output} cannot be written: there is no folder {output.parent}; make it first")
+    if output.exists() and not overwrite:
+        raise InputError(f"{output} is there already: choose another name, or replace it with --overwrite")
+    return output
 
 
 def make_folder(path: Path) -> Path:

@@ -1,48 +1,29 @@
 """``vcc gallery``: published cameras, listed or rebuilt."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from cyclopts import Parameter
 
 from vcc.cli.console import make_folder, progress, show
-
-EPILOG = (
-    "Example:  vcc gallery\n\nExample:  vcc gallery wavefront-coding\n\n"
-    "Example:  vcc gallery biprism-stereo --light-field views/ -o stereo"
-)
+from vcc.gallery import entries, entry, write_entry
+from vcc.gallery.page import VERDICTS
 
 
 def gallery(
-    name: Annotated[
-        str | None,
-        typer.Argument(metavar="NAME", help="Of a camera. Without it, all are listed.", show_default=False),
-    ] = None,
-    light_field: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="LIGHTFIELD",
-            help="A light field of your own: a folder of views, a file or a store. Default: the built-in scene.",
-            show_default=False,
-        ),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FOLDER",
-            help="Where the page and its pictures go. Default: vcc-gallery/NAME.",
-            show_default=False,
-        ),
-    ] = None,
+    name: str | None = None,
+    /,
+    *,
+    light_field: Annotated[Path | None, Parameter(metavar="LIGHT_FIELD")] = None,
+    output: Annotated[Path | None, Parameter(alias="-o", metavar="FOLDER")] = None,
 ) -> None:
-    """Rebuild a published camera, from optics to decoded result, beside what was claimed of it."""
-    from vcc.gallery import entries, entry, write_entry
-    from vcc.gallery.page import VERDICTS
+    """Rebuild a published camera, from optics to decoded result, beside what was claimed of it.
 
+    Args:
+        name: Of a camera. Without it, all are listed.
+        light_field: A light field of your own: a folder of views, a file or a store. Default: the built-in scene.
+        output: Where the page and its pictures go. Default: vcc-gallery/NAME.
+    """
     if name is None:
         for each in entries():
             show(f"{each.name}\n    {each.title}. {each.citation}")

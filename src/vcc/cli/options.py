@@ -1,311 +1,271 @@
-"""Options that several commands share, and what is made of them."""
+"""Options that several commands share: values with units, and records that are laid flat into each command.
 
-from __future__ import annotations
+A record is declared once; its docstring is its help. `told` says which of its options somebody gave. Annotations
+are objects here, not strings: cyclopts reads them also where a record is extended in another file.
+"""
 
+import dataclasses
 import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
-import typer
+from cyclopts import Group, Parameter, Token
 
 from vcc.base.errors import InputError
+from vcc.base.units import parse, short
+from vcc.cli.console import as_options, progress
+from vcc.formats import open_light_field
+from vcc.light_field import LightField
+from vcc.plan.how import BetweenViews, EngineName, How, Interpolation, Method  # noqa: F401  # How's fields name them
+from vcc.store import StoredLightField, is_store, open_store
 
-if TYPE_CHECKING:
-    from vcc.light_field import LightField
-    from vcc.store import StoredLightField
+MAKING = Group("Making the picture", sort_key=2)
+READING = Group("Reading the light field", sort_key=3)
 
-_READING = "Reading the light field"
-_CAPTURING = "Making the picture"
-
-CameraFile = Annotated[Path, typer.Argument(metavar="CAMERA.toml", help="The camera file.", show_default=False)]
-LightFieldFolder = Annotated[
-    Path,
-    typer.Argument(metavar="LIGHTFIELD", help="A folder of views, a file or a store.", show_default=False),
-]
-
-Transfer = Annotated[
-    Literal["auto", "srgb", "linear"],
-    typer.Option(
-        help="How pixel values of the views stand for light: srgb, as pictures for people do, linear "
-        "(proportional to it), or auto: as the format says, srgb where it says nothing.",
-        rich_help_panel=_READING,
-    ),
-]
-Spacing = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LENGTH",
-        help='Distance between neighbouring views with its unit, "1 mm"; two of them, "1 mm, 2 mm", '
-        "are for rows and columns. Default: what the folder states.",
-        show_default=False,
-        rich_help_panel=_READING,
-    ),
-]
-SlopePerPixel = Annotated[
-    float | None,
-    typer.Option(
-        metavar="NUMBER",
-        help="Pixel pitch over focal length of the cameras, no unit. Default: what the folder states.",
-        show_default=False,
-        rich_help_panel=_READING,
-    ),
-]
-FocusDistance = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LENGTH",
-        help='Where the views converge, "1.2 m", or inf if they are parallel. Default: what the folder states.',
-        show_default=False,
-        rich_help_panel=_READING,
-    ),
-]
-Orientation = Annotated[
-    Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"],
-    typer.Option(
-        help="Order of the views. auto checks it by parallax and puts it right; as-is takes the "
-        "files as they are.",
-        rich_help_panel=_READING,
-    ),
-]
-Method = Annotated[
-    Literal["auto", "footprints", "rays"],
-    typer.Option(
-        help="footprints spread each sample over the sensor, exactly, where lenses, prisms and masks are all "
-        "there is; rays are traced through anything. auto takes footprints where it can.",
-        rich_help_panel=_CAPTURING,
-    ),
-]
-Samples = Annotated[
-    int | None,
-    typer.Option(
-        metavar="NUMBER",
-        help="Rays a pixel, where rays are traced; rounded up to a power of two. Default: 64.",
-        show_default=False,
-        rich_help_panel=_CAPTURING,
-    ),
-]
-Tolerance = Annotated[
-    float | None,
-    typer.Option(
-        metavar="NUMBER",
-        help="Double the rays until the picture's sampling error is at most this share of its mean, like 0.01.",
-        show_default=False,
-        rich_help_panel=_CAPTURING,
-    ),
-]
-RaySeed = Annotated[
-    int,
-    typer.Option(
-        metavar="NUMBER",
-        help="Of the choice of rays: the same number gives the same picture.",
-        rich_help_panel=_CAPTURING,
-    ),
-]
-Interpolation = Annotated[
-    Literal["sharp", "nearest", "linear", "cubic"],
-    typer.Option(
-        help="Interpolation within a view; sharp is linear with what that costs given back.",
-        rich_help_panel=_CAPTURING,
-    ),
-]
-BetweenViews = Annotated[
-    Literal["auto", "none", "depth"],
-    typer.Option(
-        help="Whether to interpolate between views where neighbouring ones differ by more than a pixel: auto does "
-        "along one parallax, where nothing is in focus; depth makes views in between by each pixel's own depth, "
-        "which is found first and kept in a store; none never does.",
-        rich_help_panel=_CAPTURING,
-    ),
-]
-SceneDistance = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LENGTH",
-        help='Distance of the scene before the camera, "1.2 m", by which that interpolation goes. '
-        "Default: what the light field states or shows.",
-        show_default=False,
-        rich_help_panel=_CAPTURING,
-    ),
-]
-Refine = Annotated[
-    str,
-    typer.Option(
-        metavar="NUMBER",
-        help="Divide samples by this number each way where a mask is finer than they are, 1 to 8. "
-        "auto decides, and explain says what it costs.",
-        rich_help_panel=_CAPTURING,
-    ),
-]
-Engine = Annotated[
-    Literal["numba", "array_api", "reference"],
-    typer.Option(
-        help="What computes: numba is fast, reference slow and plain.",
-        rich_help_panel=_CAPTURING,
-    ),
-]
-MemoryLimit = Annotated[
-    str | None,
-    typer.Option(
-        metavar="SIZE",
-        help='Of a light field in a store: what reading it in pieces may take, "1.5 GB". Default: 1 GiB.',
-        show_default=False,
-        rich_help_panel=_CAPTURING,
-    ),
-]
+# --- values ---
 
 
-def how_made(
-    *,
-    method: str,
-    interpolation: str,
-    between_views: str,
-    scene_distance: str | None,
-    refine: str,
-    samples: int | None,
-    ray_seed: int,
-) -> dict[str, Any]:
-    """The options of `vcc.Camera.compile` from those of the command line.
-
-    Raises:
-        InputError: a distance without a unit, or a refinement that is no number.
-    """
-    return {
-        "method": method,
-        "interpolation": interpolation,
-        "between_views": between_views,
-        "scene_distance": length(scene_distance, "--scene-distance"),
-        "refine": refinement(refine),
-        "samples": samples,
-        "seed": ray_seed,
-    }
-
-
-def refinement(given: str) -> int | str:
-    """What --refine says: "auto" or a whole number (whose range the camera checks).
-
-    Raises:
-        InputError: neither.
-    """
-    if given == "auto":
-        return given
-    try:
-        return int(given)
-    except ValueError:
-        raise InputError(f'--refine is "auto" or a whole number, not "{given}"') from None
-
-
-def length(given: str | None, option: str) -> float | None:
-    """Metres of a length on the command line; None if it is not given.
+def length(text: str, option: str) -> float:
+    """Metres of a length on the command line; "inf" is one.
 
     Raises:
         InputError: no unit, or not a length.
     """
-    from vcc.base.units import parse
-
-    if given is None:
-        return None
-    if given.strip().lower() in ("inf", "infinity"):
-        return math.inf
-    return parse(given, "length", option)
+    return math.inf if text.strip().lower() in ("inf", "infinity") else parse(text, "length", option)
 
 
-def memory_size(given: str | None, option: str = "--memory-limit") -> int | None:
-    """Bytes of a size on the command line, "800 MB" or "1.5 GiB"; None if it is not given.
+def lengths(text: str, option: str) -> float | tuple[float, float]:
+    """Metres of one length, or of two with a comma between them.
+
+    Raises:
+        InputError: more than two, no unit, or not a length.
+    """
+    parts = [length(part, option) for part in text.split(",")]
+    if len(parts) > 2:
+        raise InputError(f'{option} is "{text}": one length, or two with a comma between them')
+    return parts[0] if len(parts) == 1 else (parts[0], parts[1])
+
+
+def memory_size(text: str, option: str = "--memory-limit") -> int:
+    """Bytes of a size on the command line, "800 MB" or "1.5 GiB".
 
     Raises:
         InputError: no unit, or not a size above 0.
     """
-    if given is None:
-        return None
     units = {"kb": 1e3, "mb": 1e6, "gb": 1e9, "tb": 1e12, "kib": 2**10, "mib": 2**20, "gib": 2**30, "tib": 2**40}
-    number, unit = given.strip().rstrip("BbiIkKmMgGtT"), given.strip().lstrip("0123456789.eE+- ")
+    number, unit = text.strip().rstrip("BbiIkKmMgGtT"), text.strip().lstrip("0123456789.eE+- ")
     try:
         size = float(number) * units[unit.lower()]
     except (ValueError, KeyError):
         size = math.nan
     if not (size >= 1 and math.isfinite(size)):
-        raise InputError(f'{option} is "{given}": a size has a number and a unit, like "800 MB" or "1.5 GiB"')
+        raise InputError(f'{option} is "{text}": a size has a number and a unit, like "800 MB" or "1.5 GiB"')
     return int(size)
 
 
-def spacing_of(given: str | None) -> float | tuple[float, float] | None:
-    """Metres of one length, or of two (rows, columns) with a comma between them.
-
-    Raises:
-        InputError: more than two, no unit, or not a length.
-    """
-    if given is None:
-        return None
-    parts = [length(part, "--spacing") or 0.0 for part in given.split(",")]
-    if len(parts) > 2:
-        raise InputError(f'--spacing is "{given}": one length, or two with a comma between them')
-    return parts[0] if len(parts) == 1 else (parts[0], parts[1])
-
-
-def exposure_of(given: str) -> Any:
-    """ "auto" or a number above 0.
+def above_zero(text: str, option: str) -> float:
+    """A number above 0.
 
     Raises:
         InputError: anything else.
     """
-    if given == "auto":
-        return given
     try:
-        number = float(given)
+        number = float(text)
     except ValueError:
         number = math.nan
     if not (number > 0 and math.isfinite(number)):
-        raise InputError(f'--exposure is "{given}": it is auto or a number above 0, like 0.8')
+        raise InputError(f'{option} is "{text}": it is a number above 0, like 0.8')
     return number
 
 
-def exposure_time(given: str) -> Any:
-    """ "auto" or the seconds of a time on the command line.
+def whole_number(text: str, option: str) -> int:
+    """A whole number; one with a fraction is not rounded.
+
+    Raises:
+        InputError: anything else.
+    """
+    try:
+        return int(text)
+    except ValueError:
+        raise InputError(f'{option} is "{text}": it is a whole number, like 3') from None
+
+
+def duration(text: str, option: str) -> float:
+    """Seconds of a time on the command line.
 
     Raises:
         InputError: no unit, or not a time.
     """
-    from vcc.base.units import parse
-
-    return given if given == "auto" else parse(given, "time", "--exposure")
+    return parse(text, "time", option)
 
 
-def read_light_field(
-    folder: Path,
-    transfer: str,
-    spacing: str | None,
-    slope_per_pixel: float | None,
-    focus_distance: str | None,
-    orientation: str,
-    **layout: Any,
-) -> LightField | StoredLightField:
-    """The light field that the options of a command ask for, with a progress bar; a store is opened, not read.
+Reader = Callable[[str, str], Any]
+"""A value from its text and the name of its option, for messages."""
 
-    ``layout`` holds what some formats need besides, see `vcc.open_light_field`: views, order, every.
 
-    Raises:
-        InputError: what `vcc.open_light_field` and the lengths refuse; a store and cameras told beside it.
+def auto_or(read: Reader) -> Reader:
+    """What reads "auto" besides."""
+
+    def read_either(text: str, option: str) -> Any:
+        try:
+            return "auto" if text == "auto" else read(text, option)
+        except InputError as error:
+            raise InputError(f"{error}, or auto") from None
+
+    return read_either
+
+
+def quantity(
+    metavar: str,
+    read: Reader,
+    *,
+    tokens: int = 1,
+    repeated: bool = False,
+    written: Callable[[Any], str] = str,
+) -> Parameter:
+    """How an option is read, and its default shown; a minus in front is part of its value.
+
+    Args:
+        metavar: what stands for the value in help.
+        read: a token's value, or each token's where there are more.
+        tokens: how many words it takes.
+        repeated: whether it may be given more than once; the value is then a tuple.
+        written: a default as one would type it.
     """
-    from vcc.store import is_store, open_store
 
-    if is_store(folder):
-        told = {"--spacing": spacing, "--slope-per-pixel": slope_per_pixel, "--focus-distance": focus_distance}
-        names = [name for name, value in told.items() if value is not None]
-        names += ["--orientation"] if orientation != "auto" else []
-        names += [f"--{name}" for name in layout]
-        if names:
-            raise InputError(f"{folder} is a store, which states its cameras: leave out {', '.join(names)}")
-        return open_store(folder)
-    given: dict[str, Any] = {
-        "transfer": transfer,
-        "orientation": orientation,
-        "spacing": spacing_of(spacing),
-        "slope_per_pixel": slope_per_pixel,
-        "focus_distance": length(focus_distance, "--focus-distance"),
-        **layout,
-    }
-    from vcc.cli.console import progress
-    from vcc.formats import open_light_field
+    def converter(_: Any, given: tuple[Token, ...]) -> Any:
+        values = tuple(read(token.value, token.keyword or "") for token in given)
+        return values if tokens > 1 or repeated else values[0]
 
-    with progress("Reading views") as advance:
-        return open_light_field(folder, progress=advance, **given)
+    return Parameter(
+        converter=converter,
+        metavar=metavar,
+        n_tokens=tokens,
+        allow_leading_hyphen=True,
+        show_choices=False,
+        show_default=lambda default: None if default is None else written(default),
+    )
+
+
+Length = Annotated[float, quantity("LENGTH", length, written=short)]
+Lengths = Annotated[float | tuple[float, float], quantity("LENGTH", lengths, written=short)]
+Whole = Annotated[int, quantity("NUMBER", whole_number)]
+Counts = Annotated[
+    tuple[int, int], quantity("ROWS COLUMNS", whole_number, tokens=2, written=lambda two: "{} {}".format(*two))
+]
+Size = Annotated[int, quantity("SIZE", memory_size)]
+Factor = Annotated[float | Literal["auto"], quantity("auto|NUMBER", auto_or(above_zero))]
+Time = Annotated[float | Literal["auto"], quantity("auto|TIME", auto_or(duration))]
+
+CameraFile = Annotated[Path, Parameter(help="The camera file, .toml.")]
+LightFieldFile = Annotated[Path, Parameter(help="A folder of views, a file or a store.")]
+Output = Annotated[Path, Parameter(alias="-o", metavar="FILE")]
+File = Annotated[Path, Parameter(metavar="FILE")]
+OutputFile = Annotated[
+    Path,
+    Parameter(
+        help="What to make: a store (.zarr); or .npz, .mat, .png (ESLF), .mp4 (a flight through the views), a "
+        "folder (no ending).",
+    ),
+]
+FolderNames = Annotated[
+    Literal["hci", "views"],
+    Parameter(help="Names of views in a folder: as the HCI benchmark has them (the default), or row and column."),
+]
+Overwrite = Annotated[bool, Parameter(help="Replace what has that name.")]
+
+
+# --- records ---
+
+
+def told(record: Any, *, but: tuple[str, ...] = ()) -> list[str]:
+    """The options of a record that are not at their defaults, as they are typed."""
+    fields = [field for field in dataclasses.fields(record) if field.name not in but]
+    changed = [field.name for field in fields if getattr(record, field.name) != field.default]
+    return [f"--{name.replace('_', '-')}" for name in changed]
+
+
+@Parameter(name="*", group=READING)
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How a light field is read.
+
+    Args:
+        transfer: How pixel values of the views stand for light: srgb, as pictures for people do, linear
+            (proportional to it), or auto: as the format says, srgb where it says nothing.
+        spacing: Distance between neighbouring views with its unit, "1 mm"; two of them, "1 mm, 2 mm", are for rows
+            and columns. Default: what the folder states.
+        slope_per_pixel: Pixel pitch over focal length of the cameras, no unit. Default: what the folder states.
+        focus_distance: Where the views converge, "1.2 m", or inf if they are parallel. Default: what the folder
+            states.
+        orientation: Order of the views. auto checks it by parallax and puts it right; as-is takes the files as
+            they are.
+    """
+
+    transfer: Literal["auto", "srgb", "linear"] = "auto"
+    spacing: Lengths | None = None
+    slope_per_pixel: float | None = None
+    focus_distance: Length | None = None
+    orientation: Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"] = "auto"
+
+    def light_field(self, path: Path) -> LightField | StoredLightField:
+        """The light field that is asked for, with a progress bar; a store is opened, not read.
+
+        Raises:
+            InputError: what `vcc.open_light_field` refuses; a store and cameras told beside it.
+        """
+        if is_store(path):
+            if names := told(self, but=("transfer",)):
+                raise InputError(f"{path} is a store, which states its cameras: leave out {', '.join(names)}")
+            return open_store(path)
+        with progress("Reading views") as advance:
+            return open_light_field(path, progress=advance, **self._given())
+
+    def in_memory(self, path: Path) -> LightField:
+        """The light field that is asked for, all of it read."""
+        field = self.light_field(path)
+        return field if isinstance(field, LightField) else field.read()
+
+    def _given(self) -> dict[str, Any]:
+        chosen = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return {name: value for name, value in chosen.items() if value is not None}
+
+
+@Parameter(name="*", group=MAKING)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Making(How):
+    """How a picture is made; the help is that of `How`, but where lengths and sizes carry units here."""
+
+    scene_distance: Annotated[
+        Length | None,
+        Parameter(
+            help='Distance of the scene before the camera, "1.2 m", by which interpolation between views goes. '
+            "Default: what the light field states or shows."
+        ),
+    ] = None
+    refine: Annotated[int | Literal["auto"], quantity("auto|NUMBER", auto_or(whole_number))] = "auto"
+    samples: Whole | None = None
+    seed: Annotated[Whole, Parameter(name="--ray-seed")] = 0
+    threads: Whole | None = None
+    memory_limit: Annotated[
+        Size | None,
+        Parameter(
+            help='Of a light field in a store: what reading it in pieces may take, "1.5 GB". Default: 1 GiB. '
+            "Smaller pieces take more time by rays, all of which are traced for each piece."
+        ),
+    ] = None
+
+
+def _for_people(docstring: str) -> str:
+    """A record's docstring as help: sentences begin with a capital, code loses its quotes, None is a default."""
+    text = re.sub(r"(?m)^( +\w+: )(\w)", lambda match: match[1] + match[2].upper(), docstring)
+    text = re.sub(r'``"(\w+)"``', r"`\1`", text)
+    text = re.sub(r";\s+None\s+does\s+not\.", ".", text)
+    text = re.sub(r"[;.]\s+None\s+takes\s+", ". Default: ", text)
+    return as_options(text.replace("`vcc.Camera.explain`", "`vcc explain`"))
+
+
+Making.__doc__ = _for_people(How.__doc__ or "")

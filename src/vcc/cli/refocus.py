@@ -1,132 +1,106 @@
 """``vcc refocus``: pictures of a light field focused elsewhere, focal stacks, and what is sharp in all of them."""
 
-from __future__ import annotations
+from typing import Annotated, Any
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from cyclopts import Parameter, Token
 
 from vcc.base.errors import InputError
-from vcc.cli import options as given
 from vcc.cli.console import check_output, progress, show
-
-if TYPE_CHECKING:
-    from vcc.light_field import LightField
-    from vcc.store import StoredLightField
-
-EPILOG = (
-    'Example:  vcc refocus views/ --distance "1.2 m" -o picture.png\n\n'
-    'Example:  vcc refocus views/ --stack "0.8 m" "3 m" 12 -o stack.mp4\n\n'
-    "Example:  vcc refocus views/ --all-in-focus -o sharp.png"
+from vcc.cli.options import (
+    MAKING,
+    Factor,
+    Length,
+    LightFieldFile,
+    Output,
+    Reading,
+    Size,
+    length,
 )
+from vcc.files.pictures import WRITE_ENDINGS
+from vcc.light_field import LightField
+from vcc.plan.how import BetweenViews, Interpolation
+from vcc.recover.focal_stack import ENDINGS, focal_stack, focus_distances
+from vcc.recover.refocus import refocused
+from vcc.store import StoredLightField
+
 PICTURES_WITHOUT_STACK = 16
 """How many pictures --all-in-focus takes where --stack does not say."""
 
 
+def _stack(_: Any, tokens: tuple[Token, ...]) -> tuple[float, ...]:
+    """The distances of a focal stack from its nearest, farthest and number of pictures."""
+    nearest, farthest, number = (token.value for token in tokens)
+    if not number.isdecimal():
+        raise InputError(
+            f'--stack has "{number}" pictures: write two lengths and a whole number, "0.8 m" "3 m" 12'
+        )
+    return focus_distances(length(nearest, "--stack"), length(farthest, "--stack"), int(number))
+
+
 def refocus(
-    light_field: given.LightFieldFolder,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="A picture, .png, .tif, .exr or .npy; of a focal stack a film, .mp4 or .gif.",
-            show_default=False,
-        ),
-    ],
-    distance: Annotated[
-        str | None,
-        typer.Option(metavar="LENGTH", help='Where to focus, "1.2 m", or inf.', show_default=False),
-    ] = None,
+    light_field: LightFieldFile,
+    /,
+    *,
+    output: Output,
+    distance: Length | None = None,
     stack: Annotated[
-        tuple[str, str, int] | None,
-        typer.Option(
-            metavar="NEAREST FARTHEST PICTURES",
-            help='A focal stack: "0.8 m" "3 m" 12 focuses on 12 distances in equal steps of blur.',
-            show_default=False,
-        ),
+        tuple[float, ...] | None,
+        Parameter(converter=_stack, n_tokens=3, metavar="NEAREST FARTHEST PICTURES", allow_leading_hyphen=True),
     ] = None,
-    all_in_focus: Annotated[
-        bool,
-        typer.Option(
-            "--all-in-focus",
-            help="One picture of all that is sharp in any of a focal stack; without --stack of one over the "
-            "scene's depth.",
-        ),
-    ] = False,
-    aperture: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LENGTH",
-            help='Diameter of the round aperture, "10 mm". Default: all views.',
-            show_default=False,
-        ),
-    ] = None,
-    exposure: Annotated[
-        str,
-        typer.Option(
-            metavar="NUMBER",
-            help="Factor from radiance to the brightness of a picture for people. auto shows the brightest parts "
-            "white and says which factor that took.",
-        ),
-    ] = "auto",
-    frames_per_second: Annotated[float, typer.Option(metavar="NUMBER", help="Of a film.")] = 8.0,
-    interpolation: given.Interpolation = "sharp",
-    between_views: given.BetweenViews = "auto",
-    memory_limit: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SIZE",
-            help='What the pictures of a focal stack may take, "1.5 GB"; of one picture, what reading a store in '
-            "pieces may. Default: 1 GiB for pieces.",
-            show_default=False,
-        ),
-    ] = None,
-    transfer: given.Transfer = "auto",
-    spacing: given.Spacing = None,
-    slope_per_pixel: given.SlopePerPixel = None,
-    focus_distance: given.FocusDistance = None,
-    orientation: given.Orientation = "auto",
+    all_in_focus: bool = False,
+    aperture: Length | None = None,
+    exposure: Factor = "auto",
+    frames_per_second: float = 8.0,
+    interpolation: Annotated[Interpolation, Parameter(group=MAKING)] = "sharp",
+    between_views: Annotated[BetweenViews, Parameter(group=MAKING)] = "auto",
+    memory_limit: Size | None = None,
+    reading: Reading = Reading(),
 ) -> None:
-    """Focus a light field on a distance after the fact, on many, or on all of them."""
+    """Focus a light field on a distance after the fact, on many, or on all of them.
+
+    Args:
+        output: A picture, .png, .tif, .exr or .npy; of a focal stack a film, .mp4 or .gif.
+        distance: Where to focus, "1.2 m", or inf.
+        stack: A focal stack: "0.8 m" "3 m" 12 focuses on 12 distances in equal steps of blur.
+        all_in_focus: One picture of all that is sharp in any of a focal stack; without --stack of one over the
+            scene's depth.
+        aperture: Diameter of the round aperture, "10 mm". Default: all views.
+        exposure: Factor from radiance to the brightness of a picture for people. auto shows the brightest parts
+            white and says which factor that took.
+        frames_per_second: Of a film.
+        interpolation: Within a view; sharp is linear with what that costs given back.
+        between_views: Whether to interpolate between views where neighbouring ones differ by more than a pixel:
+            auto does along one parallax, where nothing is in focus; depth makes views in between by each pixel's
+            own depth, which is found first and kept in a store; none never does.
+        memory_limit: What the pictures of a focal stack may take, "1.5 GB"; of one picture, what reading a store
+            in pieces may. Default: 1 GiB for pieces.
+    """
     if distance is not None and (stack is not None or all_in_focus):
         raise InputError("--distance is one picture: leave out --stack and --all-in-focus")
     if distance is None and stack is None and not all_in_focus:
         raise InputError(
             'where should it focus? Give --distance "1.2 m", --stack "0.8 m" "3 m" 12 or --all-in-focus'
         )
-    from vcc.files.pictures import WRITE_ENDINGS
-    from vcc.recover.focal_stack import ENDINGS, focal_stack, focus_distances
-    from vcc.recover.refocus import refocused
-
     film = stack is not None and not all_in_focus
     output = check_output(output, ENDINGS if film else WRITE_ENDINGS)
-    factor = given.exposure_of(exposure)
-    where, limit = given.length(distance, "--distance"), given.memory_size(memory_limit)
     options: dict[str, Any] = {
-        "diameter": given.length(aperture, "--aperture"),
+        "diameter": aperture,
         "interpolation": interpolation,
         "between_views": between_views,
+        "memory_limit": memory_limit,
     }
-    distances = None
-    if stack is not None:
-        ends = [given.length(each, "--stack") or 0.0 for each in stack[:2]]
-        distances = focus_distances(ends[0], ends[1], stack[2])
-    field = given.read_light_field(light_field, transfer, spacing, slope_per_pixel, focus_distance, orientation)
-    if where is not None:
+    field = reading.light_field(light_field)
+    if distance is not None:
         with progress("Refocusing") as advance:
-            image = refocused(field, where, **options, memory_limit=limit, progress=advance)
-        show(image.save(output, exposure=factor).description)
+            image = refocused(field, distance, **options, progress=advance)
+        show(image.save(output, exposure=exposure).description)
         return
     with progress("Refocusing") as advance:
-        chosen = distances or _distances_of(field)
-        pictures = focal_stack(field, chosen, **options, memory_limit=limit, progress=advance)
+        pictures = focal_stack(field, stack or _distances_of(field), **options, progress=advance)
     if film:
-        show(pictures.save(output, frames_per_second=frames_per_second, exposure=factor))
+        show(pictures.save(output, frames_per_second=frames_per_second, exposure=exposure))
     else:
-        show(pictures.all_in_focus(memory_limit=limit).image.save(output, exposure=factor).description)
+        show(pictures.all_in_focus(memory_limit=memory_limit).image.save(output, exposure=exposure).description)
 
 
 def _distances_of(field: LightField | StoredLightField) -> tuple[float, ...]:
@@ -135,8 +109,6 @@ def _distances_of(field: LightField | StoredLightField) -> tuple[float, ...]:
     Raises:
         InputError: it shows none, or things beyond infinity.
     """
-    from vcc.recover.focal_stack import focus_distances
-
     found = field.measured_disparity_range()
     if found is None:
         raise InputError(

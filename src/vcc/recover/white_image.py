@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+from numpy.polynomial.polynomial import polygrid2d, polyvander2d
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.affine import Affine
@@ -312,8 +313,6 @@ def _evenly_lit(light: Array, grid: LensletGrid, index: NDArray[np.int64]) -> Ar
 
     Vignetting pulls centroids to its brighter side, and more so where micro-images touch.
     """
-    from numpy.polynomial.polynomial import polygrid2d, polyvander2d
-
     order = 4 if len(index) >= 60 else 2
     rows, columns = light.shape
     middle = np.array([(columns - 1) / 2, (rows - 1) / 2])

@@ -1,0 +1,244 @@
+"""The commands of ``vcc`` by name: what help says of each, and where it stands; running one, and how it ends."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+from collections.abc import Sequence
+
+from cyclopts import App, CycloptsError, Group, Parameter
+from cyclopts.exceptions import MissingArgumentError, UnknownCommandError, UnusedCliTokensError
+
+from vcc import __version__
+from vcc.base.errors import InputError
+from vcc.cli.console import notes, say
+
+COMMANDS = {
+    "capture": (
+        "Make the picture that a camera records of a light field.",
+        'vcc capture camera.toml views/ -o picture.png --spacing "1 mm"',
+        "vcc capture camera.toml views/ -o picture.exr --interpolation cubic",
+    ),
+    "expose": (
+        "Record a light field as a real sensor would: photons, electrons, noise, raw numbers.\n\n"
+        "The camera file says how the sensor does so, in a table sensor.electronics.",
+        'vcc expose camera.toml views/ -o raw.tif --exposure "10 ms" --seed 1',
+        "vcc expose camera.toml views/ -o raw.npy --picture picture.png",
+    ),
+    "explain": (
+        "Say how a picture would be made, what it costs and what to beware of.",
+        "vcc explain camera.toml views/",
+    ),
+    "info": (
+        "Say what a light field is: views, cameras, disparities, brightness, and what its files leave open.",
+        "vcc info views/",
+        "vcc info views/ --quick",
+        "vcc info views/ --picture grid.png",
+    ),
+    "plot": (
+        "Draw a camera from the side with rays, or a light field's way through it in phase space.",
+        "vcc plot camera.toml -o camera.svg",
+        "vcc plot camera.toml --phase-space --light-field views/",
+    ),
+    "demo": (
+        "Run the paper's examples and its own check, and explain them on a page of pictures.",
+        "vcc demo --small",
+        "vcc demo --light-field views/",
+    ),
+    "convert": (
+        "Put a light field into a store (Zarr), or into files of another format.\n\n"
+        "A store keeps samples bit for bit, with their cameras, opens at once and is read in parts: a camera "
+        "takes a picture of it in whatever memory there is (--memory-limit). It appears when it is whole.",
+        'vcc convert views/ scene.zarr --spacing "1 mm"',
+        "vcc convert views/ small.zarr --lossy jpegxl --quality 90",
+        "vcc convert scene.zarr half.zarr --dtype float16",
+        "vcc convert scene.zarr flight.mp4",
+    ),
+    "decode": (
+        "Turn the raw recording of a plenoptic or mask-modulated camera into a light field.\n\n"
+        "Where lenslets' micro-images are is taken from --centres, or found in --white, or follows from --camera. "
+        "Through a mask of cosines, carriers follow from --camera.",
+        "vcc decode raw.tif --camera camera.toml -o field.zarr",
+        "vcc decode raw.tif --white white.tif --dark dark.tif --views 9 -o views",
+        "vcc decode photo.lfp --white white.lfp -o field.zarr",
+        "vcc decode raw.png --centres centres.csv --color-filter BGGR -o field.zarr",
+    ),
+    "refocus": (
+        "Focus a light field on a distance after the fact, on many, or on all of them.",
+        'vcc refocus views/ --distance "1.2 m" -o picture.png',
+        'vcc refocus views/ --stack "0.8 m" "3 m" 12 -o stack.mp4',
+        "vcc refocus views/ --all-in-focus -o sharp.png",
+    ),
+    "spectrum": (
+        "Draw the spectrum of a light field: where its detail lies in frequency, and how optics would shear it.",
+        "vcc spectrum views/ -o spectrum.png",
+        "vcc spectrum scene.zarr -o section.svg --across vt --of section",
+    ),
+    "gallery": (
+        "Rebuild a published camera, from optics to decoded result, beside what was claimed of it.",
+        "vcc gallery",
+        "vcc gallery wavefront-coding",
+        "vcc gallery biprism-stereo --light-field views/ -o stereo",
+    ),
+}
+"""By name: what help says, and examples. ``vcc NAME`` is the function of that name in ``vcc.cli.NAME``."""
+
+RENDERERS = {
+    "mitsuba": (
+        "Render any scene of Mitsuba 3. Its own sensor says where the middle of the views stands and looks.",
+        'vcc synth mitsuba scene.xml -o out.zarr --views 20 20 --pixels 500 500 --aperture "20 mm" '
+        '--field-of-view "40 deg" --focus-distance "1.3 m" --samples 64',
+    ),
+    "demo": (
+        "Render a scene of ours by Mitsuba: glass, gold and gloss, at several depths.",
+        "vcc synth demo still-life -o still-life.zarr --views 9 9 --pixels 200 300",
+    ),
+    "planes": (
+        "Render pictures on planes, the nearer ones before the others.",
+        "vcc synth planes -o leaves.zarr",
+        'vcc synth planes -o two.zarr --plane "leaf.png, 0.8 m, 30 cm" --plane "town.jpg, 3 m, 2 m"',
+    ),
+    "pbrt": (
+        "Render a scene of PBRT by the program pbrt (on the PATH, or named by PBRT in the environment).",
+        "vcc synth pbrt scene.pbrt -o out.zarr --views 9 9 --pixels 400 600 --samples 128",
+    ),
+    "blender-script": (
+        "Write a script that renders the views in your own Blender, 3.6 to 5.x, and states their geometry.",
+        'vcc synth blender-script -o views.py --views 9 9 --aperture "40 mm"',
+        "blender scene.blend --background --python views.py",
+    ),
+    "depth": (
+        "Make the views around a picture from its depth; what no picture shows is made up behind edges.",
+        'vcc synth depth room.png room-depth.exr -o room.zarr --field-of-view "60 deg"',
+        'vcc synth depth kinect.png kinect-depth.png -o out.zarr --depth-unit "1 mm"',
+        'vcc synth depth view.png disparity.pfm -o out.zarr --meaning disparity --focus-distance "4 m"',
+    ),
+    "opengl": (
+        "Draw meshes by OpenGL, textured and simply lit: quick, without shadows, mirrors and glass.",
+        'vcc synth opengl teapot.glb -o teapot.zarr --field-of-view "40 deg"',
+        'vcc synth opengl room.obj -o room.zarr --unit "1 cm" --eye "0, 160, 300" --target "0, 100, 0"',
+    ),
+}
+"""Likewise: ``vcc synth NAME`` is the function of that name in ``vcc.cli.synth.NAME``."""
+
+
+def _commands(
+    name: str, package: str, commands: dict[str, tuple[str, ...]], help: str, epilogue: str, place: int = 0
+) -> App:
+    """An app whose commands are loaded when they are asked for, and listed in the order given."""
+    made = App(
+        name=name,
+        help=help,
+        help_epilogue=epilogue,
+        version=f"vcc {__version__}",
+        group_parameters=Group("Options", sort_key=1),
+        version_flags=["--version"] if name == "vcc" else [],
+        default_parameter=Parameter(negative=(), show_default=_worth_showing, allow_repeating=True),
+        suppress_keyboard_interrupt=False,
+        sort_key=place,
+    )
+    for flag in (*made.help_flags, *made.version_flags):
+        made[flag].group = "Options"
+    for number, (command, (words, *examples)) in enumerate(commands.items()):
+        function = command.replace("-", "_")
+        made.command(
+            f"{package}.{function}:{function}",
+            name=command,
+            help=words,
+            help_epilogue="\n\n".join(f"Example:  {example}" for example in examples),
+            sort_key=number,
+        )
+    return made
+
+
+def _worth_showing(default: object) -> str | None:
+    """A default in help; that an option is not given goes without saying."""
+    return None if default is None or default is False else str(default)
+
+
+app = _commands(
+    "vcc",
+    "vcc.cli",
+    COMMANDS,
+    "Virtual Computational Camera: what would a camera with unconventional optics record? "
+    "Give it a light field and a camera file, get the picture on its sensor.",
+    "Try:  vcc demo  ·  Help on a command:  vcc capture --help",
+)
+app.command(
+    _commands(
+        "synth",
+        "vcc.cli.synth",
+        RENDERERS,
+        "Make a light field of a scene: choose what renders it. Views are written as they are done, and the same "
+        "command goes on where it was stopped.",
+        "Help on a renderer:  vcc synth planes --help",
+        place=len(COMMANDS),
+    )
+)
+
+
+def main() -> None:
+    """Run the command line with the arguments of this process, and end it with an exit code.
+
+    0: done. 1: a fault in the program, with a traceback, or interrupted. 2: unusable input, with a
+    message on standard error.
+    """
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run a command; bad input becomes a message, and what is to be read with care a line.
+
+    Args:
+        arguments: as typed after ``vcc``.
+
+    Returns:
+        The exit code, see `main`.
+    """
+    with notes():
+        try:
+            app(list(arguments), exit_on_error=False, print_error=False, result_action="return_value")
+        except InputError as error:
+            return _refuse(str(error))
+        except CycloptsError as error:
+            return _refuse(_in_words(error), _help_on(error))
+        except KeyboardInterrupt:
+            say("Aborted.", "bold red", "")
+            return 1
+        except BrokenPipeError:  # who reads has seen enough; nothing more is to be written when Python ends
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 1
+    return 0
+
+
+def _refuse(message: str, way_out: str = "") -> int:
+    say("Error:", "bold red", message)
+    if way_out:
+        say("Help: ", "bold", way_out)
+    return 2
+
+
+def _in_words(error: CycloptsError) -> str:
+    """What is wrong with what was typed. What our converters refuse is said as they say it."""
+    if isinstance(error.__cause__, InputError):
+        return str(error.__cause__)
+    if isinstance(error, MissingArgumentError) and error.argument is not None and error.keyword is None:
+        kind = "argument" if error.argument.index is not None else "option"
+        return f"Missing {kind} {' / '.join(error.argument.names)}"
+    if isinstance(error, UnknownCommandError) and error.app is not None:  # its own words load every command
+        return _no_such_command((error.unused_tokens or [""])[0], [each for each in error.app if each[0] != "-"])
+    if isinstance(error, UnusedCliTokensError):
+        return f"Unexpected {' '.join(error.unused_tokens or [])}"
+    return str(error)
+
+
+def _no_such_command(asked: str, names: list[str]) -> str:
+    near = difflib.get_close_matches(asked, names, 1)
+    return f'There is no command "{asked}": ' + (
+        f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
+    )
+
+
+def _help_on(error: CycloptsError) -> str:
+    return " ".join(("vcc", *(error.command_chain or ()), "--help"))

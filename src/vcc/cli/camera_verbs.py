@@ -1,0 +1,41 @@
+"""What commands ask of a camera, with the options of the command line."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from vcc.advice.explain import Explanation
+from vcc.base.progress import Progress
+from vcc.camera import Camera
+from vcc.fields.samples import Samples
+from vcc.image import Image
+from vcc.plan.how import How
+from vcc.run.recording import Recording
+
+SAMPLES_WORTH_A_BAR = 3e8
+"""Below this, a picture takes less than a second, and asking for progress would only slow it down."""
+
+
+def captured(camera: Camera, field: Samples, how: How, progress: Progress) -> Image:
+    """The picture; progress is asked for where it takes long."""
+    plan = camera.compile(field, how, progress=progress)
+    long = field.whole() is None or plan.samples_touched * (field.grid.channels or 1) > SAMPLES_WORTH_A_BAR
+    return camera.capture(field, how, plan=plan, progress=progress if long else None)
+
+
+def exposed(
+    camera: Camera,
+    field: Samples,
+    exposure: float | Literal["auto"],
+    how: How,
+    *,
+    seed: int,
+    radiance: float,
+) -> Recording:
+    """What the sensor's electronics make of it; ``seed`` is the noise's, and that of ``how`` the rays'."""
+    return camera.expose(field, exposure, seed=seed, radiance=radiance, ray_seed=how.seed, how=how)
+
+
+def explained(camera: Camera, field: Samples, how: How) -> Explanation:
+    """The plan in words."""
+    return camera.explain(field, how)

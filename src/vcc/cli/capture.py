@@ -1,0 +1,34 @@
+"""``vcc capture``: the picture that a camera records."""
+
+from vcc.cli.camera_verbs import captured
+from vcc.cli.console import check_output, progress, show
+from vcc.cli.options import CameraFile, Factor, LightFieldFile, Making, Output, Reading
+from vcc.files.camera_file import load_camera
+from vcc.files.pictures import WRITE_ENDINGS
+
+
+def capture(
+    camera: CameraFile,
+    light_field: LightFieldFile,
+    /,
+    *,
+    output: Output,
+    exposure: Factor = "auto",
+    as_recorded: bool = False,
+    how: Making = Making(),
+    reading: Reading = Reading(),
+) -> None:
+    """Make the picture that a camera records of a light field.
+
+    Args:
+        output: The picture: .png and .tif are for people (sRGB); .exr and .npy hold linear values untouched.
+        exposure: Factor from irradiance to the brightness of a .png or .tif. auto shows the brightest parts white
+            and says which factor that took.
+        as_recorded: Leave the picture upside down, as it lies on the sensor.
+    """
+    output = check_output(output, WRITE_ENDINGS)
+    optics = load_camera(camera)
+    field = reading.light_field(light_field)
+    with progress("Capturing") as advance:
+        image = captured(optics, field, how, advance)
+    show(image.save(output, exposure=exposure, upright=not as_recorded).description)

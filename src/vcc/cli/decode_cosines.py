@@ -1,0 +1,61 @@
+"""``vcc decode`` of what was recorded through a mask of cosines."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import Group, Parameter
+from numpy.typing import NDArray
+
+from vcc.camera import Camera
+from vcc.cli.console import progress
+from vcc.cli.options import File
+from vcc.cli.raw_recordings import Recorded, read_raw
+from vcc.light_field import LightField
+from vcc.optics.electronics import Electronics
+from vcc.recover import decode_heterodyne
+from vcc.run.recording import demosaic
+
+
+@Parameter(name="*", group=Group("A camera with a mask of cosines", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class Cosines:
+    """What there is of a camera with a mask of cosines.
+
+    Args:
+        calibration: A recording of something white through a pinhole in the middle of the aperture. Default:
+            simulated.
+        border: Of the sensor, 0 to 0.25, that is faded out at each edge and cut off the views.
+    """
+
+    calibration: File | None = None
+    border: Annotated[float, Parameter(metavar="SHARE")] = 0.1
+
+
+def through_a_mask(path: Path, camera: Camera, recorded: Recorded, given: Cosines) -> tuple[LightField, str]:
+    """The light field of a camera with a mask of cosines, and how it was calibrated, in words.
+
+    Args:
+        path: of the recording.
+        camera: the optics.
+        recorded: how it was recorded.
+        given: what there is of it besides; without a calibration, one is simulated.
+
+    Raises:
+        InputError: what `vcc.recover.decode_heterodyne` refuses.
+    """
+    raw = read_raw(path, camera, None, recorded.black)
+    shadow = (
+        None if given.calibration is None else read_raw(given.calibration, camera, None, recorded.black).light()
+    )
+    light: NDArray[Any] = raw.light()
+    with progress("Decoding"):
+        if raw.color_filter is not None:
+            light = demosaic(light.astype(np.float32), Electronics(color_filter=raw.color_filter), "bilinear")
+        if recorded.upright:
+            light, shadow = light[::-1, ::-1], None if shadow is None else shadow[::-1, ::-1]
+        field = decode_heterodyne(
+            light, camera, calibration=shadow, border=given.border, memory_limit=recorded.memory_limit
+        )
+    return field, f"spectral tiles rearranged, calibration {'simulated' if shadow is None else 'given'}"

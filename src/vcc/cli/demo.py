@@ -1,0 +1,28 @@
+"""``vcc demo``: the paper's examples."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from vcc.cli.console import make_folder
+from vcc.demo import run_demo
+
+
+def demo(
+    *,
+    output: Annotated[Path, Parameter(alias="-o", metavar="FOLDER")] = Path("vcc-demo"),
+    light_field: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
+    small: bool = False,
+) -> None:
+    """Run the paper's examples and its own check, and explain them on a page of pictures.
+
+    Args:
+        output: Where the pictures go.
+        light_field: A light field of your own: a folder with a picture for each view. Default: a scene that the
+            demo makes.
+        small: Fewer views and pixels: a look in seconds.
+    """
+    from rich.console import Console
+
+    run_demo(make_folder(output), light_field, small, Console())

@@ -1,0 +1,19 @@
+"""``vcc explain``: how a picture would be made."""
+
+from vcc.cli.camera_verbs import explained
+from vcc.cli.console import show
+from vcc.cli.options import CameraFile, LightFieldFile, Making, Reading
+from vcc.files.camera_file import load_camera
+
+
+def explain(
+    camera: CameraFile,
+    light_field: LightFieldFile,
+    /,
+    *,
+    how: Making = Making(),
+    reading: Reading = Reading(),
+) -> None:
+    """Say how a picture would be made, what it costs and what to beware of."""
+    optics = load_camera(camera)
+    show(str(explained(optics, reading.light_field(light_field), how)))

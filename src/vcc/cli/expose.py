@@ -1,0 +1,48 @@
+"""``vcc expose``: what a real sensor would record."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from vcc.cli.camera_verbs import exposed
+from vcc.cli.console import check_output, show
+from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time, Whole
+from vcc.files.camera_file import load_camera
+from vcc.files.pictures import RAW_ENDINGS, WRITE_ENDINGS
+from vcc.run.recording import electronics_of
+
+
+def expose(
+    camera: CameraFile,
+    light_field: LightFieldFile,
+    /,
+    *,
+    output: Output,
+    exposure: Time = "auto",
+    seed: Whole = 0,
+    radiance: float = 1.0,
+    picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    how: Making = Making(),
+    reading: Reading = Reading(),
+) -> None:
+    """Record a light field as a real sensor would: photons, electrons, noise, raw numbers.
+
+    Args:
+        output: The raw numbers, .tif, .png or .npy: linear, not scaled, upside down as recorded.
+        exposure: Exposure time, "10 ms". auto brings the brightest 0.1 % of the pixels to 90 % of saturation.
+        seed: Of the sensor's noise, 0 or more.
+        radiance: What the light field's white (a value of 1) stands for, in W/(m² sr).
+        picture: Write also a picture of it for people, demosaiced and upright; or linear, .exr and .npy.
+    """
+    output = check_output(output, RAW_ENDINGS)
+    if picture is not None:
+        picture = check_output(picture, WRITE_ENDINGS)
+    optics = load_camera(camera)
+    electronics_of(optics.sensor)  # refused before the light field is read
+    field = reading.light_field(light_field)
+    recording = exposed(optics, field, exposure, how, seed=seed, radiance=radiance)
+    show(recording.save(output).description)
+    if picture is not None:
+        mosaic = recording.electronics.color_filter is not None
+        show((recording.demosaiced() if mosaic else recording.image()).save(picture).description)

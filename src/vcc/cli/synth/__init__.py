@@ -1,0 +1,1 @@
+"""``vcc synth``: light fields made of scenes, each renderer a command of its own."""

@@ -1,0 +1,59 @@
+"""``vcc synth demo``: scenes of ours."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from vcc.cli.console import show
+from vcc.cli.options import Length, Lengths
+from vcc.cli.synth.rendering import (
+    Angle,
+    Samples,
+    SampleType,
+    Seed,
+    Store,
+    Variant,
+    ViewsAndPixels,
+    check_store,
+    make,
+)
+from vcc.sources.mitsuba import MitsubaRenderer, demo_scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewsOfScene(ViewsAndPixels):
+    """Where the views are.
+
+    Args:
+        aperture: Side of the square that the views fill. Default: what the scene is made for.
+        field_of_view: Angle that the width of a picture spans. Default: what the scene is made for.
+        focus_distance: Where the views converge, or inf for parallel. Default: what the scene is made for.
+    """
+
+    aperture: Lengths | None = None
+    field_of_view: Angle | None = None
+    focus_distance: Length | None = None
+
+
+def demo(
+    name: Literal["still-life", "columns", "lamps"],
+    /,
+    *,
+    output: Store,
+    where: ViewsOfScene = ViewsOfScene(),
+    samples: Samples = 64,
+    seed: Seed = 0,
+    variant: Variant = "auto",
+    dtype: SampleType = "float16",
+) -> None:
+    """Render a scene of ours by Mitsuba: glass, gold and gloss, at several depths.
+
+    Args:
+        name: Which scene.
+    """
+    output, scene = check_store(output), demo_scene(name)
+    cameras = where.cameras(
+        aperture=scene.aperture, field_of_view=scene.field_of_view, focus_distance=scene.focus_distance
+    )
+    renderer = MitsubaRenderer(scene.scene, samples=samples, variant=variant, seed=seed)
+    show(f"{scene.name}: {scene.summary}")
+    make(renderer, cameras, output, dtype)

@@ -1,0 +1,122 @@
+"""``vcc synth depth``: views around one picture, from its depth map."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from cyclopts import Group, Parameter
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+from vcc.cli.console import show
+from vcc.cli.options import Counts, Length
+from vcc.cli.synth.rendering import SampleType, Store, Views, check_store, make
+from vcc.files.pfm import read_pfm
+from vcc.files.pictures import read_picture
+from vcc.files.transfer import decode
+from vcc.sources.depth_map import DepthMapScene
+
+
+@Parameter(name="*", group=Group("Reading the picture", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class ReadingDepth:
+    """How the picture and its depth are read.
+
+    Args:
+        meaning: Whether DEPTH holds distances, or disparities in pixels per view, positive nearer than where they
+            converge.
+        depth_unit: What a value of 1 in DEPTH stands for, "1 mm" in most 16-bit files.
+        transfer: How whole numbers in PICTURE stand for light.
+    """
+
+    meaning: Literal["depth", "disparity"] = "depth"
+    depth_unit: Length = 1.0
+    transfer: Literal["srgb", "linear"] = "srgb"
+
+    def picture(self, path: Path) -> NDArray[np.float32]:
+        """Linear light, (rows, columns, channels)."""
+        samples = read_picture(path)[0]
+        full = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
+        return decode(samples) if self.transfer == "srgb" else samples.astype(np.float32) / np.float32(full)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewsOfPicture(Views):
+    """Where the views are.
+
+    Args:
+        focus_distance: Where the views converge, "1.3 m", or inf for parallel. Default: in the middle of the
+            scene.
+    """
+
+    views: Counts = (9, 9)
+    focus_distance: Length | None = None
+
+
+def depth(
+    picture: Path,
+    depth: Path,
+    /,
+    *,
+    output: Store,
+    where: ViewsOfPicture = ViewsOfPicture(),
+    reading: ReadingDepth = ReadingDepth(),
+    dtype: SampleType = "float16",
+) -> None:
+    """Make the views around a picture from its depth; what no picture shows is made up behind edges.
+
+    Args:
+        picture: What the middle view sees.
+        depth: Of the same pixels: .exr, .pfm, .npy, .tif or 16-bit .png; one channel.
+    """
+    output = check_store(output)
+    radiance, found = reading.picture(picture), _depth_samples(depth)
+    if found.shape != radiance.shape[:2]:
+        raise InputError(
+            f"{depth} has {found.shape[1]}×{found.shape[0]} pixels, and {picture} has "
+            f"{radiance.shape[1]}×{radiance.shape[0]}: they must be of the same pixels"
+        )
+    pixels = (radiance.shape[0], radiance.shape[1])
+    if reading.meaning == "disparity":
+        if where.focus_distance is None:
+            raise InputError("disparities are against where the views converge: give --focus-distance")
+        cameras = where.cameras(pixels=pixels)
+        scene = DepthMapScene.from_disparity(radiance, found, cameras)
+    else:
+        distances = found * reading.depth_unit
+        _check_distances(distances, depth)
+        middle = 2 / (1 / distances.min() + 1 / distances.max())
+        cameras = where.cameras(pixels=pixels, focus_distance=float(middle))
+        scene = DepthMapScene.for_cameras(radiance, distances, cameras)
+    make(scene, cameras, output, dtype)
+    corner = scene.uncovered(cameras.camera(0, 0))
+    show(f"{float(corner.mean()):.1%} of the view in the corner was made up: behind edges and beyond the border")
+
+
+def _check_distances(distances: NDArray[np.float64], path: Path) -> None:
+    bad = ~(distances > 0)
+    if bad.any():
+        row, column = (int(n) for n in np.argwhere(bad)[0])
+        raise InputError(
+            f"{path} has no distance in {bad.sum()} pixels, the first at row {row}, column {column} "
+            f"({distances[row, column]:g} m): fill them first"
+        )
+
+
+def _depth_samples(path: Path) -> NDArray[np.float64]:
+    """The numbers of a depth map as they are stored, (rows, columns).
+
+    Raises:
+        InputError: a file that cannot be read, or one with channels that differ.
+    """
+    if path.suffix.lower() == ".pfm":
+        return read_pfm(path).astype(np.float64)
+    samples = np.asarray(read_picture(path)[0], dtype=np.float64)
+    if samples.ndim == 3:
+        if not (samples == samples[..., :1]).all():
+            raise InputError(
+                f"{path} has {samples.shape[2]} channels that differ: a depth map has one number a pixel"
+            )
+        samples = samples[..., 0]
+    return samples

@@ -1,0 +1,124 @@
+"""Options that renderers share, and what is made of them.
+
+A renderer's command is a function that ends in `make`; `vcc.cli.app` names it.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Group, Parameter
+
+from vcc.base.errors import InputError
+from vcc.base.units import deg, mm, parse, short
+from vcc.cli.console import progress, show
+from vcc.cli.options import Counts, Length, Lengths, Whole, quantity
+from vcc.sources import CameraArray, Renderer, synthesize
+
+WHERE = Group("Where the views are", sort_key=2)
+HOW = Group("How they are rendered", sort_key=3)
+
+
+def _angle(text: str, option: str) -> float:
+    return parse(text, "angle", option)
+
+
+Angle = Annotated[
+    float,
+    quantity("ANGLE", _angle, written=lambda angle: short(angle, "angle")),
+]
+Store = Annotated[Path, Parameter(alias="-o", metavar="STORE.zarr", help="The store to write, or to go on with.")]
+Unit = Annotated[Length, Parameter(group=WHERE, help='How long a unit of the scene is, "1 m", "1 cm".')]
+SampleType = Annotated[
+    Literal["float16", "float32", "uint8", "uint16"],
+    Parameter(
+        group=HOW,
+        help="What samples are kept as: float16 and float32 hold linear radiance as it is; in uint8 and uint16 "
+        "full scale is radiance 1, and what is brighter is cut off.",
+    ),
+]
+Samples = Annotated[Whole, Parameter(group=HOW, help="Paths per pixel.")]
+Seed = Annotated[Whole, Parameter(group=HOW, help="Of the noise: the same gives the same pictures.")]
+Variant = Annotated[
+    str,
+    Parameter(
+        group=HOW,
+        metavar="NAME",
+        help="Of Mitsuba. auto takes llvm_ad_rgb where the system's LLVM lets it work, and else scalar_rgb.",
+    ),
+]
+
+
+@Parameter(name="*", group=WHERE)
+@dataclass(frozen=True, kw_only=True)
+class Views:
+    """Where the views are; what is None is left to the scene.
+
+    Args:
+        views: Rows and columns of views.
+        aperture: Side of the square that the views fill, "20 mm"; two of them, "10 mm, 20 mm", are height and
+            width.
+        field_of_view: Angle that the width of a picture spans, "40 deg".
+        focus_distance: Where the views converge, "1.3 m", or inf for parallel.
+    """
+
+    views: Counts = (20, 20)
+    aperture: Lengths | None = 20 * mm
+    field_of_view: Angle | None = 40 * deg
+    focus_distance: Length | None = 1.3
+
+    def cameras(self, **otherwise: Any) -> CameraArray:
+        """Where the cameras stand.
+
+        Args:
+            otherwise: arguments of `CameraArray.over_aperture` for what is not told.
+
+        Raises:
+            InputError: what that refuses.
+        """
+        asked = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        told = {name: value for name, value in asked.items() if value is not None}
+        return CameraArray.over_aperture(**otherwise | told)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewsAndPixels(Views):
+    """Where the views are, and how fine.
+
+    Args:
+        pixels: Rows and columns of a view's pixels.
+    """
+
+    pixels: Counts = (500, 500)
+
+
+def check_store(path: Path) -> Path:
+    """Refuse a place where no store can be, before a scene is loaded.
+
+    Raises:
+        InputError: a name that does not end in .zarr, or a folder that is not there.
+    """
+    path = path.expanduser()
+    if path.suffix.lower() != ".zarr":
+        raise InputError(f'"{path.name}" is no name of a store: end it in .zarr')
+    if not path.parent.is_dir():
+        raise InputError(f"{path} cannot be written: there is no folder {path.parent}; make it first")
+    return path
+
+
+def make(renderer: Renderer, cameras: CameraArray, output: Path, dtype: str) -> None:
+    """Render all views into a store, with a bar and the time left, and say what came of it.
+
+    Raises:
+        InputError: what `synthesize` refuses.
+    """
+    try:
+        with progress("Rendering views") as advance:
+            made = synthesize(renderer, cameras, output, dtype=dtype, progress=advance)
+    finally:
+        close = getattr(renderer, "close", None)
+        if close is not None:
+            close()
+    (rows, columns), (high, wide) = cameras.views, cameras.pixels
+    show(f"{output}: {rows}×{columns} views of {high}×{wide} pixels, {made.shape[-1]} channels, {dtype}, linear")
