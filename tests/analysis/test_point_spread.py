@@ -239,7 +239,7 @@ def test_limits_of_the_expected_error():
 
 
 def refused(words):
-    return pytest.raises(vcc.errors.InputError, match=re.escape(words))
+    return pytest.raises(vcc.InputError, match=re.escape(words))
 
 
 def test_what_is_refused():

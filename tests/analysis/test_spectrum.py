@@ -180,7 +180,7 @@ def test_the_slice_has_channels_and_refuses_frames_that_mix_x_and_y():
     coloured = blob.light_field.replaced(blob.light_field.values[..., None] * np.array([1.0, 0.5]))
     section = fft4(coloured).sensor_slice()
     close(section.values[..., 1], 0.5 * section.values[..., 0], 1e-6)
-    with pytest.raises(vcc.errors.InputError, match="mixes x and y"):
+    with pytest.raises(vcc.InputError, match="mixes x and y"):
         fft4(Blob(MIXED).light_field).sensor_slice()
 
 
@@ -284,7 +284,7 @@ LIGHT_FIELD = vcc.LightField.from_views(np.ones((2, 2, 4, 4)), 1 * mm, 2e-3)
 
 
 def refused(words):
-    return pytest.raises(vcc.errors.InputError, match=re.escape(words))
+    return pytest.raises(vcc.InputError, match=re.escape(words))
 
 
 def test_what_is_refused():

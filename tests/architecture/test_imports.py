@@ -71,6 +71,7 @@ LATE = {
     "numba",
     "scipy",
     "matplotlib",
+    "PIL",
     "mpl_toolkits",
     "rich",
     "pint",

@@ -176,8 +176,6 @@ def test_a_light_field_on_disk_keeps_its_disparities(tmp_path):
 
 @pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 def test_disparities_are_found_once_and_kept_in_the_store(tmp_path, monkeypatch):
-    from vcc.recover import depth
-
     lf = field(disparity=None, disparity_range=(-1.3, 2.3))
     save_store(lf, tmp_path / "a.zarr")
     stored, steps = open_store(tmp_path / "a.zarr"), []
@@ -188,7 +186,7 @@ def test_disparities_are_found_once_and_kept_in_the_store(tmp_path, monkeypatch)
     def never(*_, **__):
         raise AssertionError("found again")
 
-    monkeypatch.setattr(depth, "depth_by_plane_sweep", never)
+    monkeypatch.setattr("vcc.fields.plane_sweep.plane_sweep", never)
     again = FAR_OUT_OF_FOCUS.capture(open_store(tmp_path / "a.zarr"), between_views="depth")
     np.testing.assert_array_equal(again.values, first.values)
     np.testing.assert_allclose(

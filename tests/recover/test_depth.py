@@ -150,13 +150,13 @@ def test_progress_and_figures() -> None:
 )
 def test_what_cannot_be_is_refused(change, message) -> None:
     field = field_of([TexturedPlane(waves(1.1, 1), 1.1)], (3, 3))
-    with pytest.raises(vcc.errors.InputError, match=message):
+    with pytest.raises(vcc.InputError, match=message):
         change(field)
 
 
 def test_a_range_that_cannot_be_measured_is_asked_for() -> None:
     field = vcc.LightField.from_views(np.full((3, 3, 20, 20), 0.5, np.float32), SPACING, SLOPE)
-    with pytest.raises(vcc.errors.InputError, match="give disparity_range"):
+    with pytest.raises(vcc.InputError, match="give disparity_range"):
         depth_by_plane_sweep(field)
 
 

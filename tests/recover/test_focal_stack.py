@@ -8,13 +8,10 @@ import pytest
 import vcc
 from command_line import run
 from vcc.base.affine import Affine
+from vcc.base.measures import psnr
 from vcc.recover.focal_stack import FocalStack, focal_stack, focus_distances
 from vcc.recover.refocus import refocused
 from vcc.showcase.scene import demo_scene
-
-
-def psnr(picture: np.ndarray, truth: np.ndarray) -> float:
-    return float(10 * np.log10(1 / np.mean((picture.astype(float) - truth) ** 2)))
 
 
 @pytest.fixture(scope="module")

@@ -259,29 +259,47 @@ def test_dark_corners_are_said():
     assert decoded.values[5, 5].min() == pytest.approx(1.0, abs=1e-3)
 
 
-def test_what_does_not_fit_is_refused():
+def broken(raw: np.ndarray) -> np.ndarray:
+    holed = raw.copy()
+    holed[0, 0] = np.nan
+    return holed
+
+
+OTHER_PITCH = LensletGrid("square", (0, 0), ((10, 0), (0, 10)))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda raw, camera: decode_plenoptic(raw[:-1], camera=camera), "sensor 153×153"),
+        (
+            lambda raw, camera: decode_plenoptic(raw, camera=camera, white=np.ones((150, 153))),
+            "the white image is 150×153",
+        ),
+        (lambda raw, camera: decode_plenoptic(raw), "not known"),
+        (lambda raw, camera: decode_plenoptic(raw, OTHER_PITCH, camera=camera), "not of this camera"),
+        (lambda raw, camera: decode_plenoptic(raw, camera=camera, views=11), "do not fit into micro-images"),
+        (lambda raw, camera: decode_plenoptic(raw, camera=camera, views=0), "one whole number or"),
+        (lambda raw, camera: decode_plenoptic(broken(raw), camera=camera), r"not finite.*\(0, 0\)"),
+        (
+            lambda raw, camera: LensletGrid.of_camera(vcc.Camera([vcc.Lens(focal_length=F)], camera.sensor)),
+            r"last element is a vcc\.LensArray",
+        ),
+        (lambda raw, camera: decode_plenoptic(raw, camera=camera, memory_limit=1000), "decoded light field"),
+        (
+            lambda raw, camera: LensletGrid("oblique", (0, 0), ((1, 0), (0, 1))),
+            "layout is 'square' or 'hexagonal'",
+        ),
+        (lambda raw, camera: LensletGrid("square", (0, np.nan), ((1, 0), (0, 1))), "finite pixels"),
+        (lambda raw, camera: LensletGrid("square", (0, 0), ((1, 0), (2, 0))), "along one line"),
+        (lambda raw, camera: LensletGrid.from_centres(np.random.default_rng(0).random((400, 2)) * 300), "lattice"),
+        (lambda raw, camera: LensletGrid.from_centres(np.zeros((20, 2))), "on top of one another"),
+    ],
+)
+def test_what_does_not_fit_is_refused(call, words):
     camera, image = plenoptic()
-    raw = image.values
-    with pytest.raises(InputError, match="sensor 153×153"):
-        decode_plenoptic(raw[:-1], camera=camera)
-    with pytest.raises(InputError, match="the white image is 150×153"):
-        decode_plenoptic(raw, camera=camera, white=np.ones((150, 153)))
-    with pytest.raises(InputError, match="not known"):
-        decode_plenoptic(raw)
-    with pytest.raises(InputError, match="not of this camera"):
-        decode_plenoptic(raw, LensletGrid("square", (0, 0), ((10, 0), (0, 10))), camera=camera)
-    with pytest.raises(InputError, match="do not fit into micro-images"):
-        decode_plenoptic(raw, camera=camera, views=11)
-    broken = raw.copy()
-    broken[0, 0] = np.nan
-    with pytest.raises(InputError, match="not finite"):
-        decode_plenoptic(broken, camera=camera)
-    with pytest.raises(InputError, match=r"last element is a vcc\.LensArray"):
-        LensletGrid.of_camera(vcc.Camera([vcc.Lens(focal_length=F)], camera.sensor))
-    with pytest.raises(InputError, match="decoded light field"):
-        decode_plenoptic(raw, camera=camera, memory_limit=1000)
-    with pytest.raises(InputError, match="lattice"):
-        LensletGrid.from_centres(np.random.default_rng(0).random((400, 2)) * 300)
+    with pytest.raises(InputError, match=words):
+        call(image.values, camera)
 
 
 # -- real recordings

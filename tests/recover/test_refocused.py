@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.measures import psnr
 from vcc.base.units import m, mm
 from vcc.files.pictures import read_picture
 from vcc.files.transfer import decode
@@ -40,10 +41,6 @@ def grating(distance: float, views: int = VIEWS, pixels: int = PIXELS) -> vcc.Li
 
 def middle(picture: np.ndarray, border: int = 16) -> np.ndarray:
     return picture[border:-border, border:-border]
-
-
-def psnr(picture: np.ndarray, truth: np.ndarray) -> float:
-    return float(10 * np.log10(1 / np.mean((picture.astype(float) - truth) ** 2)))
 
 
 @pytest.mark.parametrize("scene", [0.9 * m, 1.5 * m, 4 * m])
@@ -130,7 +127,7 @@ def test_a_view_meets_itself(name):
     view = decode(read_picture(file)[0])[100:356, 100:400]
     field = vcc.LightField.from_views(view[None, None], SPACING, SLOPE, FOCUS, disparity_range=(0.0, 0.0))
     found = middle(refocused(field, FOCUS).to_numpy(), 4)
-    reached = psnr(found, middle(view, 4))
+    reached = psnr(found, middle(view, 4), 1.0)
     print(f"{reached:.1f} dB")
     assert reached >= 60  # asked for by the project, of natural pictures
 
@@ -204,9 +201,9 @@ def test_left_out_views_of_the_demo_scene_are_predicted():
     for row, column in ((1, 1), (1, 2), (2, 3)):
         u, v = field.frame([column, row, 0, 0])[:2]
         truth = field.view(row, column).to_numpy()
-        swept = psnr(novel_view(half, u, v).to_numpy(), truth)
-        at_once = psnr(novel_view(half, u, v, scene_distance=1.3).to_numpy(), truth)
-        nearest = psnr(half.view(row // 2, column // 2).to_numpy(), truth)
+        swept = psnr(novel_view(half, u, v).to_numpy(), truth, 1.0)
+        at_once = psnr(novel_view(half, u, v, scene_distance=1.3).to_numpy(), truth, 1.0)
+        nearest = psnr(half.view(row // 2, column // 2).to_numpy(), truth, 1.0)
         print(f"view ({row}, {column}): swept {swept:.1f} dB, one plane {at_once:.1f}, nearest view {nearest:.1f}")
         # Views given differ by −2.8 to +3.1 pixels: a plane for each pixel must beat one for all, which must beat
         # no interpolation.

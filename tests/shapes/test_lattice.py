@@ -275,3 +275,16 @@ def test_a_lattice_and_its_openings_are_described_in_words():
     assert Lattice("hexagonal", 125e-6, 0.1).described() == "hexagonal cells (pitch 125 um, rotation 0.1 rad)"
     words = CellApertures(Lattice("square", 1e-3), 0.5).described()
     assert words == "cell apertures (lattice square cells (pitch 1 mm), scale 0.5)"
+
+
+@pytest.mark.parametrize("rotation", [0.0, 0.3])
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_cells_lie_at_whole_steps_along_the_rows_and_the_next_direction(layout, rotation):
+    lattice = Lattice(layout, pitch=0.3, rotation=rotation, offset=(0.1, -0.2))
+    row, column = np.mgrid[-5:6, -4:5]
+    along = column - row // 2 if layout == "hexagonal" else column
+    places = lattice.place_from_steps(np.stack([along, row], axis=-1))
+    np.testing.assert_allclose(places, np.stack(lattice.centre_of(row, column), axis=-1), atol=1e-12)
+    steps = lattice.place_from_steps.linear.T
+    assert np.linalg.norm(steps, axis=1) == pytest.approx([0.3, 0.3])
+    assert steps[0] @ steps[1] == pytest.approx(0.09 * (0.5 if layout == "hexagonal" else 0.0))

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.analysis.deblurring import expected_deblurring_error
+from vcc.analysis.deblurring import checked_power, expected_deblurring_error
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 
 Array = NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 _BATCH = 2**22
 """Numbers in the kernels that are transformed together: 16 MiB in single precision."""
@@ -89,9 +87,9 @@ def optimised_aperture(
         InputError: a noise of zero or less, powers that are negative or not finite, a kernel larger than the
             picture, fewer than 2 survivors or no more patterns than survivors, or probabilities outside 0 to 1.
     """
-    prior = np.asarray(power, dtype=np.float64)
     _check_search(cells, pixels_per_cell, population, survivors, generations, patience)
-    _check(noise, prior, cells * pixels_per_cell)
+    prior = checked_power(noise, power)
+    _check_size(prior, cells * pixels_per_cell)
     for name, value in (("exchange", exchange), ("mutation", mutation)):
         if not 0 <= value <= 1:
             raise InputError(f"{name} is a probability from 0 to 1, not {value}")
@@ -117,16 +115,19 @@ def optimised_aperture(
         children = _bred(random, bits, population - survivors, exchange, mutation)
         bits = np.concatenate([bits, children])
         errors = np.concatenate([errors, errors_of(children)])
-    message = f"stopped after all {done} generations"
-    if waited:
-        message += f", the last {waited} of which brought nothing better"
-    if converged:
-        message = f"converged: {waited} generations brought nothing better; {done} bred"
     pattern = bits[0].astype(np.float64)
     kernel = np.kron(pattern, np.ones((pixels_per_cell, pixels_per_cell))) / (cells * pixels_per_cell) ** 2
     # The search is in single precision; a dark pattern, the best of dark ones only, has no kernel.
     error = expected_deblurring_error(kernel, noise, prior) if pattern.any() else history[-1]
+    message = _ended(converged, done, waited)
     return OptimisedAperture(pattern, error, tuple(history), tuple(typical), converged, message)
+
+
+def _ended(converged: bool, done: int, waited: int) -> str:
+    if converged:
+        return f"converged: {waited} generations brought nothing better; {done} bred"
+    vain = f", the last {waited} of which brought nothing better" if waited else ""
+    return f"stopped after all {done} generations{vain}"
 
 
 class _Errors:
@@ -176,10 +177,8 @@ def _bred(
     return np.asarray(children ^ (random.random(children.shape) < mutation))
 
 
-def _check(noise: float, prior: Array, kernel: int) -> None:
-    if not (noise > 0 and math.isfinite(noise)):
-        raise InputError(f"noise is a standard deviation above 0, not {noise}")
-    if prior.ndim != 2 or not np.isfinite(prior).all() or prior.min(initial=0.0) < 0 or not prior.any():
+def _check_size(prior: Array, kernel: int) -> None:
+    if not prior.any():
         raise InputError("power is (rows, columns) of finite numbers of 0 or more, not all of them 0")
     if min(prior.shape) < kernel:
         raise InputError(

@@ -36,11 +36,7 @@ def expected_deblurring_error(kernel: ArrayLike, noise: float, power: ArrayLike)
             that are negative or not finite.
     """
     blur = np.asarray(kernel, dtype=np.float64)
-    prior = np.asarray(power, dtype=np.float64)
-    if not (noise > 0 and math.isfinite(noise)):
-        raise InputError(f"noise is a standard deviation above 0, not {noise}")
-    if prior.ndim != 2 or not np.isfinite(prior).all() or prior.min(initial=0.0) < 0:
-        raise InputError("power is (rows, columns) of finite numbers of 0 or more, one for each frequency")
+    prior = checked_power(noise, power)
     if blur.ndim != 2 or not np.isfinite(blur).all() or blur.min(initial=0.0) < 0 or not blur.any():
         raise InputError("a blur kernel is (rows, columns) of finite numbers of 0 or more, not all 0")
     if blur.shape[0] > prior.shape[0] or blur.shape[1] > prior.shape[1]:
@@ -51,6 +47,20 @@ def expected_deblurring_error(kernel: ArrayLike, noise: float, power: ArrayLike)
     transfer = np.abs(np.fft.fft2(blur, s=prior.shape)) ** 2
     # σ²/(|K|² + σ²/|F₀|²), written so that a frequency without power brings no error.
     return float(np.sum(noise**2 * prior / (transfer * prior + noise**2)))
+
+
+def checked_power(noise: float, power: ArrayLike) -> Array:
+    """|F₀|² of pictures as `expected_deblurring_error` takes it, float64.
+
+    Raises:
+        InputError: a noise of zero or less, or powers that are negative or not finite.
+    """
+    prior = np.asarray(power, dtype=np.float64)
+    if not (noise > 0 and math.isfinite(noise)):
+        raise InputError(f"noise is a standard deviation above 0, not {noise}")
+    if prior.ndim != 2 or not np.isfinite(prior).all() or prior.min(initial=0.0) < 0:
+        raise InputError("power is (rows, columns) of finite numbers of 0 or more, one for each frequency")
+    return prior
 
 
 def natural_image_power(

@@ -14,6 +14,7 @@ from vcc.base.errors import InputError
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, check_frame, check_shape, told_along_u
 from vcc.fields.parallax import disparity_range
+from vcc.fields.plane_sweep import disparity_maps
 from vcc.fields.sampled import Index, has_values, taken, to_dtype, to_numpy
 
 Progress = Callable[[int, int], None]
@@ -225,6 +226,4 @@ def _range_of(values: Any, frame: Affine) -> tuple[float, float] | None:
 
 def maps_of(samples: InMemory, progress: Progress | None) -> DisparityMaps:
     """The maps of disparities that samples show, found now."""
-    from vcc.recover.depth import disparity_maps
-
-    return disparity_maps(samples, progress=progress)  # type: ignore[arg-type]
+    return disparity_maps(samples, progress=progress)

@@ -5,15 +5,18 @@ stacks, deblurring, decoding of plenoptic and mask-modulated recordings, depth.
 from __future__ import annotations
 
 from vcc.recover.aberration import without_aberration
-from vcc.recover.deblur import Deblurred, blurred, richardson_lucy, sparse_gradients, wiener
+from vcc.recover.blur import blurred
+from vcc.recover.deblur import Deblurred, richardson_lucy, sparse_gradients, wiener
 from vcc.recover.defocus_depth import DefocusDepth, defocus_kernels, depth_from_defocus
 from vcc.recover.depth import DepthMap, depth_by_plane_sweep, depth_by_structure_tensor, disparity_error
 from vcc.recover.focal_stack import AllInFocus, FocalStack, focal_stack, focus_distances
 from vcc.recover.heterodyne import HeterodyneGeometry, decode_heterodyne, heterodyne_calibration
 from vcc.recover.heterodyne_band import band_limited, true_views
-from vcc.recover.plenoptic import LensletGrid, decode_plenoptic, find_lenslets
+from vcc.recover.lenslet_grid import LensletGrid
+from vcc.recover.plenoptic import decode_plenoptic
 from vcc.recover.refocus import ideal_camera, novel_view, refocused
 from vcc.recover.stereo import BiprismStereo, StereoDepth, depth_by_biprism
+from vcc.recover.white_image import find_lenslets
 
 __all__ = [
     "AllInFocus",

@@ -1,34 +1,24 @@
 """Deblurring with known point-spread functions: Wiener, Richardson–Lucy, and sparse gradients (total variation).
 
-A recording y is taken as y = K x + noise: every place of the picture x spreads over the pixels as its
-point-spread function (PSF). Where depth, and so the PSF, differs over the picture, masks say which part of it is
-in which layer, and K x = Σ_l k_l ∗ (m_l · x). That conserves light; it leaves out that near things hide what is
-behind.
-
-PSFs are arrays of floating-point numbers that sum to 1, rows before columns, in the orientation of the recording.
-Light of a point stays at the pixel that element (rows // 2, columns // 2) stands for; the others say where it
-strays to.
+What is undone is the blur of `vcc.recover.blur`, y = K x + noise: every place of the picture x spreads over the
+pixels as its point-spread function (PSF).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.memory import check_memory
+from vcc.base.progress import Progress
+from vcc.recover.blur import Blur, Borders, channels_first, channels_last
+from vcc.recover.recorded import numbers_of
 
 Array = NDArray[np.float64]
-Progress = Callable[[int, int], None]
-Borders = Literal["unknown", "periodic"]
 
-SUM_TOLERANCE = 1e-6
-"""How far from 1 a PSF, or the masks of a pixel, may sum to."""
 _PRESENT = 1e-9
 """Without noise, frequencies passed with less than this amplitude are taken as lost: rounding of double precision
 would come back a billion times larger."""
@@ -68,119 +58,6 @@ class Deblurred:
     message: str = "closed form"
 
 
-@dataclass(frozen=True, eq=False)
-class _Blur:
-    """K and its adjoint by FFT, on a domain that holds all that can reach the recording.
-
-    With periodic borders the domain is the recording itself. With unknown ones it is larger by the PSF, and only
-    the recording's part of K x is seen: light from beyond the borders is looked for, not assumed away.
-    """
-
-    psfs: Array  # (layers, rows, columns)
-    masks: Array | None  # (layers, domain)
-    shape: tuple[int, int]
-    domain: tuple[int, int]
-    start: tuple[int, int]
-    transfer: NDArray[np.complex128]  # (layers, rows, columns // 2 + 1)
-
-    @classmethod
-    def of(
-        cls,
-        psf: ArrayLike,
-        masks: ArrayLike | None,
-        shape: tuple[int, int],
-        borders: str,
-        several: bool = False,
-    ) -> _Blur:
-        from scipy import fft
-
-        if borders not in ("unknown", "periodic"):
-            raise InputError(f'borders is "unknown" or "periodic", not {borders!r}')
-        psfs = _checked_psf(psf, shape, several or masks is not None)
-        size = psfs.shape[1:]
-        middle = size[0] // 2, size[1] // 2
-        if borders == "periodic":
-            domain, start = shape, (0, 0)
-        else:
-            whole = [fft.next_fast_len(n + k - 1, real=True) for n, k in zip(shape, size, strict=True)]
-            domain, start = (whole[0], whole[1]), (size[0] - 1 - middle[0], size[1] - 1 - middle[1])
-        padded = np.zeros((len(psfs), *domain))
-        padded[:, : size[0], : size[1]] = psfs
-        padded = np.roll(padded, (-middle[0], -middle[1]), axis=(1, 2))
-        layers = None if masks is None else _checked_masks(masks, len(psfs), shape)
-        blur = cls(psfs, None, shape, domain, start, fft.rfft2(padded))
-        if layers is not None:
-            extended = np.stack([blur.extended(each, "edge") for each in layers])
-            object.__setattr__(blur, "masks", extended)
-        return blur
-
-    def extended(self, picture: Array, how: Literal["edge", "wrap"]) -> Array:
-        """A picture (rows, columns) on the whole domain: its edges go on, or blend into the opposite ones."""
-        after = [whole - n - s for whole, n, s in zip(self.domain, self.shape, self.start, strict=True)]
-        if how == "edge":
-            return np.pad(picture, [(s, a) for s, a in zip(self.start, after, strict=True)], mode="edge")
-        for axis in (0, 1):
-            gap = self.start[axis] + after[axis]
-            if gap == 0:
-                continue
-            last, first = picture.take([-1], axis), picture.take([0], axis)
-            share = (np.arange(gap) + 1) / (gap + 1)
-            bridge = last + (first - last) * (share[:, None] if axis == 0 else share)
-            picture = np.roll(np.concatenate([picture, bridge], axis), self.start[axis], axis)
-        return picture
-
-    def seen(self, whole: Array) -> Array:
-        """The recording's part of the domain."""
-        (top, left), (rows, columns) = self.start, self.shape
-        return whole[top : top + rows, left : left + columns]
-
-    def unseen(self, part: Array) -> Array:
-        """The adjoint of `seen`: zeros around."""
-        whole = np.zeros(self.domain)
-        self.seen(whole)[...] = part
-        return whole
-
-    def apply(self, whole: Array) -> Array:
-        """K x, (rows, columns) of the recording, for x on the domain."""
-        return self.seen(self.convolved(whole))
-
-    def convolved(self, whole: Array) -> Array:
-        """K x on all of the domain."""
-        from scipy import fft
-
-        layers = whole[None] if self.masks is None else self.masks * whole
-        return np.asarray(fft.irfft2((self.transfer * fft.rfft2(layers)).sum(axis=0), s=self.domain))
-
-    def adjoint(self, part: Array) -> Array:
-        """Kᵀ y on the domain, for y as the recording is."""
-        from scipy import fft
-
-        spectrum = np.conj(self.transfer) * fft.rfft2(self.unseen(part))
-        layers = np.asarray(fft.irfft2(spectrum, s=self.domain))
-        return np.asarray(layers.sum(axis=0) if self.masks is None else (self.masks * layers).sum(axis=0))
-
-
-def blurred(
-    picture: ArrayLike, psf: ArrayLike, *, masks: ArrayLike | None = None, borders: Borders = "unknown"
-) -> Array:
-    """The picture blurred: Σ_l k_l ∗ (m_l · x), the forward model of this module.
-
-    Args:
-        picture: (rows, columns[, channels]), any unit.
-        psf: (rows, columns); with masks (layers, rows, columns).
-        masks: (layers, rows, columns), the share of each pixel in each layer; None for one layer.
-        borders: "periodic" lets light that leaves on one side enter on the other; "unknown" continues the picture
-            by its edges, since what is beyond is not known.
-
-    Raises:
-        InputError: a PSF that is larger than the picture, not finite, negative or not of sum 1; masks that do not
-            fit or do not sum to 1; a picture that is not finite.
-    """
-    channels, shape = _checked_picture(picture, "the picture")
-    blur = _Blur.of(psf, masks, channels.shape[1:], borders)
-    return _reshaped(np.stack([blur.apply(blur.extended(each, "edge")) for each in channels]), shape)
-
-
 def wiener(
     recording: ArrayLike,
     psf: ArrayLike,
@@ -217,12 +94,13 @@ def wiener(
     """
     from scipy import fft
 
-    channels, shape = _checked_picture(recording, "the recording")
+    values = numbers_of(recording, "the recording")
     _check_noise(noise, above=False)
     if contrast is not None and not (contrast > 0 and math.isfinite(contrast)):
         raise InputError(f"the contrast of the prior must be above 0, not {contrast}")
-    rows, columns = channels.shape[1:]
-    blur = _Blur.of(psf, None, (rows, columns), borders, several=np.ndim(psf) == 3)
+    channels = channels_first(values)
+    rows, columns = values.shape[:2]
+    blur = Blur.of(psf, None, (rows, columns), borders, several=np.ndim(psf) == 3)
     down, right = np.meshgrid(fft.fftfreq(blur.domain[0]), fft.rfftfreq(blur.domain[1]), indexing="ij")
     squared = down**2 + right**2
     # Frequencies that the half spectrum leaves out are the conjugates of those it has.
@@ -244,7 +122,7 @@ def wiener(
         ratio = variance * squared / strength
         inverse = np.where(passed, np.conj(transfer) / np.where(passed, power + ratio, 1), 0)
         out[...] = blur.seen(np.asarray(fft.irfft2(inverse * spectrum, s=blur.domain)))
-    return Deblurred(_reshaped(found, shape))
+    return Deblurred(channels_last(found, values.shape))
 
 
 def _likeliest(
@@ -323,29 +201,24 @@ def richardson_lucy(
         InputError: a negative recording, no iterations, a negative tolerance, more memory needed than allowed, or
             what `blurred` refuses.
     """
-    channels, shape = _checked_picture(recording, "the recording")
-    if channels.min() < 0:
+    values = numbers_of(recording, "the recording")
+    if values.min() < 0:
         raise InputError(
             f"Richardson–Lucy is for light, which is not negative: the recording goes down to "
-            f"{channels.min():.6g}. Clip it (numpy.maximum(recording, 0)), or use wiener or sparse_gradients"
+            f"{values.min():.6g}. Clip it (numpy.maximum(recording, 0)), or use wiener or sparse_gradients"
         )
     _check_steps(iterations, tolerance)
-    blur = _Blur.of(psf, masks, channels.shape[1:], borders)
-    _check_memory(blur, len(channels), 6, memory_limit)
+    channels = channels_first(values)
+    blur = Blur.of(psf, masks, values.shape[:2], borders)
+    blur.check_memory(len(channels), 6, memory_limit)
     held = blur.adjoint(np.ones(blur.shape))
-    updated = held > _FAINT
-    divisor = np.where(updated, held, 1.0)
     picture = np.stack([np.full(blur.domain, max(float(each.mean()), 0.0)) for each in channels])
     objective: list[float] = []
     change, done = math.inf, 0
     while done < iterations and change > tolerance:
         moved = 0.0
         for channel, estimate in zip(channels, picture, strict=True):
-            foretold = blur.apply(estimate)
-            # Rounding of the FFT leaves tiny negative numbers where a picture is black.
-            floor = 1e-12 * max(float(channel.max()), 1e-300)
-            factor = np.where(updated, blur.adjoint(channel / np.maximum(foretold, floor)) / divisor, 1.0)
-            step = estimate * np.maximum(factor, 0) - estimate
+            step = _lucy_step(blur, held, channel, estimate)
             estimate += step
             moved += float((blur.seen(step) ** 2).sum())
         done += 1
@@ -355,15 +228,24 @@ def richardson_lucy(
         if progress is not None:
             progress(done, iterations)
     converged = change <= tolerance
-    return Deblurred(
-        _reshaped(np.stack([blur.seen(each) for each in picture]), shape),
-        converged,
-        done,
-        change,
-        tuple(objective),
-        f"{'converged' if converged else 'stopped'} after {done} steps, the last of which changed the picture by "
-        f"{change:.2g} of itself" + ("" if converged else f", more than the tolerance {tolerance:g}"),
-    )
+    found = np.stack([blur.seen(each) for each in picture])
+    message = _ended(converged, done, change) + ("" if converged else f", more than the tolerance {tolerance:g}")
+    return Deblurred(channels_last(found, values.shape), converged, done, change, tuple(objective), message)
+
+
+def _lucy_step(blur: Blur, held: Array, channel: Array, estimate: Array) -> Array:
+    """How an estimate on the domain changes; ``held`` is Kᵀ1, what of each pixel's light is seen."""
+    # Rounding of the FFT leaves tiny negative numbers where a picture is black.
+    floor = 1e-12 * max(float(channel.max()), 1e-300)
+    ratio = blur.adjoint(channel / np.maximum(blur.apply(estimate), floor))
+    updated = held > _FAINT
+    factor = np.where(updated, ratio / np.where(updated, held, 1.0), 1.0)
+    return np.asarray(estimate * np.maximum(factor, 0) - estimate)
+
+
+def _ended(converged: bool, steps: int, change: float) -> str:
+    how = "converged" if converged else "stopped"
+    return f"{how} after {steps} steps, the last of which changed the picture by {change:.2g} of itself"
 
 
 def sparse_gradients(
@@ -408,40 +290,22 @@ def sparse_gradients(
     """
     from scipy import optimize
 
-    channels, shape = _checked_picture(recording, "the recording")
+    values = numbers_of(recording, "the recording")
     _check_noise(noise, above=True)
     if not 0 < exponent <= 2:
         raise InputError(f"the exponent of the gradients lies above 0 and up to 2, not {exponent}")
     if gradient_scale is not None and not (gradient_scale > 0 and math.isfinite(gradient_scale)):
         raise InputError(f"gradient_scale must be above 0, not {gradient_scale}")
     _check_steps(iterations, tolerance)
-    blur = _Blur.of(psf, masks, channels.shape[1:], borders)
+    channels = channels_first(values)
+    blur = Blur.of(psf, masks, values.shape[:2], borders)
     # L-BFGS-B keeps 10 pairs of steps and gradients, beside some work of its own and ours.
-    _check_memory(blur, len(channels), 34, memory_limit)
+    blur.check_memory(len(channels), 34, memory_limit)
     linear = _linear_estimate(channels, blur, noise, masks, borders)
     start = np.stack([blur.extended(np.maximum(each, 0), "edge") for each in linear])
-    if gradient_scale is None:
-        lengths = np.sqrt((_gradient(start) ** 2).sum(axis=(0, 1)))
-        mean = exponent * float((lengths**exponent).sum()) / start.size
-        gradient_scale = max(mean ** (1 / exponent), 1e-3 * noise)  # a picture without gradients has no scale
-    scale, small = gradient_scale, (_SMOOTHED * gradient_scale) ** 2
-
-    def energy(flat: Array) -> tuple[float, Array]:
-        whole = flat.reshape(start.shape)
-        slope = np.empty_like(whole)
-        value = 0.0
-        for channel, estimate, out in zip(channels, whole, slope, strict=True):
-            left = blur.apply(estimate) - channel
-            value += float((left**2).sum()) / (2 * noise**2)
-            out[...] = blur.adjoint(left) / noise**2
-        edges = _gradient(whole)
-        squared = ((edges**2).sum(axis=(0, 1)) + small) / scale**2
-        value += float((squared ** (exponent / 2)).sum())
-        slope += _divergence_of(edges * (exponent / scale**2 * squared ** (exponent / 2 - 1)))
-        return value, slope.ravel()
-
+    scale = _likeliest_scale(start, exponent, noise) if gradient_scale is None else gradient_scale
     objective: list[float] = []
-    latest, change = start.ravel().copy(), math.inf
+    latest, change = start.ravel().copy(), 0.0
 
     def watch(intermediate_result: optimize.OptimizeResult) -> None:
         nonlocal latest, change
@@ -453,7 +317,7 @@ def sparse_gradients(
             progress(min(len(objective), iterations), iterations)
 
     found = optimize.minimize(
-        energy,
+        _Surprise(channels, blur, noise, exponent, scale),
         start.ravel(),
         jac=True,
         method="L-BFGS-B",
@@ -467,21 +331,56 @@ def sparse_gradients(
             "maxcor": 10,
         },
     )
-    picture = found.x.reshape(start.shape)
-    converged = bool(found.success)
-    return Deblurred(
-        _reshaped(np.stack([blur.seen(each) for each in picture]), shape),
-        converged,
-        int(found.nit),
-        change if objective else 0.0,
-        tuple(objective),
-        f"{'converged' if converged else 'stopped'} after {found.nit} steps, the last of which changed the "
-        f"picture by {change if objective else 0.0:.2g} of itself",
-    )
+    picture = np.stack([blur.seen(each) for each in found.x.reshape(start.shape)])
+    converged, steps = bool(found.success), int(found.nit)
+    message = _ended(converged, steps, change)
+    return Deblurred(channels_last(picture, values.shape), converged, steps, change, tuple(objective), message)
+
+
+@dataclass(frozen=True, eq=False)
+class _Surprise:
+    """The negative log posterior of `sparse_gradients`, and its slope.
+
+    Args:
+        channels: of the recording, (channels, rows, columns).
+        blur: K.
+        noise: σ.
+        exponent: p.
+        scale: b.
+    """
+
+    channels: Array
+    blur: Blur
+    noise: float
+    exponent: float
+    scale: float
+
+    def __call__(self, flat: Array) -> tuple[float, Array]:
+        """Of pictures on the blur's domain, (channels, rows, columns), all numbers in a row."""
+        whole = flat.reshape(len(self.channels), *self.blur.domain)
+        slope = np.empty_like(whole)
+        value = 0.0
+        for channel, estimate, out in zip(self.channels, whole, slope, strict=True):
+            left = self.blur.apply(estimate) - channel
+            value += float((left**2).sum()) / (2 * self.noise**2)
+            out[...] = self.blur.adjoint(left) / self.noise**2
+        edges = _gradient(whole)
+        small = (_SMOOTHED * self.scale) ** 2
+        squared = ((edges**2).sum(axis=(0, 1)) + small) / self.scale**2
+        value += float((squared ** (self.exponent / 2)).sum())
+        slope += _divergence_of(edges * (self.exponent / self.scale**2 * squared ** (self.exponent / 2 - 1)))
+        return value, slope.ravel()
+
+
+def _likeliest_scale(pictures: Array, exponent: float, noise: float) -> float:
+    """The b of greatest likelihood for pictures (channels, rows, columns)."""
+    lengths = np.sqrt((_gradient(pictures) ** 2).sum(axis=(0, 1)))
+    mean = exponent * float((lengths**exponent).sum()) / pictures.size
+    return max(float(mean ** (1 / exponent)), 1e-3 * noise)  # a picture without gradients has no scale
 
 
 def _linear_estimate(
-    channels: Array, blur: _Blur, noise: float, masks: ArrayLike | None, borders: Borders
+    channels: Array, blur: Blur, noise: float, masks: ArrayLike | None, borders: Borders
 ) -> Array:
     """The Wiener estimate, (channels, rows, columns), to start from; with masks that of each layer."""
     picture = np.moveaxis(channels, 0, 2)
@@ -520,73 +419,6 @@ def _divergence(counts: Array, foretold: Array) -> float:
     return float(kl_div(counts, np.maximum(foretold, 1e-12 * max(float(counts.max()), 1e-300))).sum())
 
 
-def _checked_picture(picture: ArrayLike, what: str) -> tuple[Array, tuple[int, ...]]:
-    """(channels, rows, columns) and the shape that was given."""
-    values = np.asarray(picture, dtype=np.float64)
-    if values.ndim not in (2, 3) or 0 in values.shape:
-        raise InputError(f"{what} has the axes (rows, columns[, channels]), not the shape {values.shape}")
-    if not np.isfinite(values).all():
-        bad = tuple(int(n) for n in np.argwhere(~np.isfinite(values))[0])
-        raise InputError(f"{what} has {values[bad]} at index {bad}: it must be finite. Mend such pixels first")
-    return np.moveaxis(values.reshape(*values.shape[:2], -1), 2, 0), values.shape
-
-
-def _reshaped(channels: Array, shape: tuple[int, ...]) -> Array:
-    return np.ascontiguousarray(np.moveaxis(channels, 0, 2)).reshape(shape)
-
-
-def _checked_psf(psf: ArrayLike, shape: tuple[int, int], layered: bool) -> Array:
-    psfs = np.asarray(psf)
-    if psfs.dtype.kind not in "fiu":
-        raise InputError(f"a PSF is an array of floating-point numbers, not of {psfs.dtype}")
-    if psfs.ndim != (3 if layered else 2) or 0 in psfs.shape:
-        axes = "(layers, rows, columns), one for each layer" if layered else "(rows, columns)"
-        raise InputError(
-            f"the PSF has the axes {axes}; this one has the shape {psfs.shape}"
-            + ("" if layered or psfs.ndim != 3 else ". A PSF for each depth goes with masks=")
-        )
-    psfs = psfs.astype(np.float64).reshape(-1, *psfs.shape[-2:])
-    for number, each in enumerate(psfs):
-        name = f"PSF {number}" if layered else "the PSF"
-        if not np.isfinite(each).all():
-            bad = tuple(int(n) for n in np.argwhere(~np.isfinite(each))[0])
-            raise InputError(f"{name} has {each[bad]} at index {bad}: it must be finite")
-        if each.min() < -SUM_TOLERANCE:
-            raise InputError(
-                f"{name} is negative ({each.min():.6g}): light does not spread so. Clip and normalise it"
-            )
-        if abs(each.sum() - 1) > SUM_TOLERANCE:
-            raise InputError(
-                f"{name} sums to {each.sum():.9g}, not to 1: divide it by its sum (or, where light is lost, "
-                "divide the recording by that share too)"
-            )
-        if each.shape[0] > shape[0] or each.shape[1] > shape[1]:
-            raise InputError(
-                f"{name} of {each.shape[0]}×{each.shape[1]} pixels is larger than the picture of "
-                f"{shape[0]}×{shape[1]}: cut off its dark borders, or take a larger picture"
-            )
-    return psfs
-
-
-def _checked_masks(masks: ArrayLike, layers: int, shape: tuple[int, int]) -> Array:
-    values = np.asarray(masks, dtype=np.float64)
-    if values.shape != (layers, *shape):
-        raise InputError(
-            f"{layers} PSFs and a picture of {shape[0]}×{shape[1]} need masks of shape {(layers, *shape)}, not "
-            f"{values.shape}"
-        )
-    if not np.isfinite(values).all() or values.min() < 0:
-        raise InputError("masks hold the share of each pixel in each layer: finite numbers, none negative")
-    wrong = np.abs(values.sum(axis=0) - 1) > SUM_TOLERANCE
-    if wrong.any():
-        bad = (int(np.argwhere(wrong)[0][0]), int(np.argwhere(wrong)[0][1]))
-        raise InputError(
-            f"the masks of pixel {bad} sum to {values[:, bad[0], bad[1]].sum():.6g}, not to 1: each pixel is "
-            "divided among the layers"
-        )
-    return values
-
-
 def _check_noise(noise: float, above: bool) -> None:
     if not (math.isfinite(noise) and (noise > 0 if above else noise >= 0)):
         raise InputError(
@@ -600,9 +432,3 @@ def _check_steps(iterations: int, tolerance: float) -> None:
         raise InputError(f"iterations is a whole number of 1 or more, not {iterations}")
     if not tolerance >= 0:
         raise InputError(f"the tolerance is 0 or more, not {tolerance}")
-
-
-def _check_memory(blur: _Blur, channels: int, copies: int, memory_limit: int | None) -> None:
-    needed = 8 * blur.domain[0] * blur.domain[1] * (copies * channels + 5 * len(blur.psfs))
-    what = f"deblurring {channels} channels of {blur.domain[0]}×{blur.domain[1]} samples"
-    check_memory(needed, memory_limit, what, "deblur channel by channel")

@@ -22,6 +22,7 @@ from vcc.camera import Camera
 from vcc.fields.sampled import to_numpy
 from vcc.image import Image
 from vcc.light_field import LightField
+from vcc.recover.recorded import numbers_of
 
 Array = NDArray[np.float64]
 
@@ -129,7 +130,6 @@ def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: flo
     widest = aperture * max(abs(s) for s in spread.values()) / pitch
     size = 2 * math.ceil(widest / 2 + 1) + 1
     close = replace(camera.sensor, shape=(size, size), decentre=(0.0, 0.0), electronics=None)
-    point_camera = Camera(camera.elements, close)
     views = max(_FEWEST_VIEWS, math.ceil(_VIEWS_PER_PIXEL * widest))
     kernels = []
     for distance in away:
@@ -143,19 +143,22 @@ def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: flo
             distance,
             disparity_range=(0.0, 0.0),
         )
-        with warnings.catch_warnings():
-            # Around a point there is nothing: that its light field does not fill the sensor is as it should be.
-            warnings.simplefilter("ignore", ResultWarning)
-            # Linear: the picture of one point stays without ringing, and nowhere below 0.
-            picture = point_camera.capture(
-                point, method="footprints", interpolation="linear", between_views="none"
-            )
-            values = to_numpy(picture.values)
-        total = float(values.sum(dtype=np.float64))
-        if not total > 0:
-            raise InputError(f"no light of a point at {distance:g} m reaches the sensor on the axis")
-        kernels.append(values.astype(np.float64) / total)
+        kernels.append(_kernel(Camera(camera.elements, close), point, distance))
     return kernels
+
+
+def _kernel(camera: Camera, point: LightField, distance: float) -> Array:
+    """The picture of a point by a camera, divided by its light."""
+    with warnings.catch_warnings():
+        # Around a point there is nothing: that its light field does not fill the sensor is as it should be.
+        warnings.simplefilter("ignore", ResultWarning)
+        # Linear: the picture of one point stays without ringing, and nowhere below 0.
+        picture = camera.capture(point, method="footprints", interpolation="linear", between_views="none")
+    values = to_numpy(picture.values)
+    total = float(values.sum(dtype=np.float64))
+    if not total > 0:
+        raise InputError(f"no light of a point at {distance:g} m reaches the sensor on the axis")
+    return np.asarray(values.astype(np.float64) / total)
 
 
 def depth_from_defocus(
@@ -206,26 +209,13 @@ def depth_from_defocus(
             kernel larger than the picture or a block or not of sum 1, a picture with NaNs or too small for one
             block, a noise of zero or less, more memory needed than allowed.
     """
-    values = _values(image)
+    numbers = numbers_of(image, "the picture")
+    values = numbers.reshape(*numbers.shape[:2], -1)
     spreads = [np.asarray(kernel, np.float64) for kernel in kernels]
     _check_candidates(spreads, distances, values.shape[:2])
     if not (noise > 0 and math.isfinite(noise)):
         raise InputError(f"noise must be greater than 0, in the picture's units, not {noise}")
-    step = max(1, block // 2) if step is None else step
-    if not (block >= 4 and step >= 1):
-        raise InputError(f"block is 4 pixels or more and step 1 or more, not {block} and {step}")
-    largest = max(max(kernel.shape) for kernel in spreads)
-    if largest > block:
-        raise InputError(
-            f"the largest kernel has {largest} pixels a side, and a block {block}: take blocks of {largest} "
-            "or more"
-        )
-    starts = [np.arange(0, length - block + 1, step) for length in values.shape[:2]]
-    if not (starts[0].size and starts[1].size):
-        raise InputError(
-            f"a picture of {values.shape[0]}×{values.shape[1]} pixels holds no block of {block}: take a "
-            "smaller block"
-        )
+    starts = _block_starts(values.shape[:2], spreads, block, max(1, block // 2) if step is None else step)
     blocks, parts = starts[0].size * starts[1].size, _SECTORS * _RINGS * values.shape[2]
     needed = 8 * blocks * (3 * block**2 + len(spreads) * parts) + 8 * 4 * (_FINER * block) ** 2
     check_memory(needed, memory_limit, "depth from defocus", "give a part of the picture")
@@ -246,11 +236,29 @@ def depth_from_defocus(
     away = tuple(float(distance) for distance in distances)
     return DefocusDepth(
         **_decided(-np.minimum(difference, trusted), away),
-        rows=starts[0] + (block - 1) / 2,
-        columns=starts[1] + (block - 1) / 2,
+        rows=np.asarray(starts[0] + (block - 1) / 2, np.float64),
+        columns=np.asarray(starts[1] + (block - 1) / 2, np.float64),
         block=block,
         distances=away,
     )
+
+
+def _block_starts(shape: tuple[int, ...], kernels: list[Array], block: int, step: int) -> list[NDArray[np.intp]]:
+    """The first rows and the first columns of blocks."""
+    if not (block >= 4 and step >= 1):
+        raise InputError(f"block is 4 pixels or more and step 1 or more, not {block} and {step}")
+    largest = max(max(kernel.shape) for kernel in kernels)
+    if largest > block:
+        raise InputError(
+            f"the largest kernel has {largest} pixels a side, and a block {block}: take blocks of {largest} "
+            "or more"
+        )
+    starts = [np.arange(0, length - block + 1, step) for length in shape]
+    if not (starts[0].size and starts[1].size):
+        raise InputError(
+            f"a picture of {shape[0]}×{shape[1]} pixels holds no block of {block}: take a smaller block"
+        )
+    return starts
 
 
 def _decided(log_likelihood: Array, distances: Sequence[float]) -> dict[str, Any]:
@@ -308,20 +316,6 @@ def _crosses(low: float, high: float, focus: float) -> str:
         f"candidates from {low:g} to {high:g} m cross the focal plane at about {focus:g} m: a blur there has two "
         "distances, one on each side, and this method cannot tell which. Give candidates on one side of it"
     )
-
-
-def _values(image: Image | ArrayLike) -> Array:
-    """(rows, columns, channels), finite."""
-    given: Any = to_numpy(image.values) if isinstance(image, Image) else np.asarray(image)
-    if given.ndim not in (2, 3) or 0 in given.shape:
-        raise InputError(f"a picture has (rows, columns[, channels]), not shape {given.shape}")
-    values = given.astype(np.float64)
-    if not np.isfinite(values).all():
-        raise InputError(
-            f"the picture holds {np.count_nonzero(~np.isfinite(values))} values that are NaN or infinite: "
-            "replace them first, or give a part without them"
-        )
-    return np.asarray(values.reshape(*values.shape[:2], -1))
 
 
 def _check_candidates(kernels: list[Array], distances: Sequence[float], shape: tuple[int, ...]) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory, check_samples
+from vcc.base.progress import Progress
+from vcc.files import transfer
+from vcc.files.atomic import atomic_path
+from vcc.files.pictures import auto_exposure, checked_exposure
+from vcc.formats import video
 from vcc.image import Image
-from vcc.recover.refocus import refocused
-
-if TYPE_CHECKING:
-    from vcc.light_field import LightField
-    from vcc.store import StoredLightField
-
-Progress = Callable[[int, int], None]
+from vcc.light_field import LightField
+from vcc.recover.refocus import check_distance, refocused
+from vcc.store import StoredLightField
 
 ENDINGS = (".mp4", ".gif")
 _NOTHING_SHARP = 1e-12
@@ -74,7 +75,8 @@ class FocalStack:
             raise InputError(
                 f"{len(self.pictures)} pictures have {len(self.distances)} distances: give one for each"
             )
-        _check_distances(self.distances)
+        for distance in self.distances:
+            check_distance(distance, "a distance to focus on")
         if not np.isfinite(self.pictures).all():
             bad = tuple(int(n) for n in np.argwhere(~np.isfinite(self.pictures))[0])
             raise InputError(f"a focal stack has finite samples; at index {bad} it has {self.pictures[bad]}")
@@ -161,20 +163,8 @@ class FocalStack:
             InputError: another ending, an impossible rate, pictures of neither 1 nor 3 channels, no PyAV for an
                 MP4, or a place that cannot be written to.
         """
-        from vcc.files import transfer
-        from vcc.files.atomic import atomic_path
-        from vcc.files.pictures import auto_exposure, checked_exposure
-        from vcc.formats import video
-
         path = Path(path).expanduser()
-        ending = path.suffix.lower()
-        if ending not in ENDINGS:
-            raise InputError(f'a focal stack is written to a name that ends in .mp4 or .gif, not "{path.name}"')
-        if not 0 < frames_per_second <= (50 if ending == ".gif" else math.inf) or math.isinf(frames_per_second):
-            raise InputError(
-                f"frames_per_second is a number above 0{' and up to 50' if ending == '.gif' else ''}, not "
-                f"{frames_per_second}"
-            )
+        _check_film(path, frames_per_second)
         count, rows, columns = self.pictures.shape[:3]
         channels = self.pictures.reshape(count, rows, columns, -1)
         if channels.shape[3] not in (1, 3):
@@ -193,17 +183,10 @@ class FocalStack:
             return np.ascontiguousarray(np.broadcast_to(encoded, (rows, columns, 3)))
 
         with atomic_path(path) as temporary:
-            if ending == ".gif":
+            if path.suffix.lower() == ".gif":
                 _write_gif(temporary, [codes(number) for number in way], frames_per_second)
             else:
-                av = video.library()
-                # The common chroma of H.264 goes by pairs of pixels.
-                even = ((0, rows % 2), (0, columns % 2), (0, 0))
-                frames = (np.pad(codes(number), even, mode="edge") for number in way)
-                try:
-                    video.encode(av, temporary, frames, frames_per_second, quality=18, lossless=False)
-                except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
-                    raise InputError(f"{path} could not be written as a video: {error}") from error
+                _write_mp4(temporary, (codes(number) for number in way), frames_per_second, path)
         return (
             f"{path}: {count} pictures of {columns}×{rows} pixels in {len(way)} frames, {frames_per_second:g} a "
             f"second, exposure {factor:.6g}, {clipped:.2%} of the pixels clipped"
@@ -221,7 +204,8 @@ def focus_distances(nearest: float, farthest: float, count: int) -> tuple[float,
     Raises:
         InputError: a distance of zero or less, the farther one nearer, or a count below 1.
     """
-    _check_distances((nearest, farthest))
+    for distance in (nearest, farthest):
+        check_distance(distance, "a distance to focus on")
     if nearest > farthest:
         raise InputError(
             f"the nearest distance, {nearest} m, lies beyond the farthest, {farthest} m: exchange them"
@@ -258,7 +242,8 @@ def focal_stack(
     distances = tuple(float(distance) for distance in distances)
     if not distances:
         raise InputError("a focal stack needs at least one distance to focus on")
-    _check_distances(distances)
+    for distance in distances:
+        check_distance(distance, "a distance to focus on")
     rows, columns = light_field.shape[2:4]
     shape = (len(distances), rows, columns, *((light_field.channels,) if light_field.channels else ()))
     check_samples(shape, memory_limit, "the focal stack", "take fewer distances or smaller views")
@@ -272,6 +257,28 @@ def focal_stack(
     return FocalStack(pictures, distances, frame)
 
 
+def _check_film(path: Path, frames_per_second: float) -> None:
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise InputError(f'a focal stack is written to a name that ends in .mp4 or .gif, not "{path.name}"')
+    if not 0 < frames_per_second <= (50 if ending == ".gif" else math.inf) or math.isinf(frames_per_second):
+        raise InputError(
+            f"frames_per_second is a number above 0{' and up to 50' if ending == '.gif' else ''}, not "
+            f"{frames_per_second}"
+        )
+
+
+def _write_mp4(path: Path, frames: Iterable[NDArray[np.uint8]], frames_per_second: float, told: Path) -> None:
+    """An H.264 film; ``told`` is what to call the file in an error."""
+    av = video.library()
+    # The common chroma of H.264 goes by pairs of pixels.
+    even = (np.pad(each, ((0, each.shape[0] % 2), (0, each.shape[1] % 2), (0, 0)), mode="edge") for each in frames)
+    try:
+        video.encode(av, path, even, frames_per_second, quality=18, lossless=False)
+    except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
+        raise InputError(f"{told} could not be written as a video: {error}") from error
+
+
 def _write_gif(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: float) -> None:
     """An animated GIF by Pillow, which Matplotlib brings; it takes 256 colours for each frame, without FFmpeg."""
     from PIL import Image as Picture
@@ -280,11 +287,3 @@ def _write_gif(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: f
     pictures[0].save(
         path, save_all=True, append_images=pictures[1:], duration=1000 / frames_per_second, loop=0, optimize=False
     )
-
-
-def _check_distances(distances: Sequence[float]) -> None:
-    for distance in distances:
-        if not distance > 0:  # NaN too
-            raise InputError(
-                f"a distance to focus on must be greater than 0 m (infinite is allowed), not {distance}"
-            )

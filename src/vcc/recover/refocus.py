@@ -4,29 +4,25 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress
 from vcc.camera import Camera
 from vcc.fields.grid import Grid
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Element, Lens, Mask
 from vcc.optics.sensor import Sensor
+from vcc.plan.model import Plan
 from vcc.plan.operators import AlongAxes, Blur
 from vcc.shapes import patterns
-
-if TYPE_CHECKING:
-    from vcc.plan.model import Plan
-    from vcc.store import StoredLightField
-
-Progress = Callable[[int, int], None]
+from vcc.store import StoredLightField
 
 IMAGE_DISTANCE = 50e-3
 """How far behind the lens the sensor of the ideal camera stands, metres. Pictures do not depend on it: pixels and
@@ -65,7 +61,7 @@ def ideal_camera(
         InputError: a distance or diameter of zero or less, a centre without a diameter, or a light field given in
             the plane of that distance, where all pixels of a view show the same place.
     """
-    _check_distance(distance, "distance")
+    check_distance(distance, "distance")
     if diameter is not None and not diameter > 0:
         raise InputError(f"the diameter of the aperture must be greater than 0 m, not {diameter}")
     if diameter is None and tuple(centre) != (0.0, 0.0):
@@ -228,7 +224,7 @@ def novel_view(
     """
     i, j = _view_index(light_field, u, v)
     if scene_distance is not None:
-        _check_distance(scene_distance, "scene_distance")
+        check_distance(scene_distance, "scene_distance")
     around = _views_around(light_field, i, j)
     farthest = max(max(abs(near.column - i), abs(near.row - j)) for near in around)
     if scene_distance is not None or farthest == 0:
@@ -371,6 +367,11 @@ def _view_index(light_field: LightField, u: float, v: float) -> tuple[float, flo
     return index[0], index[1]
 
 
-def _check_distance(distance: float, name: str) -> None:
+def check_distance(distance: float, name: str) -> None:
+    """Refuse what is no distance to focus on.
+
+    Raises:
+        InputError: zero or less, or NaN.
+    """
     if not distance > 0:  # NaN too
         raise InputError(f"{name} must be greater than 0 m (infinite is allowed), not {distance}")

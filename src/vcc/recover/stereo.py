@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.camera import Camera
-from vcc.fields.sampled import to_numpy
 from vcc.image import Image
 from vcc.optics import Biprism, Lens
+from vcc.recover.recorded import grey, numbers_of
 
 Array = NDArray[np.float64]
 
@@ -188,11 +188,7 @@ def _checked(image: Image, camera: Camera) -> Array:
         )
     if not image.inverted:
         raise InputError("the picture is turned upright: give it as the camera captured it")
-    values = to_numpy(image.values).astype(np.float64)
-    values = values if values.ndim == 2 else values.mean(axis=2)
-    if not np.isfinite(values).all():
-        raise InputError("the picture holds NaN or infinite values: replace them first")
-    return np.asarray(values)
+    return grey(numbers_of(image, "the picture"))
 
 
 def _mixed(stereo: BiprismStereo, lens: Lens) -> float:

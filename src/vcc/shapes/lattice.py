@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.shapes.patterns import RASTER_LIMIT, RASTER_PER_CELL, Cells, Pattern
 
@@ -81,6 +82,17 @@ class Lattice:
         """How far a cell, rotation included, extends from its centre along (x, y), metres."""
         x, y = np.abs(self.corners).max(axis=0)
         return float(x), float(y)
+
+    @property
+    def place_from_steps(self) -> Affine:
+        """From steps (a, b) to the place (x, y) of a centre, metres.
+
+        a counts along the rows, b along the next direction of the lattice, 90° or 60° on: cell (row, column) is at
+        (column, row) on the square layout, and at (column − row // 2, row) on the hexagonal one.
+        """
+        oblique = 0.5 if self.layout == "hexagonal" else 0.0
+        across = self._turned(np.array([1.0, oblique]) * self.pitch, np.array([0.0, self.row_height]), 1)
+        return Affine.from_parts(np.stack(across), self.offset)
 
     def described(self) -> str:
         """The cells in words, such as ``"hexagonal cells (pitch 0.125 mm)"``."""

@@ -19,6 +19,7 @@ from vcc.base.errors import InputError, ResultWarning
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, told_along_u
 from vcc.fields.parallax import Axis, disparity_range
+from vcc.fields.plane_sweep import disparity_maps
 from vcc.fields.sampled import Index, as_slice
 from vcc.files.transfer import decode
 from vcc.image import Image
@@ -329,7 +330,6 @@ class StoredLightField:
     def _kept_or_found(self, progress: Progress | None) -> DisparityMaps:
         import warnings
 
-        from vcc.recover.depth import disparity_maps
         from vcc.store.disparity_maps import keep_maps, read_maps
 
         kept = read_maps(self.path, self.shape)

@@ -1,0 +1,232 @@
+"""The rays of a point of light through a camera, and where on the sensor they fall.
+
+Rays are sent forwards, through the same stages and faces that captures are made with. Without diffusers the
+entrance opening is divided into cells; each carries its mean transmission and falls on the sensor as the box that
+its own rays span (a ray differential: Igehy, "Tracing ray differentials", 1999): nothing is random, and nothing
+singular in focus. With diffusers rays are drawn from a scrambled Sobol' sequence over the opening and each
+diffuser's kernel.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.optics import Scatter
+from vcc.optics.train import Stage, Train
+
+Array = NDArray[np.float64]
+Pair = tuple[float, float]
+
+CELLS_PER_PIXEL = 16
+"""Of the opening, along a pixel of the picture: borders are right to 1/64 of a pixel's light, while there are no
+more than `ENOUGH_CELLS` for that."""
+FEWEST_CELLS, ENOUGH_CELLS, MOST_CELLS = 128, 512, 4096
+"""Across the longer side of the opening: in any case; where pixels ask for more; where each needs at least one."""
+FIRST_CELLS = 64
+"""For a look at how large the picture will be."""
+NO_LIGHT = 1e-6
+"""Means of patterns are differences of integrals, whose rounding is below this."""
+NEARBY = 1e-3
+"""Of a cell: how far from its middle the rays go that measure its box on the sensor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """Where light falls: places on the sensor (n, 2), widths of boxes (n, 2), weights (n,)."""
+
+    places: Array
+    widths: Array
+    weights: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PointRays:
+    """The rays of a point of light through a rectangle of the entrance plane.
+
+    Args:
+        camera: any.
+        distance: of the point before the entrance plane, metres; may be infinite.
+        field: where it stands, as slopes (X/Z, Y/Z).
+        middle: of the rectangle, metres.
+        size: its (width, height), metres; infinite where nothing bounds it.
+    """
+
+    camera: Train
+    distance: float
+    field: Pair
+    middle: Pair = (0.0, 0.0)
+    size: Pair = (math.inf, math.inf)
+
+    @classmethod
+    def through_stops(cls, camera: Train, distance: float, field: Pair) -> PointRays:
+        """Those that the camera's stops let pass.
+
+        Stops behind what bends or scatters rays tell nothing about where they came from, and are passed over.
+
+        Raises:
+            InputError: no stop bounds them, or none of them passes.
+        """
+        rays = cls(camera, distance, field)
+        low, high = np.full(2, -np.inf), np.full(2, np.inf)
+        disturbed = False
+        for stage in camera.stages:
+            if disturbed and np.abs(stage.approach.linear[:2, 2:]).max() > 0:
+                break
+            corners = rays._seen_from_the_entrance(stage)
+            if corners is not None:
+                low, high = np.maximum(low, corners.min(axis=0)), np.minimum(high, corners.max(axis=0))
+            disturbed = disturbed or stage.faces.bending is not None or stage.faces.spread is not None
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+            raise InputError(
+                "nothing bounds the light that this camera takes in (no stop of known size stands before the "
+                "first plate, array or diffuser): give the lens a diameter, or pass aperture=(width, height) in "
+                "metres"
+            )
+        if (high <= low).any():
+            raise InputError("no light of this point passes the camera's stops: it lies outside the field of view")
+        (x, y), (width, height) = ((low + high) / 2).tolist(), (high - low).tolist()
+        return cls(camera, distance, field, (x, y), (width, height))
+
+    def _seen_from_the_entrance(self, stage: Stage) -> Array | None:
+        """The corners of a stage's opening, (4, 2), where the point's rays to them cross the entrance plane."""
+        size = (math.inf, math.inf) if stage.faces.pattern is None else stage.faces.pattern.size
+        at = stage.arriving(self.from_places(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])))[:, :2]
+        stage_from_entrance = Affine.from_parts(np.stack([at[1] - at[0], at[2] - at[0]], axis=1), at[0])
+        if not (all(map(math.isfinite, size)) and stage_from_entrance.is_invertible()):
+            return None
+        corners = np.array([[x, y] for x in (-0.5, 0.5) for y in (-0.5, 0.5)]) * size
+        return stage_from_entrance.inverse()(corners + stage.element.decentre)
+
+    def from_places(self, places: Array) -> Array:
+        """The rays (u, v, s, t) of the point through places (..., 2) of the entrance plane."""
+        slopes = places / self.distance - np.asarray(
+            self.field
+        )  # s = (u − X)/Z; parallel for an infinite distance
+        return np.concatenate([places, slopes], axis=-1)
+
+    @property
+    def image(self) -> Array:
+        """(x, y) on the sensor where the affine optics send the ray through the middle, metres."""
+        to_sensor = self.camera.rays_at(self.camera.sensor.z)
+        return np.asarray(to_sensor(self.from_places(np.array(self.middle)))[:2])
+
+    def in_cells(self, cells: int | None, steps: Array) -> Spot:
+        """The light of each cell of the opening.
+
+        Args:
+            cells: how many its longer side is divided into at least; None takes as many as the picture's size
+                asks for.
+            steps: (horizontal, vertical) pitch of the pixels that the light is counted in, metres.
+
+        Raises:
+            InputError: pixels so fine that `MOST_CELLS` do not fill them.
+        """
+        first = self._traced(FIRST_CELLS if cells is None else cells)
+        lit = first.weights > 0
+        if not lit.any():  # what passes may be smaller than the first cells' middles show
+            return self._traced(ENOUGH_CELLS)
+        # A few boxes may be large where optics are strongly curved: the bulk decides.
+        widest = float(np.quantile((first.widths[lit] / steps).max(axis=1), 0.99))
+        least = math.ceil(widest * (FIRST_CELLS if cells is None else cells))  # one cell for each pixel
+        if least > MOST_CELLS:
+            raise InputError(
+                f"this point's picture is about {least} pixels wide, and {MOST_CELLS} cells of the opening are "
+                "the most: count its light in larger pixels (pitch=)"
+            )
+        if cells is None:
+            return self._traced(max(min(max(CELLS_PER_PIXEL * least, FEWEST_CELLS), ENOUGH_CELLS), least))
+        return first if least <= cells else self._traced(least)
+
+    def _traced(self, cells: int) -> Spot:
+        counts = [max(2, math.ceil(cells * side / max(self.size))) for side in self.size]
+        cell = np.array(self.size) / counts
+        x, y = ((np.arange(n) - (n - 1) / 2) * c + m for n, c, m in zip(counts, cell, self.middle, strict=True))
+        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        near = NEARBY * cell
+        # Three rays a cell: its middle, and one beside it along each axis.
+        rays = np.stack([self.from_places(places + near * beside) for beside in ((0, 0), (1, 0), (0, 1))])
+        share = np.full(len(places), 1.0 / len(places))
+        for stage in self.camera.stages:
+            rays = stage.approach(rays)
+            if stage.faces.pattern is not None:
+                share = share * _mean_transmission(stage, rays)
+            rays = stage.deflected(rays)
+        rays = self.camera.approach_to_sensor(rays)
+        return Spot(rays[0, :, :2], _box(rays), share)
+
+    def drawn(self, rays: int, seed: int) -> list[Spot]:
+        """Rays over the opening and the kernels of diffusers, in two halves that are even sets themselves.
+
+        Args:
+            rays: how many, rounded up to a power of two.
+            seed: of their choice.
+        """
+        from scipy.stats import qmc
+
+        stages = self.camera.stages
+        spreads = [stage.faces.spread for stage in stages if stage.faces.spread is not None]
+        dimensions = 2 + sum(2 + (len(spread.kernels) > 1) for spread in spreads)
+        power = math.ceil(math.log2(rays))
+        points = np.asarray(qmc.Sobol(dimensions, scramble=True, seed=seed).random_base2(power))
+        column = itertools.count()
+        within = np.stack([points[:, next(column)], points[:, next(column)]], axis=-1)
+        bundle = self.from_places((within - 0.5) * self.size + self.middle)
+        share = np.full(len(points), 1.0 / len(points))
+        for stage in stages:
+            bundle = stage.approach(bundle)
+            x, y = (bundle[:, :2] - stage.element.decentre).T
+            if stage.faces.pattern is not None:
+                with stage.named():
+                    share = share * np.asarray(stage.faces.pattern(x, y), dtype=np.float64)
+            bundle = stage.deflected(bundle)
+            if stage.faces.spread is not None:
+                spread = stage.faces.spread
+                numbers = [points[:, next(column)] for _ in range(2 + (len(spread.kernels) > 1))]
+                with stage.named():
+                    bundle[:, 2:] += _deflections(spread, x, y, numbers)
+        ends = self.camera.approach_to_sensor(bundle)[:, :2]
+        half = len(points) // 2
+        parts = (slice(None, half), slice(half, None))
+        return [Spot(ends[part], np.zeros((half, 2)), share[part]) for part in parts]
+
+
+def _box(rays: Array) -> Array:
+    """Widths (n, 2) of boxes of the same variance as the parallelograms that cells' rays span."""
+    along = (rays[1:, :, :2] - rays[0, :, :2]) / NEARBY
+    return np.asarray(np.sqrt((along**2).sum(axis=0)))
+
+
+def _mean_transmission(stage: Stage, rays: Array) -> Array:
+    """What a pattern lets pass of each cell: its mean over the cell's box where all boxes are alike."""
+    pattern = stage.faces.pattern
+    assert pattern is not None
+    x, y = (rays[0, :, :2] - stage.element.decentre).T
+    widths = _box(rays)
+    alike = np.ptp(widths, axis=0) <= 1e-6 * widths.max()
+    with stage.named():
+        if alike.all() and widths[0].min() > 0:
+            mean = np.asarray(pattern.mean(x, y, float(widths[0, 0]), float(widths[0, 1])), dtype=np.float64)
+            return np.where(mean > NO_LIGHT, mean, 0.0)
+        return np.asarray(pattern(x, y), dtype=np.float64)
+
+
+def _deflections(spread: Scatter, x: Array, y: Array, numbers: list[Array]) -> Array:
+    """Changes of slope (n, 2) by the kernels at places x, y, drawn by evenly spread numbers."""
+    shares, widths = spread.at(x, y)
+    chosen = np.zeros(len(x), dtype=np.int64)
+    if len(spread.kernels) > 1:
+        running = np.cumsum(shares, axis=1)
+        chosen = np.minimum((numbers[2][:, None] >= running).sum(axis=1), len(spread.kernels) - 1)
+    found = np.zeros((len(x), 2))
+    for n, kernel in enumerate(spread.kernels):
+        here = chosen == n
+        if here.any():
+            found[here] = np.stack(kernel.deflections(numbers[0][here], numbers[1][here]), axis=-1)
+    return found * widths[:, None]

@@ -1,0 +1,213 @@
+"""The middle row and the middle column of a light field's views, and what disparities in them mean.
+
+Disparities are those of `vcc.fields.parallax`: along u, pixels per view, positive = nearer than where the views
+converge.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.base.errors import InputError
+from vcc.fields.grid import Block, Grid
+from vcc.fields.sampled import to_numpy
+
+Array = NDArray[np.float32]
+Doubles = NDArray[np.float64]
+
+LARGEST_RANGE = 64
+"""Pixels per view either way; more is a range in other units."""
+MARGIN = 0.3
+"""Pixels per view by which a measured range is widened: it leaves out the outermost 2 %."""
+
+
+class Views(Protocol):
+    """Of `vcc.fields.samples.Samples`, what is needed here: a grid, and its blocks when they are asked for."""
+
+    @property
+    def grid(self) -> Grid:
+        """Which rays the samples are."""
+
+    def read(self, block: Block, /) -> Any:
+        """The samples of a block, (v, u, t, s[, channels])."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """The middle row of views or the middle column, as views are compared with one another.
+
+    Args:
+        views: (views, channels, t, s), the square roots of radiance over its bright part. The square root is how
+            photon noise becomes even, and shadows count as highlights do.
+        along: the axis of views, ``"u"`` for a row, ``"v"`` for a column.
+    """
+
+    views: Array
+    along: str
+
+    @property
+    def middle(self) -> int:
+        """Which view is the middle one."""
+        return (len(self.views) - 1) // 2
+
+    @property
+    def axis(self) -> int:
+        """The axis of a picture, (channel, t, s), along which it moves from view to view."""
+        return 2 if self.along == "u" else 1
+
+
+@dataclass(frozen=True)
+class DisparityGeometry:
+    """What disparities mean: how they go over between u and v, and into metres.
+
+    Args:
+        position: rows u and v of the frame's linear part.
+        slope: rows s and t.
+        view: (row, column) of the middle view.
+    """
+
+    position: Doubles
+    slope: Doubles
+    view: tuple[int, int]
+
+    @classmethod
+    def of(cls, grid: Grid, fewest: int) -> DisparityGeometry:
+        """That of a light field.
+
+        Args:
+            grid: its views' axes along those of its pixels.
+            fewest: views that there must be in a row or column.
+
+        Raises:
+            InputError: too few views, or a frame that turns or mixes its axes.
+        """
+        rows, columns = grid.shape[:2]
+        if max(rows, columns) < fewest:
+            raise InputError(
+                f"depth needs {fewest} views or more in a row or column; this light field has {rows}×{columns}"
+            )
+        linear = grid.frame.linear
+        scale = np.abs(linear).max(axis=1, keepdims=True)
+        if not np.allclose(
+            linear[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]] / scale.repeat(2), 0, atol=1e-9
+        ):
+            raise InputError(
+                "depth needs a light field whose view axes are along those of its pixels; this frame turns or "
+                "mixes them. Resample it first (vcc.LightField.resampled)"
+            )
+        return cls(linear[:2], linear[2:], ((rows - 1) // 2, (columns - 1) // 2))
+
+    def along(self, disparity: ArrayLike, axis: str) -> Doubles:
+        """Disparities along u as those along the axis, ``"u"`` or ``"v"``."""
+        given = np.asarray(disparity, np.float64)
+        if axis == "u":
+            return given
+        # By way of the homogeneous distance, which is finite at infinity: Z = position part / slope part.
+        z, one = self._homogeneous(given)
+        numerator = self.slope[1, 1] * z - self.position[1, 1] * one
+        return np.asarray(numerator / (self.slope[1, 3] * z - self.position[1, 3] * one), np.float64)
+
+    def distance(self, disparity: Array) -> Array:
+        """`vcc.fields.grid.Grid.distance_of` of each, metres."""
+        z, one = self._homogeneous(disparity.astype(np.float64))
+        with np.errstate(divide="ignore"):
+            return np.where(one == 0, np.inf, z / np.where(one == 0, 1, one)).astype(np.float32)
+
+    def _homogeneous(self, disparity: Doubles) -> tuple[Doubles, Doubles]:
+        position, slope = self.position[0], self.slope[0]
+        return position[0] - disparity * position[2], slope[0] - disparity * slope[2]
+
+
+def arms(light_field: Views) -> list[Arm]:
+    """The middle row of views and the middle column, those of two views or more; no others are read.
+
+    Raises:
+        InputError: they are black.
+    """
+    shape = light_field.grid.shape
+    row, column = ((n - 1) // 2 for n in shape[:2])
+    whole = Block.all_of(shape)
+    found = []
+    if shape[1] > 1:
+        found.append(Arm(_pictures(light_field.read(replace(whole, rows=(row, row + 1)))), "u"))
+    if shape[0] > 1:
+        found.append(Arm(_pictures(light_field.read(replace(whole, columns=(column, column + 1)))), "v"))
+    bright = max(float(np.percentile(arm.views, 99)) for arm in found)
+    if bright == 0:
+        raise InputError("the middle views of this light field are black: there is no parallax to see")
+    for arm in found:
+        np.divide(arm.views, bright, out=arm.views)
+        np.sqrt(np.minimum(arm.views, 4), out=arm.views)
+    return found
+
+
+def _pictures(values: Any) -> Array:
+    """(views, channels, t, s) of a row or column of views."""
+    views = to_numpy(values).astype(np.float32)
+    views = views.reshape(-1, *views.shape[2:])
+    views = views[..., None] if views.ndim == 3 else views
+    return np.ascontiguousarray(np.moveaxis(views, 3, 1))
+
+
+def range_to_search(grid: Grid, given: tuple[float, float] | None) -> tuple[float, float]:
+    """(lowest, highest) disparity along u to be found, pixels per view.
+
+    Args:
+        grid: of a light field, whose own range counts where none is given, widened by `MARGIN` if it was measured.
+        given: by a user.
+
+    Raises:
+        InputError: a range that is none, that is in other units, or that cannot be measured.
+    """
+    if given is None:
+        measured = grid.measured_disparity_range()
+        if measured is None:
+            raise InputError(
+                "the range of disparities cannot be measured (too little texture): give "
+                "disparity_range=(low, high)"
+            )
+        widened = 0.0 if grid.disparity_range is not None else MARGIN
+        given = (measured[0] - widened, measured[1] + widened)
+    low, high = float(given[0]), float(given[1])
+    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+        raise InputError(f"disparity_range is (lowest, highest), pixels per view, not {given}")
+    if max(abs(low), abs(high)) > LARGEST_RANGE:
+        raise InputError(
+            f"disparity_range {given} reaches beyond {LARGEST_RANGE} pixels per view: it is given in pixels from "
+            "one view to the next; light_field.disparity_of(distance) gives it for a distance in metres"
+        )
+    return low, high
+
+
+def cubic_weights(f: float) -> tuple[float, float, float, float]:
+    """Weights of samples −1, 0, 1 and 2 for the place f between 0 and 1 (Keys 1981, a = −½)."""
+    return (
+        ((-0.5 * f + 1) * f - 0.5) * f,
+        (1.5 * f - 2.5) * f * f + 1,
+        ((-1.5 * f + 2) * f + 0.5) * f,
+        (0.5 * f - 0.5) * f * f,
+    )
+
+
+def moved(view: Array, shift: float, axis: int) -> Array:
+    """A view read ``shift`` pixels further along an axis, cubic; borders repeated."""
+    whole = math.floor(shift)
+    length = view.shape[axis]
+    low, high = max(0, 1 - whole), max(0, whole + 2)
+    padding = [(0, 0)] * view.ndim
+    padding[axis] = (low, high)
+    padded = np.pad(view, padding, mode="edge")
+    start = low + whole - 1
+    found = np.zeros_like(view)
+    for n, weight in enumerate(cubic_weights(shift - whole)):
+        if weight == 0:
+            continue
+        piece = [slice(None)] * view.ndim
+        piece[axis] = slice(start + n, start + n + length)
+        found += np.float32(weight) * padded[tuple(piece)]
+    return found

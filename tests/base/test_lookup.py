@@ -1,0 +1,29 @@
+"""Values between grid points against planes, which bilinear interpolation gives exactly, and against SciPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from vcc.base.lookup import bilinear
+
+
+def test_a_plane_is_exact_between_points_and_held_beyond_the_edges():
+    row, column = np.mgrid[:4, :5]
+    plane = 1.0 + 2 * row + 3 * column
+    y, x = np.array([-1.0, 0.0, 0.25, 2.9, 3.0, 7.0]), np.array([-0.5, 0.0, 3.75, 1.1, 4.0, 9.0])
+    expected = 1 + 2 * np.clip(y, 0, 3) + 3 * np.clip(x, 0, 4)
+    np.testing.assert_allclose(bilinear(plane, y, x), expected, rtol=1e-14)
+    np.testing.assert_allclose(bilinear(plane, y[:, None], x)[2, 3], 1 + 2 * 0.25 + 3 * 1.1, rtol=1e-14)
+    np.testing.assert_allclose(bilinear(plane, 0.5, np.inf), 1 + 2 * 0.5 + 3 * 4, rtol=1e-14)
+
+
+@pytest.mark.parametrize(("outside", "mode"), [("edge", "nearest"), ("zero", "grid-constant")])
+@pytest.mark.parametrize("shape", [(6, 7), (1, 7), (6, 1), (1, 1)])
+def test_several_numbers_at_a_point_are_looked_up_alike(outside: str, mode: str, shape: tuple[int, int]):
+    random = np.random.default_rng(3)
+    values = random.random((*shape, 2))
+    y, x = (random.uniform(-2, size + 1, (5, 40)) for size in shape)
+    expected = [map_coordinates(values[..., n], [y, x], order=1, mode=mode) for n in range(2)]
+    np.testing.assert_allclose(bilinear(values, y, x, outside), np.stack(expected, axis=-1), atol=1e-14)
