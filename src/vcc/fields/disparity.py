@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.fields.sampled import as_slice
-
-Progress = Callable[[int, int], None]
 
 OUTERMOST = 0.5
 """Per cent of a map's pixels at either end of its disparities that their range leaves out: what errs, errs far."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, Protocol, Self, get_args
@@ -11,13 +10,12 @@ import numpy as np
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, check_frame, check_shape, told_along_u
 from vcc.fields.parallax import disparity_range
 from vcc.fields.plane_sweep import disparity_maps
 from vcc.fields.sampled import Index, has_values, taken, to_dtype, to_numpy
-
-Progress = Callable[[int, int], None]
 
 
 class Samples(Protocol):

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.progress import Progress
 from vcc.fields.grid import Block
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
