@@ -15,7 +15,8 @@ from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
 from vcc.plan.how import How, Options
 from vcc.plan.model import Plan
-from vcc.plan.protocol import Progress
+from vcc.base.progress import Progress
+from vcc.plan.protocol import 
 from vcc.plot.camera_plot import plot_camera
 from vcc.run.drive import drive
 from vcc.run.operators import carried_to

@@ -19,7 +19,8 @@ from vcc.fields.sampled import to_dtype
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints, MaskLookup
 from vcc.plan.footprints.shares import reach_in_pixels, shares
-from vcc.plan.protocol import Partial, Progress
+from vcc.base.progress import Progress
+from vcc.plan.protocol import Partial, 
 from vcc.plan.rays.model import Rays
 
 

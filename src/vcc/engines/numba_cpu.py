@@ -25,7 +25,8 @@ from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import REACH, Division, taps
-from vcc.plan.protocol import Partial, Progress
+from vcc.base.progress import Progress
+from vcc.plan.protocol import Partial, 
 from vcc.plan.rays.model import Rays
 
 BAND = 64

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
-from vcc.plan.protocol import Partial, Progress
+from vcc.base.progress import Progress
+from vcc.plan.protocol import Partial, 
 from vcc.plan.rays.model import CellWindows, Rays, Window
 
 TILE = 32

@@ -27,7 +27,8 @@ from vcc.fields.sampled import has_values, to_dtype, to_numpy
 from vcc.fields.samples import Samples
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
-from vcc.plan.protocol import Partial, Progress
+from vcc.base.progress import Progress
+from vcc.plan.protocol import Partial, 
 from vcc.run.blocks import Blocks, Need, cut
 
 HELD = 0.25
