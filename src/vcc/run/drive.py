@@ -192,12 +192,11 @@ class Drive:
                 self._ready = self.engine.prepared(self.plan.before, self.samples.whole(), self.threads)
             return run(core, self._ready, progress=progress)
         used = self.plan.core.used_views(self.samples.grid.shape)
-        counted = _Counted(progress, sum(int(used[slice(*b.rows), slice(*b.columns)].sum()) for b in listed))
+        looked_at = {block: int(used[slice(*block.rows), slice(*block.columns)].sum()) for block in listed}
+        counted = _Counted(progress, sum(looked_at.values()))
         total: Partial | None = None
-        for block in listed:
-            (a, b), (c, d) = block.rows, block.columns
-            if total is not None and not used[a:b, c:d].any():
-                continue
+        # Where nothing is looked at, the first block tells the picture's size.
+        for block in [block for block in listed if looked_at[block]] or listed[:1]:
             values, around = self._values(block, used, counted)
             part = run(core.part(self.plan.block(around)), values)
             del values
