@@ -9,14 +9,13 @@ from typing import Any, Literal, TypeVar, Unpack
 from vcc.advice.darkness import why_dark
 from vcc.advice.explain import Explanation, explained
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress
 from vcc.fields.samples import InMemory, Samples
 from vcc.image import Image
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
 from vcc.plan.how import How, Options
 from vcc.plan.model import Plan
-from vcc.base.progress import Progress
-from vcc.plan.protocol import 
 from vcc.plot.camera_plot import plot_camera
 from vcc.run.drive import drive
 from vcc.run.operators import carried_to

@@ -67,7 +67,7 @@ def test_divided_samples_cost_their_number():
     fine = vcc.Mask(np.random.default_rng(1).random((200, 200)).round(), width=17 * mm, z=51.8 * mm)
     plain, divided = (camera(vcc.Lens(50 * mm), fine).compile(light_field(), refine=n) for n in (1, 4))
     assert divided.samples_touched == 16 * plain.samples_touched
-    assert camera(vcc.Lens(50 * mm), fine).compile(light_field()).refine > 1
+    assert camera(vcc.Lens(50 * mm), fine).compile(light_field()).core.refine > 1
     assert "samples divided" in camera(vcc.Lens(50 * mm), fine).explain(light_field())
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.advice.limits import finest_detail, tangent_over_sine
+from vcc.advice.mask_limits import finest_detail
+from vcc.advice.words import tangent_over_sine
 from vcc.analysis import sampling_advice
 from vcc.base.units import mm, nm, um
 from vcc.shapes.kernels import Gaussian

@@ -6,7 +6,8 @@ import re
 import textwrap
 
 from vcc.advice import explain_footprints, explain_rays, explain_store
-from vcc.advice.limits import in_words, sampling_limits
+from vcc.advice.limits import sampling_limits
+from vcc.advice.words import in_words
 from vcc.base.units import short
 from vcc.fields.grid import SAMPLES_IN_WORDS, Grid
 from vcc.fields.samples import Samples
@@ -103,6 +104,4 @@ def _what(train: Train, grid: Grid) -> str:
 def _limits(train: Train, grid: Grid, scene_distance: float | None) -> str:
     shown = vergences(grid, scene_distance)
     scene = None if shown is None else (float(shown.min()), float(shown.max()))
-    nv, nu, nt, ns = grid.shape[:4]
-    found = sampling_limits(train, grid.frame, (nv, nu, nt, ns), scene)
-    return "What the samples can carry\n" + in_words(found)
+    return "What the samples can carry\n" + in_words(sampling_limits(train, grid, scene))

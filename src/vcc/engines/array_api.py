@@ -14,13 +14,13 @@ import numpy as np
 from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
+from vcc.base.progress import Progress
 from vcc.engines.rays import memory_of_rays, traced
 from vcc.fields.sampled import to_dtype
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints, MaskLookup
 from vcc.plan.footprints.shares import reach_in_pixels, shares
-from vcc.base.progress import Progress
-from vcc.plan.protocol import Partial, 
+from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
 
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.progress import Progress
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import rays_compiled, sharpening_kernels
@@ -25,8 +26,7 @@ from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import REACH, Division, taps
-from vcc.base.progress import Progress
-from vcc.plan.protocol import Partial, 
+from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
 
 BAND = 64

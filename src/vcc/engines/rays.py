@@ -12,9 +12,9 @@ import numpy as np
 from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
-from vcc.fields.sampled import to_dtype
 from vcc.base.progress import Progress
-from vcc.plan.protocol import Partial, 
+from vcc.fields.sampled import to_dtype
+from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import CellWindows, Rays
 
 Array = NDArray[np.float64]

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.progress import Progress
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
-from vcc.base.progress import Progress
-from vcc.plan.protocol import Partial, 
+from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import CellWindows, Rays, Window
 
 TILE = 32

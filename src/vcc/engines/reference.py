@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.progress import Progress
 from vcc.engines.rays import memory_of_rays, traced
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import shares
-from vcc.base.progress import Progress
-from vcc.plan.protocol import Partial, 
+from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
 
 Array = NDArray[np.float64]

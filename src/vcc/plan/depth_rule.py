@@ -19,7 +19,6 @@ from vcc.base.values import Value
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import Grid
 from vcc.optics.train import Train
-from vcc.plan.view_gaps import ViewGaps
 
 Array = NDArray[np.float64]
 
@@ -116,15 +115,16 @@ def denser(train: Train, grid: Grid) -> tuple[Grid, ViewsBetween | None, str]:
     pixels_from_metres = train.sensor.frame.inverse()
     on_sensor = pixels_from_metres.linear @ train.rays_at(train.sensor.z).linear[:2]
     views = (math.ceil(rows), math.ceil(columns))
-    gaps = ViewGaps(grid.frame, on_sensor, views)
     disparities = np.linspace(low, high, 33)
     per_index = on_sensor @ grid.frame.linear
     motion = np.zeros((33, 2, 2))
     motion[:, 0, 0], motion[:, 1, 1] = disparities, parallax.down(disparities)
     apart = np.linalg.norm(per_index[:, :2] - per_index[:, 2:] @ motion, axis=1)  # (n, axis of the views)
     across, down = apart.max(axis=0)
+    # A pixel, or where that is wider a sample: closer together, no ghosts are seen.
+    told_apart = max(1.0, float(np.linalg.norm(per_index[:, 2:], axis=0).max()))
     wanted = [
-        1 if there < 2 else max(1, math.ceil(gap / gaps.limit + ROUNDING))
+        1 if there < 2 else max(1, math.ceil(gap / told_apart + ROUNDING))
         for there, gap in zip(views, (down, across), strict=True)
     ]
     times = (min(wanted[0], MOST_TIMES), min(wanted[1], MOST_TIMES))

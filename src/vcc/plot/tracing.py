@@ -204,13 +204,9 @@ def openings(camera: Train, axis: int) -> Iterator[tuple[Element, Affine, float]
         The element, the map of rays from the entrance plane to the opening (through all that is affine), and
         half of the opening's size along the axis, metres.
     """
-    ray = Affine.identity()
     for stage in camera.stages:
-        ray = stage.approach @ ray
         if stage.faces.pattern is not None and math.isfinite(stage.faces.pattern.size[axis]):
-            yield stage.element, ray, stage.faces.pattern.size[axis] / 2
-        if stage.centred is not None:
-            ray = stage.centred @ ray
+            yield stage.element, stage.arriving, stage.faces.pattern.size[axis] / 2
 
 
 def fan(positions: ArrayLike, distance: float, offset: float, axis: int, cross: float = 0.0) -> Array:

@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 from vcc.base import late
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.memory import MEMORY_LIMIT
+from vcc.base.progress import Progress
 from vcc.engines import chosen, engine
 from vcc.fields.grid import Block
 from vcc.fields.sampled import has_values, to_dtype, to_numpy
 from vcc.fields.samples import Samples
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
-from vcc.base.progress import Progress
-from vcc.plan.protocol import Partial, 
+from vcc.plan.protocol import Partial
 from vcc.run.blocks import Blocks, Need, cut
 
 HELD = 0.25
@@ -193,12 +193,11 @@ class Drive:
                 self._ready = self.engine.prepared(self.plan.before, self.samples.whole(), self.threads)
             return run(core, self._ready, progress=progress)
         used = self.plan.core.used_views(self.samples.grid.shape)
-        counted = _Counted(progress, sum(int(used[slice(*b.rows), slice(*b.columns)].sum()) for b in listed))
+        looked_at = {block: int(used[slice(*block.rows), slice(*block.columns)].sum()) for block in listed}
+        counted = _Counted(progress, sum(looked_at.values()))
         total: Partial | None = None
-        for block in listed:
-            (a, b), (c, d) = block.rows, block.columns
-            if total is not None and not used[a:b, c:d].any():
-                continue
+        # Where nothing is looked at, the first block tells the picture's size.
+        for block in [block for block in listed if looked_at[block]] or listed[:1]:
             values, around = self._values(block, used, counted)
             part = run(core.part(self.plan.block(around)), values)
             del values

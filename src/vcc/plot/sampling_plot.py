@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.advice.limits import distance_in_words
+from vcc.advice.words import SamplingLimits, distance_in_words
 from vcc.base.units import short, um
 from vcc.plot import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from vcc.analysis.sampling import SamplingAdvice
 
 Array = NDArray[np.float64]
 
@@ -28,14 +26,14 @@ BEYOND = 3.0
 """The distances drawn go on beyond the scene by this factor, each way."""
 
 
-def plot_sampling(advice: SamplingAdvice) -> Figure:
+def plot_sampling(advice: SamplingLimits) -> Figure:
     """Draw disparity and blur over distance, the range free of ghosts shaded, and bars of lengths.
 
     Bars that keep to their limits are blue, others orange; each limit is a line across its bar. Where disparity is
     not given (behind a lens array, say) the bars are all there is.
 
     Args:
-        advice: see `vcc.analysis.sampling_advice`.
+        advice: of a camera and a light field, as of `vcc.analysis.sampling_advice`.
 
     Returns:
         The figure; ``.savefig(path)`` writes it to a file.
@@ -53,7 +51,7 @@ def plot_sampling(advice: SamplingAdvice) -> Figure:
     return figure
 
 
-def _draw_gaps(axes: Axes, advice: SamplingAdvice) -> None:
+def _draw_gaps(axes: Axes, advice: SamplingLimits) -> None:
     assert advice.gaps is not None
     low, high = _shown(advice)
     distances = np.geomspace(low, high, 1200)
@@ -90,7 +88,7 @@ def _draw_gaps(axes: Axes, advice: SamplingAdvice) -> None:
     _legend_below(axes)
 
 
-def _shown(advice: SamplingAdvice) -> tuple[float, float]:
+def _shown(advice: SamplingLimits) -> tuple[float, float]:
     """From where to where distances are drawn, metres."""
     known = [*(advice.depths or ()), *(advice.free_of_ghosts or ())]
     known += [] if advice.focus_distance is None else [advice.focus_distance]
@@ -100,7 +98,7 @@ def _shown(advice: SamplingAdvice) -> tuple[float, float]:
     return low / BEYOND, high * (10.0 if any(distance > high for distance in known) else BEYOND)
 
 
-def _draw_lengths(axes: Axes, advice: SamplingAdvice) -> None:
+def _draw_lengths(axes: Axes, advice: SamplingLimits) -> None:
     """Bars of lengths on a logarithmic axis, the sensor's pixel first; each limit a line."""
     items = [item for item in advice.items.values() if item.unit == "m" and item.value > 0]
     pixel = f"pixel of the sensor: {short(advice.pixel, digits=3)}"

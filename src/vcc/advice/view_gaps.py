@@ -79,17 +79,25 @@ class ViewGaps:
     def _border(self, focus: float, sense: float) -> float:
         """How far from focus gaps stay within the limit: gaps grow with the distance from focus in 1/Z."""
         inside, step = focus, sense * max(abs(focus), 1.0) * 1e-6
-        while self.at(np.array([inside + step]))[0] <= self.limit:
+        while self._fine(inside + step):
             inside, step = inside + step, 2 * step
             if abs(step) > 1e12:
                 return sense * math.inf
-        outside = inside + step
+        return self._bisected(inside, inside + step)
+
+    def _bisected(self, inside: float, outside: float) -> float:
+        """The last 1/Z at which gaps keep to the limit, between one at which they do and one at which not."""
         while abs(outside - inside) > 1e-12 * max(abs(inside), abs(outside)):
             middle = (inside + outside) / 2
             if middle in (inside, outside):
                 break
-            if self.at(np.array([middle]))[0] <= self.limit:
-                inside = middle
-            else:
-                outside = middle
+            inside, outside = (middle, outside) if self._fine(middle) else (inside, middle)
         return inside
+
+    def _fine(self, vergence: float) -> bool:
+        return bool(self.at(np.array([vergence]))[0] <= self.limit)
+
+
+def distance_of(vergence: float) -> float:
+    """The distance in metres of what lies at 1/Z = ``vergence``: infinite at 0, below 0 if light converges."""
+    return 1 / vergence if abs(vergence) > ROUNDING else math.inf

@@ -1,0 +1,159 @@
+"""What a mask's detail asks of a light field, of the sensor and of light: numbers in closed form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.advice import words
+from vcc.advice.folded import Folded, at_vergence, enough, singular, stretch
+from vcc.advice.words import SamplingItem
+from vcc.base.errors import InputError
+from vcc.optics.train import Stage
+from vcc.plan.parallax_rule import index_motions
+from vcc.shapes.lattice import CellApertures
+from vcc.shapes.patterns import Bounded, Cells, CosineSum, FunctionPattern, Pattern
+
+Array = NDArray[np.float64]
+Items = dict[str, SamplingItem]
+
+
+def finest_detail(pattern: Pattern) -> float | None:
+    """The width of the finest bright or dark part of a pattern, metres.
+
+    Of cells their smaller side, of cosines half the finest period, of openings in a lattice their size. None for
+    stops and other plain openings, which have no detail.
+
+    Raises:
+        InputError: a function of position, of which this cannot be known.
+    """
+    match pattern:
+        case Bounded():
+            return finest_detail(pattern.pattern)
+        case Cells():
+            if pattern.values.min() == pattern.values.max():
+                return None
+            rows, columns = pattern.values.shape
+            assert pattern.height is not None
+            return float(min(pattern.width / columns, pattern.height / rows))
+        case CosineSum():
+            period = min(pattern.periods)
+            return None if math.isinf(period) else float(period / pattern.harmonics / 2)
+        case CellApertures():
+            return float(pattern.scale * pattern.lattice.pitch)
+        case FunctionPattern():
+            raise InputError("how fine a function of position is cannot be known")
+    return None
+
+
+def mask_limits(optics: Folded, stage: Stage, wavelength: float) -> tuple[Items, tuple[str, ...]]:
+    """What the detail of a stage's pattern asks for, by key, and in words what is not given of it.
+
+    Args:
+        optics: of which the stage is one.
+        stage: with a pattern or without.
+        wavelength: metres.
+    """
+    label = stage.element.label
+    if stage.faces.pattern is None:
+        return {}, ()
+    try:
+        detail = finest_detail(stage.faces.pattern)
+    except InputError as error:
+        return {}, (f"detail of {label} is not given: {error}",)
+    if detail is None:
+        return {}, ()
+    mask = _Mask(optics, stage, detail)
+    if stage not in optics.reached:
+        return mask.fresnel(wavelength), (f"the footprints of samples at {label} are not given",)
+    if mask.in_aperture:
+        return mask.cells() | mask.holes(wavelength), ()
+    return mask.cells() | mask.shadow() | mask.fresnel(wavelength), ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Mask:
+    """A mask with detail in a camera.
+
+    Args:
+        optics: of the camera.
+        stage: the mask's.
+        detail: metres.
+    """
+
+    optics: Folded
+    stage: Stage
+    detail: float
+
+    @property
+    def label(self) -> str:
+        return self.stage.element.label
+
+    @property
+    def place(self) -> Array:
+        """2×4: place at the mask per index step (i, j, k, l)."""
+        return (self.stage.arriving @ self.optics.frame).linear[:2]
+
+    @property
+    def in_aperture(self) -> bool:
+        """Whether all of a view meets one part of the mask."""
+        rows, columns = self.optics.pixels
+        return bool((np.abs(self.place[:, 2:]) @ [columns, rows]).max() <= self.detail)
+
+    @property
+    def lever(self) -> float | None:
+        """Metres on the sensor per change of slope at the mask; None where not affine."""
+        onwards = self.optics.onwards(self.stage)
+        return None if onwards is None else stretch(onwards.linear[:2, 2:])
+
+    def cells(self) -> Items:
+        """What a view's cell covers of the mask, in the light of what is looked at; and what a sample does."""
+        motion = index_motions(self.optics.frame, np.array([self.optics.looked_at]))[0]
+        of_view = self.place[:, :2] - self.place[:, 2:] @ motion
+        return {
+            f"{self.label} views": self._cell(of_view, self.optics.views, True),
+            f"{self.label} samples": self._cell(self.place[:, 2:], self.optics.pixels, False),
+        }
+
+    def _cell(self, steps: Array, counts: tuple[int, int], of_view: bool) -> SamplingItem:
+        """The longer of the steps along two indices, of those that are counted at all; (rows, columns) of them."""
+        across, down = np.linalg.norm(steps, axis=0)
+        lengths = [length for length, count in ((across, counts[1]), (down, counts[0])) if count > 1]
+        width = float(max(lengths, default=0.0))
+        rows, columns = (n if n < 2 else enough(n * width / self.detail) for n in counts)
+        return words.cell_at_mask(self.label, of_view, width, self.detail, (rows, columns))
+
+    def shadow(self) -> Items:
+        """The mask's shadow by light of one place of the entrance plane: x = B·s there, B_mask·s at the mask."""
+        by_slope = self.stage.arriving.linear[:2, 2:]
+        if self.lever is None or singular(by_slope):
+            return {}
+        grown = self.optics.sensor_from_slope @ np.linalg.inv(by_slope)
+        width = self.detail * float(np.linalg.norm(grown, -2))
+        pixel = max(self.optics.train.sensor.pitches)
+        return {f"{self.label} shadow": words.shadow(self.label, width, pixel, self.detail)}
+
+    def fresnel(self, wavelength: float) -> Items:
+        """What diffraction takes from the shadow's sharpness: √(λ·d), the width of the first Fresnel zone."""
+        if self.lever is None:
+            return {}
+        blur, nearer = math.sqrt(wavelength * self.lever), self.detail**2 / wavelength
+        return {f"{self.label} diffraction": words.fresnel_blur(self.label, blur, self.detail, nearer)}
+
+    def holes(self, wavelength: float) -> Items:
+        """How far a hole a wide spreads light, λ·d/a, against its picture in the most blurred point."""
+        if self.lever is None or self.optics.vergences is None:
+            return {}
+        blur = max(self.detail * self._growth(vergence) for vergence in self.optics.vergences)
+        spread = wavelength * self.lever / self.detail
+        return {f"{self.label} diffraction": words.hole_diffraction(self.label, spread, blur)}
+
+    def _growth(self, vergence: float) -> float:
+        """Size on the sensor over size at the mask of the light of a point: (A + B/Z) over that at the mask."""
+        here, there = (
+            stretch(at_vergence(rays, vergence)) for rays in (self.stage.arriving, self.optics.to_sensor)
+        )
+        return there / here if here > 0 else math.inf
