@@ -8,6 +8,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from vcc.base.version import VERSION
+
 if TYPE_CHECKING:
     from vcc.base.affine import Affine as Affine
     from vcc.base.errors import InputError as InputError
@@ -37,7 +39,7 @@ if TYPE_CHECKING:
     from vcc.run.recording import expose_image as expose_image
     from vcc.run.recording import photon_transfer as photon_transfer
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 _HOMES = {
     "Affine": "vcc.base.affine",
