@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import zipfile
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.files.atomic import atomic_path
 from vcc.formats.grid import Decoded, Geometry
 
@@ -45,7 +45,7 @@ def read(
     shape: tuple[int, ...] | None = None,
     axes: str | None = None,
     key: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Decoded:
     """The light field in an array.
 

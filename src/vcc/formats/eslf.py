@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.fields.sampled import to_numpy
 from vcc.files import transfer as curves
 from vcc.files.atomic import atomic_path
@@ -32,7 +32,7 @@ def read(
     path: Path,
     *,
     views: tuple[int, int] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Decoded:
     """The views of a picture of lenslet blocks: pixel (l·rows + j, k·columns + i) is pixel (l, k) of view (j, i).
 

@@ -8,7 +8,6 @@ towards the scene with slope u comes from it with ours of −u.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.fields.grid import Sample
 from vcc.fields.sampled import to_numpy
 from vcc.files.atomic import atomic_path
@@ -37,7 +37,7 @@ def recognised(path: Path) -> bool:
     return path.suffix.lower() == ".mat" and path.is_file()
 
 
-def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> Decoded:
+def read(path: Path, *, progress: Progress | None = None) -> Decoded:
     """The light field ``LF`` with its weights and, if it was rectified, its full frame.
 
     Decoded and not colour-corrected samples are linear; those that DecodeOptions calls colour-corrected have been

@@ -5,7 +5,7 @@ for people.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.files.atomic import atomic_path
 from vcc.formats.exposing import Codes, Exposure
 from vcc.formats.grid import Decoded
@@ -47,7 +48,7 @@ def read(
     first: int = 0,
     last: int | None = None,
     moves: Movement = "right",
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Decoded:
     """The frames of a video as views from places in equal steps along a line.
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress
 from vcc.base.units import mm
 from vcc.formats.exposing import Codes, Exposure, stored_view
 from vcc.formats.hci import PARAMETERS
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 
 Kind = Literal["zarr", "hci", "views", "mat", "eslf", "mp4", "npz"]
 """What a light field may be written as; see `save_light_field`."""
-Progress = Callable[[int, int], None]
-
 _ENDINGS: dict[str, Kind] = {
     ".zarr": "zarr",
     ".mat": "mat",

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.fields.sampled import to_numpy
 from vcc.files.transfer import decode, encode
 from vcc.light_field import LightField
@@ -19,7 +20,6 @@ from vcc.store.compression import Compression
 from vcc.store.reading import StoredLightField
 from vcc.store.writing import disparities_of, write_views
 
-Progress = Callable[[int, int], None]
 View = Callable[[int, int], NDArray[Any]]
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, told_along_u
 from vcc.fields.parallax import Axis, disparity_range
@@ -24,8 +24,6 @@ from vcc.files.transfer import decode
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
-
-Progress = Callable[[int, int], None]
 
 MEASURED_BYTES = 2**26
 """Views from which disparities are measured are cut to a band of rows if they take more than this as stored."""

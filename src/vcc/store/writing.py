@@ -18,6 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.fields.disparity import DisparityMaps
 from vcc.fields.grid import Sample
 from vcc.light_field import LightField
@@ -29,7 +30,6 @@ from vcc.store.reading import StoredLightField, is_store, open_store, read_metad
 if TYPE_CHECKING:
     from typing import Self
 
-Progress = Callable[[int, int], None]
 SETTINGS = "settings"
 """Under which the description of a store keeps how it was made, beside what the maker said."""
 
