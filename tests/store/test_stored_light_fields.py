@@ -70,7 +70,7 @@ def test_samples_and_frame_come_back_bit_for_bit(tmp_path, kind, channels):
 @pytest.mark.parametrize("sample", ["mean", "point"])
 def test_what_samples_are_comes_back(tmp_path, sample):
     stored = save_store(light_field(sample=sample), tmp_path / "a.zarr")
-    parts = [stored, stored.outline, stored.read(), stored[1:, :2, 3:], stored.scaled(2), open_store(stored.path)]
+    parts = [stored, stored.grid, stored.read(), stored[1:, :2, 3:], stored.scaled(2), open_store(stored.path)]
     parts.append(convert(stored, tmp_path / "b.zarr", dtype="float16"))
     parts.append(convert(stored.read(), tmp_path / "c.zarr"))
     assert {part.sample for part in parts} == {sample}

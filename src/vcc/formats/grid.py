@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import mm
+from vcc.base.words import first_few
 from vcc.fields.grid import Sample
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")
@@ -21,8 +21,6 @@ PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".p
 
 DEFAULT_SPACING = 1 * mm
 """The view spacing taken where nothing states one, metres."""
-
-_NAMED_AT_MOST = 12
 
 
 @dataclass(frozen=True)
@@ -212,9 +210,8 @@ def _refuse_missing(
         return
     missing = ((row, column) for row in rows for column in columns if (row, column) not in at)
     count = total - len(at)
-    named = ", ".join(map(str, islice(missing, _NAMED_AT_MOST))) + (", …" if count > _NAMED_AT_MOST else "")
     raise InputError(
         f"{folder} has {len(at)} of the {total} views of its {len(rows)}×{len(columns)} grid; "
-        f"{count} are missing, by (row, column): {named}. Incomplete grids are no light field: add the missing "
-        "files, or open those that there are with vcc.formats.open_sparse_views"
+        f"{count} are missing, by (row, column): {first_few(missing, count)}. Incomplete grids are no "
+        "light field: add the missing files, or open those that there are with vcc.formats.open_sparse_views"
     )

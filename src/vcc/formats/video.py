@@ -9,20 +9,18 @@ from collections.abc import Iterator
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
+from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
-from vcc.formats.exposing import Codes, Exposure
+from vcc.files.pictures import Exposure
+from vcc.formats.exposing import Codes
 from vcc.formats.grid import Decoded
-
-if TYPE_CHECKING:
-    from vcc.light_field import LightField
-    from vcc.store import StoredLightField
 
 ENDINGS = (".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v")
 
@@ -118,7 +116,7 @@ def read(
 
 
 def save(
-    light_field: LightField | StoredLightField,
+    light_field: Samples,
     path: str | PathLike[str],
     *,
     flight: Flight = "serpentine",
@@ -152,13 +150,14 @@ def save(
     path = Path(path).expanduser()
     if path.suffix.lower() != ".mp4":
         raise InputError(f'a flight is written to a name that ends in .mp4, not "{path.name}"')
-    if light_field.channels not in (None, 1, 3):
-        raise InputError(f"a video has 1 or 3 channels, and this light field has {light_field.channels}")
+    grid = light_field.grid
+    if grid.channels not in (None, 1, 3):
+        raise InputError(f"a video has 1 or 3 channels, and this light field has {grid.channels}")
     if not (frames_per_second > 0 and math.isfinite(frames_per_second)):
         raise InputError(f"frames_per_second is a number above 0, not {frames_per_second}")
     if not 0 <= quality <= 51:
         raise InputError(f"quality is libx264's constant rate factor, 0 to 51, not {quality}")
-    rows, columns, height, width = light_field.shape[:4]
+    rows, columns, height, width = grid.shape[:4]
     way = _way(rows, columns, flight)
     numbers = Codes(light_field, 8, "srgb", exposure)
     av = library()

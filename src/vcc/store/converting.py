@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
-from vcc.fields.sampled import to_numpy
+from vcc.base.version import VERSION
+from vcc.fields.arrays import one_view
+from vcc.fields.samples import Samples
 from vcc.files.transfer import decode, encode
-from vcc.light_field import LightField
 from vcc.store.attributes import DTYPES, Transfer
 from vcc.store.compression import Compression
 from vcc.store.reading import StoredLightField
-from vcc.store.writing import disparities_of, write_views
+from vcc.store.writing import write_views
 
 View = Callable[[int, int], NDArray[Any]]
 
 
 def convert(
-    source: LightField | StoredLightField,
+    source: Samples,
     path: str | PathLike[str],
     *,
     transfer: Transfer = "linear",
@@ -53,8 +55,6 @@ def convert(
         InputError: another type; samples that it cannot hold, brighter than 1 as integers (named by view); a store
             that is not complete; what `vcc.store.save_store` refuses.
     """
-    from vcc import __version__
-
     view: View
     if isinstance(source, StoredLightField):
         source.check_complete()
@@ -66,13 +66,9 @@ def convert(
         def view(row: int, column: int) -> NDArray[Any]:
             return stored.stored_view(row, column, 0, rows)
     else:
-        values = to_numpy(source.values)
-        shape, kind, frame, names = tuple(values.shape), values.dtype, source.frame, None
-        disparity_range = disparities_of(source)
-        made = {"written_by": f"vcc {__version__}"} if provenance is None else provenance
-
-        def view(row: int, column: int) -> NDArray[Any]:
-            return cast("NDArray[Any]", values[row, column])
+        grid, view, names = source.grid, partial(one_view, source), None
+        shape, kind, frame, disparity_range = grid.shape, grid.kind, grid.frame, grid.disparity_range
+        made = {"written_by": f"vcc {VERSION}"} if provenance is None else provenance
 
     wanted = kind if dtype is None else np.dtype(dtype)
     if wanted.name not in DTYPES:
@@ -90,7 +86,7 @@ def convert(
         transfer=now,
         channel_names=names,
         disparity_range=disparity_range,
-        sample=source.sample,
+        sample=source.grid.sample,
         chunks=chunks,
         compression=compression,
     )
