@@ -108,18 +108,25 @@ def test_a_truncated_file_is_named(ending: str, kept: float, tmp_path: Path) -> 
         read_picture(path)
 
 
-def test_other_files_are_refused_with_the_list(tmp_path: Path) -> None:
-    (tmp_path / "a.webp").write_bytes(b"")
-    with pytest.raises(InputError, match=r"webp.*\.png, \.jpg"):
-        read_picture(tmp_path / "a.webp")
-    with pytest.raises(InputError, match=r"no picture file .*nothing\.png"):
-        read_picture(tmp_path / "nothing.png")
-    np.save(tmp_path / "a.npy", np.zeros((3, 3), np.int64))
-    with pytest.raises(InputError, match="int64"):
-        read_picture(tmp_path / "a.npy")
-    np.save(tmp_path / "a.npy", np.zeros(3, np.uint8))
-    with pytest.raises(InputError, match="rows and columns"):
-        read_picture(tmp_path / "a.npy")
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("a.webp", b"", r"webp.*\.png, \.jpg"),
+        ("nothing.png", None, r"no picture file .*nothing\.png"),
+        ("a.npy", np.zeros((3, 3), np.int64), "int64"),
+        ("a.npy", np.zeros(3, np.uint8), "rows and columns"),
+    ],
+)
+def test_other_files_are_refused(
+    name: str, values: np.ndarray | bytes | None, message: str, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    if isinstance(values, bytes):
+        path.write_bytes(values)
+    elif values is not None:
+        np.save(path, values)
+    with pytest.raises(InputError, match=message):
+        read_picture(path)
 
 
 def test_a_mask_is_transmission_not_srgb(tmp_path: Path) -> None:

@@ -209,20 +209,25 @@ def test_a_limit_cuts_and_the_picture_stays(tmp_path):
     assert camera.explain(stored, method="rays").expected_seconds is None
 
 
-def test_what_cannot_be_is_refused(light_fields):
-    _, on_disk = light_fields
-    camera = CAMERAS["strong defocus"][0]
-    for limit in (0, -5, "much"):
-        with pytest.raises(vcc.InputError, match="memory_limit is a number of bytes above 0"):
-            camera.capture(on_disk, memory_limit=limit)
-    with pytest.raises(vcc.InputError, match="memory_limit=1000 bytes is too little"):
-        camera.capture(on_disk, memory_limit=1000)
-    with pytest.raises(vcc.InputError, match="tolerance is for pictures made by rays"):
-        camera.capture(on_disk, tolerance=0.1)
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"memory_limit": 0}, "memory_limit is a number of bytes above 0"),
+        ({"memory_limit": -5}, "memory_limit is a number of bytes above 0"),
+        ({"memory_limit": "much"}, "memory_limit is a number of bytes above 0"),
+        ({"memory_limit": 1000}, "memory_limit=1000 bytes is too little"),
+        ({"tolerance": 0.1}, "tolerance is for pictures made by rays"),
+        ({"method": "rays", "tolerance": -1}, "greater than 0"),
+    ],
+)
+def test_what_cannot_be_is_refused(light_fields, options, words):
+    with pytest.raises(vcc.InputError, match=words):
+        CAMERAS["strong defocus"][0].capture(light_fields[1], **options)
+
+
+def test_the_light_field_inside_is_made_in_memory(light_fields):
     with pytest.raises(vcc.InputError, match=r"stored\.read\(\)"):
-        camera.light_field_at(on_disk, 0.0)
-    with pytest.raises(vcc.InputError, match="greater than 0"):
-        camera.capture(on_disk, method="rays", tolerance=-1)
+        CAMERAS["strong defocus"][0].light_field_at(light_fields[1], 0.0)
 
 
 def test_electronics_take_it_too(light_fields):

@@ -34,4 +34,5 @@ def one_view(light_field: Samples, row: int, column: int) -> NDArray[Any]:
     """
     height, width = light_field.grid.shape[2:4]
     view = Block((row, row + 1), (column, column + 1), (0, height), (0, width))
-    return to_numpy(light_field.read(view))[0, 0]
+    samples: NDArray[Any] = to_numpy(light_field.read(view))[0, 0]
+    return samples
