@@ -179,7 +179,7 @@ def test_what_is_too_bright_is_counted(tmp_path, light_field):
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("a.mp4", {"flight": "loop"}, "flight is one of"),
+        ("a.mp4", {"flight": "loop"}, "flight is 'serpentine', 'circle' or 'row', not 'loop'"),
         ("a.mp4", {"frames_per_second": 0}, "frames_per_second is"),
         ("a.mp4", {"quality": 99}, "0 to 51, not 99"),
         ("a.mp4", {"exposure": "bright"}, "exposure is"),

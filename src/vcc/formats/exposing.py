@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.fields.arrays import one_view
 from vcc.fields.samples import Samples
@@ -32,8 +33,7 @@ class Codes:
     def __init__(self, light_field: Samples, bits: int, curve: str, exposure: Exposure) -> None:
         if bits not in (8, 16):
             raise InputError(f"pictures are written with 8 or 16 bits per sample, not {bits}")
-        if curve not in ("srgb", "linear"):
-            raise InputError(f'transfer is "srgb" or "linear", not {curve!r}')
+        checks.one_of("transfer", curve, ("srgb", "linear"))
         self._light_field, self._bits, self._curve = light_field, bits, curve
         self._seen = self._beyond = 0
         self.exposure = self._automatic() if exposure == "auto" else checked_exposure(exposure)

@@ -14,6 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.fields.samples import Samples
@@ -192,8 +193,7 @@ def library() -> Any:
 
 
 def _check_selection(every: int, first: int, last: int | None, moves: str) -> None:
-    if moves not in get_args(Movement):
-        raise InputError(f"moves is one of {', '.join(map(repr, get_args(Movement)))}, not {moves!r}")
+    checks.one_of("moves", moves, get_args(Movement))
     for name, value, least in (("every", every, 1), ("first", first, 0), ("last", last, first)):
         if value is not None and (not isinstance(value, int | np.integer) or value < least):
             raise InputError(f"{name} is a whole number of {least} or more, not {value!r}")
@@ -244,24 +244,23 @@ def _check_complete(stream: Any, decoded: int, end: float, path: Path) -> None:
         )
 
 
-def _way(rows: int, columns: int, flight: str) -> list[tuple[int, int]]:
+def _way(rows: int, columns: int, flight: Flight) -> list[tuple[int, int]]:
     """(row, column) of the views of a flight."""
+    checks.one_of("flight", flight, get_args(Flight))
     if flight == "serpentine":
         return [(r, c if r % 2 == 0 else columns - 1 - c) for r in range(rows) for c in range(columns)]
     if flight == "row":
         if columns == 1:
             return [(r, 0) for r in range(rows)]
         return [((rows - 1) // 2, c) for c in range(columns)]
-    if flight == "circle":
-        angles = np.linspace(0, 2 * np.pi, 16 * (rows + columns), endpoint=False)
-        down = np.rint((rows - 1) / 2 * (1 - np.cos(angles))).astype(int)
-        right = np.rint((columns - 1) / 2 * (1 + np.sin(angles))).astype(int)
-        way: list[tuple[int, int]] = []
-        for place in zip(down.tolist(), right.tolist(), strict=True):
-            if not way or place != way[-1]:
-                way.append(place)
-        return way[:-1] if len(way) > 1 and way[0] == way[-1] else way
-    raise InputError(f"flight is one of {', '.join(map(repr, get_args(Flight)))}, not {flight!r}")
+    angles = np.linspace(0, 2 * np.pi, 16 * (rows + columns), endpoint=False)
+    down = np.rint((rows - 1) / 2 * (1 - np.cos(angles))).astype(int)
+    right = np.rint((columns - 1) / 2 * (1 + np.sin(angles))).astype(int)
+    way: list[tuple[int, int]] = []
+    for place in zip(down.tolist(), right.tolist(), strict=True):
+        if not way or place != way[-1]:
+            way.append(place)
+    return way[:-1] if len(way) > 1 and way[0] == way[-1] else way
 
 
 def encode(

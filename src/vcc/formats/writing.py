@@ -16,6 +16,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress
 from vcc.base.units import mm
@@ -223,8 +224,7 @@ def kind_of(path: Path, kind: Kind | None) -> Kind:
                 'folder (kind="hci" or "views" for a folder with a dot in its name)'
             )
         return _ENDINGS[ending]
-    if kind not in get_args(Kind):
-        raise InputError(f"kind is one of {', '.join(map(repr, get_args(Kind)))}, not {kind!r}")
+    checks.one_of("kind", kind, get_args(Kind))
     if kind not in _FOLDERS and _ENDINGS.get(ending) != kind:
         wanted = next(each for each, name in _ENDINGS.items() if name == kind)
         raise InputError(f'"{path.name}" is to be of the kind "{kind}": end its name in {wanted}')
@@ -261,8 +261,7 @@ def _warn_of_clipping(path: Path, clipped: float, exposure: Exposure) -> None:
 
 
 def _check_folder_options(grid: Grid, kind: str, ending: str, exposure: Exposure) -> None:
-    if kind not in ("hci", "views"):
-        raise InputError(f'the kind of a folder is "hci" or "views", not {kind!r}')
+    checks.one_of("the kind of a folder", kind, ("hci", "views"))
     endings = (".png",) if kind == "hci" else (".png", ".tif", ".exr")
     if ending not in endings:
         raise InputError(

@@ -55,38 +55,30 @@ def convert(
         InputError: another type; samples that it cannot hold, brighter than 1 as integers (named by view); a store
             that is not complete; what `vcc.store.save_store` refuses.
     """
-    view: View
+    grid = source.grid
+    view: View = partial(one_view, source)
+    kind, names, made = grid.kind, None, {"written_by": f"vcc {VERSION}"}
     if isinstance(source, StoredLightField):
         source.check_complete()
-        stored, rows = source, source.shape[2]
-        shape, kind, transfer, frame = source.shape, source.dtype, source.transfer, source.frame
-        names, disparity_range = source.channel_names, source.disparity_range
-        made = source.provenance if provenance is None else provenance
-
-        def view(row: int, column: int) -> NDArray[Any]:
-            return stored.stored_view(row, column, 0, rows)
-    else:
-        grid, view, names = source.grid, partial(one_view, source), None
-        shape, kind, frame, disparity_range = grid.shape, grid.kind, grid.frame, grid.disparity_range
-        made = {"written_by": f"vcc {VERSION}"} if provenance is None else provenance
-
+        view = partial(source.stored_view, first=0, stop=grid.shape[2])  # as stored: codes stay codes
+        kind, transfer, names, made = source.dtype, source.transfer, source.channel_names, source.provenance
     wanted = kind if dtype is None else np.dtype(dtype)
     if wanted.name not in DTYPES:
         raise InputError(f"samples are stored as {', '.join(DTYPES)}, not {wanted}")
     recoded, now = _recoding(kind, transfer, wanted)
     return write_views(
         Path(path).expanduser(),
-        frame,
-        shape,
+        grid.frame,
+        grid.shape,
         wanted,
         lambda row, column: recoded(view(row, column), f"view ({row}, {column})"),
         overwrite=overwrite,
         progress=progress,
-        provenance=made,
+        provenance=made if provenance is None else provenance,
         transfer=now,
         channel_names=names,
-        disparity_range=disparity_range,
-        sample=source.grid.sample,
+        disparity_range=grid.disparity_range,
+        sample=grid.sample,
         chunks=chunks,
         compression=compression,
     )
