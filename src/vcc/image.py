@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.units import short
 from vcc.fields.sampled import IMAGE_AXES, Index, indices, taken, to_numpy
-
-if TYPE_CHECKING:
-    from os import PathLike
-    from typing import Any
+from vcc.files.pictures import Exposure, SavedPicture, save_picture
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,15 +80,44 @@ class Image:
         """The values as a float32 NumPy array, wherever they are."""
         return to_numpy(self.values).astype(np.float32, copy=False)
 
-    def save(self, path: str | PathLike[str], **options: Any) -> Any:
-        """Write the picture; the ending of ``path`` chooses the format. See `vcc.files.pictures.save_image`."""
-        from vcc.files.pictures import save_image
+    def save(
+        self,
+        path: str | PathLike[str],
+        *,
+        exposure: Exposure = "auto",
+        upright: bool = True,
+        bits: int | None = None,
+    ) -> SavedPicture:
+        """Write the picture; the ending of ``path`` chooses the format.
 
-        return save_image(self, path, **options)
+        ======================  ==================================================================
+        ``.png``                sRGB, 8 bits (or 16): for people
+        ``.tif``, ``.tiff``     sRGB, 16 bits (or 8)
+        ``.exr``                linear float32, values untouched; channels R, G, B or Y
+        ``.npy``                linear float32, values untouched
+        ======================  ==================================================================
+
+        Args:
+            path: where to.
+            exposure: the factor that brings the values to the range 0…1 of an sRGB file. "auto" takes 1 over the
+                99.5th percentile of the luminance: the brightest 0.5 % of the pixels may clip. It is returned, so
+                that a second picture can be written with the same.
+            upright: turn a real image (which lies upside down on the sensor) so that people see it upright.
+            bits: bits per sample for PNG and TIFF.
+
+        Returns:
+            The path, the exposure used, the share of clipped pixels, and all that in words. The file appears
+            whole or not at all.
+
+        Raises:
+            InputError: an unknown ending, a folder that does not exist or cannot be written to, an exposure that
+                is not a finite number above 0 (or not 1, for .exr and .npy), bits that the format does not have,
+                values that are not finite, or a number of channels that the format cannot show.
+        """
+        shown = self.upright() if upright else self
+        return save_picture(shown.to_numpy(), path, exposure=exposure, bits=bits)
 
     def __repr__(self) -> str:
-        from vcc.base.units import short
-
         pitch = short(self.pixel_area**0.5)
         missing = f", {self.missing_rays:.1%} of the rays missing" if self.missing_rays > 0 else ""
         return f"Image({'×'.join(map(str, self.shape))}, pixel {pitch}{missing})"

@@ -77,13 +77,20 @@ def test_arrays_by_name(tmp_path, samples):
     assert np.array_equal(arrays.read(path).values, samples)
     np.savez(path, lf=samples, depth=samples[..., 0])
     assert np.array_equal(arrays.read(path, key="lf").values, samples)
-    with pytest.raises(InputError, match='"lf", "depth": say which one'):
-        arrays.read(path)
-    with pytest.raises(InputError, match='no array "views", but "lf", "depth"'):
-        arrays.read(path, key="views")
-    np.savez(path)
-    with pytest.raises(InputError, match="holds no array"):
-        arrays.read(path)
+
+
+@pytest.mark.parametrize(
+    ("names", "options", "message"),
+    [
+        (("lf", "depth"), {}, '"lf", "depth": say which one'),
+        (("lf", "depth"), {"key": "views"}, 'no array "views", but "lf", "depth"'),
+        ((), {}, "holds no array"),
+    ],
+)
+def test_names_that_do_not_tell_are_refused(tmp_path, samples, names, options, message):
+    np.savez(tmp_path / "a.npz", **dict.fromkeys(names, samples))
+    with pytest.raises(InputError, match=message):
+        arrays.read(tmp_path / "a.npz", **options)
 
 
 @pytest.mark.parametrize(

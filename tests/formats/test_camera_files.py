@@ -172,20 +172,24 @@ def test_hci_truth(tmp_path: Path) -> None:
     assert views[0, 1, 0, 0] == 10
 
 
-def test_no_truth(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="holds no true disparity"):
-        read_ground_truth(tmp_path)
-    with pytest.raises(InputError, match="no file or folder"):
-        read_ground_truth(tmp_path / "nothing")
-    np.save(tmp_path / "map.npy", np.zeros((2, 2)))
-    with pytest.raises(InputError, match='put "disp" or "depth" in its name'):
-        read_ground_truth(tmp_path / "map.npy")
-    np.save(tmp_path / "depth.npy", np.zeros((2, 2, 2)))
-    with pytest.raises(InputError, match=r"shape \(2, 2, 2\)"):
-        read_ground_truth(tmp_path / "depth.npy")
-    (tmp_path / "depth.npy").write_bytes(b"damaged")
-    with pytest.raises(InputError, match="cannot be read as a NumPy array"):
-        read_ground_truth(tmp_path / "depth.npy")
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        (".", None, "holds no true disparity"),
+        ("nothing", None, "no file or folder"),
+        ("map.npy", np.zeros((2, 2)), 'put "disp" or "depth" in its name'),
+        ("depth.npy", np.zeros((2, 2, 2)), r"shape \(2, 2, 2\)"),
+        ("depth.npy", b"damaged", "cannot be read as a NumPy array"),
+    ],
+)
+def test_no_truth(name: str, values: NDArray | bytes | None, message: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    if isinstance(values, bytes):
+        path.write_bytes(values)
+    elif values is not None:
+        np.save(path, values)
+    with pytest.raises(InputError, match=message):
+        read_ground_truth(path)
 
 
 # Grids with holes

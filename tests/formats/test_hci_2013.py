@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -87,21 +88,29 @@ def test_bad_attributes(change: dict[str, Any], message: str, tmp_path: Path) ->
         open_light_field(tmp_path / "lf.h5")
 
 
-def test_bad_files(tmp_path: Path) -> None:
-    path = tmp_path / "lf.h5"
-    path.write_bytes(b"not HDF5")
-    with pytest.raises(InputError, match=r"lf\.h5 is not an HDF5 file"):
-        open_light_field(path)
+def holding(name: str, values: Any) -> Callable[[Path], None]:
+    def write_it(path: Path) -> None:
+        with h5py.File(path, "w") as file:
+            file[name] = values
+
+    return write_it
+
+
+def cut_off(path: Path) -> None:
     write(path, moving_texture(2, 2), 1.0)
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match="truncated or damaged"):
-        open_light_field(path)
-    with h5py.File(path, "w") as file:
-        file["LF"] = np.zeros((2, 2))
-    with pytest.raises(InputError, match=r"LF has the shape \(2, 2\)"):
-        open_light_field(path)
-    with h5py.File(path, "w") as file:
-        file["other"] = 1
-    with pytest.raises(InputError, match="no data set LF"):
-        open_light_field(path)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+@pytest.mark.parametrize(
+    ("write_it", "message"),
+    [
+        (lambda path: path.write_bytes(b"not HDF5"), r"lf\.h5 is not an HDF5 file"),
+        (cut_off, "truncated or damaged"),
+        (holding("LF", np.zeros((2, 2))), r"LF has the shape \(2, 2\)"),
+        (holding("other", 1), "no data set LF"),
+    ],
+)
+def test_bad_files(write_it: Callable[[Path], Any], message: str, tmp_path: Path) -> None:
+    write_it(tmp_path / "lf.h5")
+    with pytest.raises(InputError, match=message):
+        open_light_field(tmp_path / "lf.h5")

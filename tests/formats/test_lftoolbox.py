@@ -146,29 +146,49 @@ def test_written_as_matlab_writes(tmp_path: Path) -> None:
     assert back.values.shape == (2, 3, 4, 5, 1)
 
 
-def test_what_cannot_be_read_or_written(tmp_path: Path) -> None:
-    path = tmp_path / "a.mat"
-    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(600))
-    with pytest.raises(InputError, match=r"a\.mat is not an HDF5 file.*'-v7\.3'"):
-        open_light_field(path)
-    by_hand(path)
-    path.write_bytes(path.read_bytes()[:-400])
-    with pytest.raises(InputError, match=r"a\.mat cannot be read: it is truncated or damaged"):
-        open_light_field(path)
+def without_lf(path: Path) -> None:
     with h5py.File(path, "w") as file:
         file["something"] = 1
-    with pytest.raises(InputError, match=r"no variable LF.*holds something"):
-        open_light_field(path)
-    by_hand(path, intrinsics=np.eye(4))
-    with pytest.raises(InputError, match="5×5"):
-        open_light_field(path)
-    by_hand(path, intrinsics=np.diag([1.0, 1, 0, 1, 1]))
-    with pytest.raises(InputError, match="invertible"):
-        open_light_field(path)
+
+
+def cut_off(path: Path) -> None:
+    by_hand(path)
+    path.write_bytes(path.read_bytes()[:-400])
+
+
+@pytest.mark.parametrize(
+    ("write", "message"),
+    [
+        (
+            lambda path: path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(600)),
+            r"a\.mat is not an HDF5 file.*'-v7\.3'",
+        ),
+        (cut_off, r"a\.mat cannot be read: it is truncated or damaged"),
+        (without_lf, r"no variable LF.*holds something"),
+        (lambda path: by_hand(path, intrinsics=np.eye(4)), "5×5"),
+        (lambda path: by_hand(path, intrinsics=np.diag([1.0, 1, 0, 1, 1])), "invertible"),
+    ],
+)
+def test_files_that_cannot_be_read(write: Any, message: str, tmp_path: Path) -> None:
+    write(tmp_path / "a.mat")
+    with pytest.raises(InputError, match=message):
+        open_light_field(tmp_path / "a.mat")
+
+
+def test_options_of_other_formats_are_refused(tmp_path: Path) -> None:
+    by_hand(tmp_path / "a.mat")
     with pytest.raises(InputError, match=r"views= means nothing to this format"):
-        open_light_field(path, views=(2, 3))
+        open_light_field(tmp_path / "a.mat", views=(2, 3))
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("a.h5", {}, r"is a \.mat file, not \"a\.h5\""),
+        ("a.mat", {"weights": np.zeros((2, 2))}, "weights of shape"),
+    ],
+)
+def test_what_cannot_be_written(name: str, options: dict[str, Any], message: str, tmp_path: Path) -> None:
     field = LightField.from_views(np.zeros((1, 1, 2, 2), np.float32), 1e-3, 1e-3)
-    with pytest.raises(InputError, match=r"is a \.mat file, not \"a\.h5\""):
-        lftoolbox.save(field, tmp_path / "a.h5")
-    with pytest.raises(InputError, match="weights of shape"):
-        lftoolbox.save(field, path, weights=np.zeros((2, 2)))
+    with pytest.raises(InputError, match=message):
+        lftoolbox.save(field, tmp_path / name, **options)

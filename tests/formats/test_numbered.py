@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -102,10 +103,8 @@ def test_what_is_not_told_and_not_seen(tmp_path: Path) -> None:
     assert read_geometry(folder, views=(2, 6), order="row-major").columns == 6
 
 
-def test_missing_and_too_many(grid: Views, tmp_path: Path) -> None:
+def test_missing_numbers(grid: Views, tmp_path: Path) -> None:
     folder = write(grid, "row-major", tmp_path / "a")
-    with pytest.raises(InputError, match=r"20 numbered pictures, and views=\(2, 3\) would be 6"):
-        open_light_field(folder, views=(2, 3))
     (folder / "frame_007.png").unlink()
     with pytest.raises(InputError, match=r"19 of 20 numbered views; 1 are missing: 7\..*open_sparse_views"):
         open_light_field(folder)
@@ -122,18 +121,30 @@ def test_missing_and_too_many(grid: Views, tmp_path: Path) -> None:
         open_sparse_views(folder, views=(4, 5), order="row-major")
 
 
-def test_bad_options(grid: Views, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"order": "spiral"}, "order is one of .*not 'spiral'"),
+        ({"views": (0, 5)}, r"views are \(rows, columns\)"),
+        ({"every": 2}, "every= means nothing to a folder"),
+        ({"views": (2, 3)}, r"20 numbered pictures, and views=\(2, 3\) would be 6"),
+    ],
+)
+def test_bad_options(options: dict[str, Any], message: str, grid: Views, tmp_path: Path) -> None:
+    folder = write(grid, "row-major", tmp_path / "a")
+    with pytest.raises(InputError, match=message):
+        open_light_field(folder, **options)
+
+
+def test_one_number_twice(grid: Views, tmp_path: Path) -> None:
     folder = write(grid, "row-major", tmp_path / "a")
     (folder / "frame_7.png").write_bytes(b"")
     with pytest.raises(InputError, match=r"two files for the view number 7: frame_007\.png and frame_7\.png"):
         open_light_field(folder)
-    (folder / "frame_7.png").unlink()
-    with pytest.raises(InputError, match="order is one of"):
-        open_light_field(folder, order="spiral")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match=r"views are \(rows, columns\)"):
-        open_light_field(folder, views=(0, 5))
-    with pytest.raises(InputError, match="every= means nothing to a folder"):
-        open_light_field(folder, every=2)
+
+
+def test_two_sets_of_numbers(grid: Views, tmp_path: Path) -> None:
+    folder = write(grid, "row-major", tmp_path / "a")
     write(grid, "row-major", folder, "other_{:d}.png".format)
     with pytest.raises(InputError, match=r"2 sets of numbered pictures"):
         open_light_field(folder, views=(4, 5))

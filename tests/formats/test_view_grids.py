@@ -348,22 +348,22 @@ def refused(message: str) -> Iterator[None]:
         yield
 
 
-def test_no_such_folder(tmp_path: Path) -> None:
-    with refused(r"no folder .*nothing"):
-        open_light_field(tmp_path / "nothing")
-    with refused(r"is empty.*input_Cam000\.png.*views\.csv"):
-        open_light_field(tmp_path)
-    (tmp_path / "a.png").write_text("")
-    with refused(r"holds 1 files, for instance a\.png"):
-        open_light_field(tmp_path)
-    with refused(r"a\.png cannot be read as a picture"):
-        open_light_field(tmp_path / "a.png")
-    (tmp_path / "zarr.json").write_text("{}")
-    with refused(r"is a store, .*vcc\.store\.open_store"):
-        open_light_field(tmp_path)
-    (tmp_path / "a.txt").write_text("")
-    with refused(r"a\.txt is a file in no format that is known"):
-        open_light_field(tmp_path / "a.txt")
+@pytest.mark.parametrize(
+    ("there", "path", "message"),
+    [
+        (None, "nothing", r"no folder .*nothing"),
+        (None, ".", r"is empty.*input_Cam000\.png.*views\.csv"),
+        ("a.png", ".", r"holds 1 files, for instance a\.png"),
+        ("a.png", "a.png", r"a\.png cannot be read as a picture"),
+        ("zarr.json", ".", r"is a store, .*vcc\.store\.open_store"),
+        ("a.txt", "a.txt", r"a\.txt is a file in no format that is known"),
+    ],
+)
+def test_no_light_field(there: str | None, path: str, message: str, tmp_path: Path) -> None:
+    if there is not None:
+        (tmp_path / there).write_text("")
+    with refused(message):
+        open_light_field(tmp_path / path)
 
 
 def test_missing_views_are_named(views: Views, folder_of: Write) -> None:
@@ -409,7 +409,7 @@ def test_a_truncated_picture_is_named(views: Views, folder_of: Write) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"transfer": "gamma"}, "transfer is one of 'auto', 'srgb', 'linear', not 'gamma'"),
+        ({"transfer": "gamma"}, "transfer is 'auto', 'srgb' or 'linear', not 'gamma'"),
         ({"orientation": "up"}, "'flip-both'.*not 'up'"),
         ({"spacing": 0}, "spacing must be greater than 0"),
         ({"slope_per_pixel": -1}, "slope_per_pixel must be greater than 0"),

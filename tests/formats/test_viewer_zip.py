@@ -102,29 +102,57 @@ def refused(path):
     return str(caught.value)
 
 
-def test_what_is_wrong_is_refused(tmp_path, small):
-    path = tmp_path / "a.zip"
-    entries = entries_of(small)
-    missing = refused(zipped(path, entries[:7] + entries[8:]))
-    assert "11 of the 12 views of its 3×4 grid" in missing
-    twice = [*entries[:-1], (entries[-1][0], *entries[0][1:3], entries[-1][3])]
-    assert "two files for the view" in refused(zipped(path, twice))
+def one_changed(entries, **change):
+    """The entries with another fourth one."""
     source, u, v, picture = entries[3]
-    moved = [*entries[:3], (source, u + 6, v, picture), *entries[4:]]
-    assert "no regular grid along u" in refused(zipped(path, moved))
-    other = [*entries[:3], (source, u, v, png(small[0, 0][:4])), *entries[4:]]
-    assert "All views have the same size" in refused(zipped(path, other))
-    lost = [*(entry[:3] for entry in entries[:-1]), ("lost.png", *entries[-1][1:3])]
-    assert '"lost.png", and holds no such picture' in refused(zipped(path, entries, text=listed(lost)))
-    outside = [*(entry[:3] for entry in entries[:-1]), ("../lost.png", *entries[-1][1:3])]
-    assert "not beside the list" in refused(zipped(path, entries, text=listed(outside)))
-    assert "u and v being numbers" in refused(zipped(path, entries, text=listed([("a.png", "left", 0)])))
-    assert "u and v being numbers" in refused(zipped(path, entries, text=listed([("a.png", "nan", 0)])))
-    assert "lists no views" in refused(zipped(path, entries, text="<lightfield/>"))
-    assert "begins with <views>" in refused(zipped(path, entries, text="<views/>"))
-    assert "is not XML" in refused(zipped(path, entries, text="<lightfield>"))
-    torn = [*entries[:3], (source, u, v, picture[:-20]), *entries[4:]]
-    assert f"a.zip: {source} cannot be read as a picture" in refused(zipped(path, torn))
+    entry = {"source": source, "u": u, "v": v, "picture": picture} | change
+    return [*entries[:3], tuple(entry.values()), *entries[4:]]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda given: given[:7] + given[8:], "11 of the 12 views of its 3×4 grid"),
+        (lambda given: [*given[:-1], (given[-1][0], *given[0][1:3], given[-1][3])], "two files for the view"),
+        (lambda given: one_changed(given, u=given[3][1] + 6), "no regular grid along u"),
+        (
+            lambda given: one_changed(given, picture=png(np.zeros((4, 10, 3), np.uint8))),
+            "All views have the same size",
+        ),
+        (
+            lambda given: one_changed(given, picture=given[3][3][:-20]),
+            "a.zip: {source} cannot be read as a picture",
+        ),
+    ],
+)
+def test_views_that_make_no_grid_are_refused(tmp_path, small, change, words):
+    entries = entries_of(small)
+    assert words.format(source=entries[3][0]) in refused(zipped(tmp_path / "a.zip", change(entries)))
+
+
+def renamed(name):
+    return lambda given: listed([*(entry[:3] for entry in given[:-1]), (name, *given[-1][1:3])])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (renamed("lost.png"), '"lost.png", and holds no such picture'),
+        (renamed("../lost.png"), "not beside the list"),
+        (lambda given: listed([("a.png", "left", 0)]), "u and v being numbers"),
+        (lambda given: listed([("a.png", "nan", 0)]), "u and v being numbers"),
+        (lambda given: "<lightfield/>", "lists no views"),
+        (lambda given: "<views/>", "begins with <views>"),
+        (lambda given: "<lightfield>", "is not XML"),
+    ],
+)
+def test_lists_that_cannot_be_understood_are_refused(tmp_path, small, text, words):
+    entries = entries_of(small)
+    assert words in refused(zipped(tmp_path / "a.zip", entries, text=text(entries)))
+
+
+def test_a_zip_without_a_list_is_refused(tmp_path):
+    path = tmp_path / "a.zip"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("a.txt", "")
     assert "holds no list of views" in refused(path)

@@ -14,7 +14,6 @@ import pytest
 from vcc import InputError, open_light_field
 from vcc.base.affine import Affine
 from vcc.base.units import mm
-from vcc.files.pictures import save_image
 from vcc.formats.hci import read_geometry
 from vcc.image import Image
 from vcc.sources import CameraArray
@@ -135,7 +134,7 @@ class Blender:
             np.full((*size, 3), len(self.rendered) / 100, np.float32), Affine.identity(2), inverted=False
         )
         options = {} if ending == ".exr" else {"exposure": 1.0, "bits": 16}
-        save_image(picture, self.render.filepath + ending, **options)
+        picture.save(self.render.filepath + ending, **options)
 
     def run(self, script, monkeypatch):
         monkeypatch.setitem(sys.modules, "bpy", self.bpy)

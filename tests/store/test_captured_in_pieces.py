@@ -10,11 +10,14 @@ import warnings
 
 import numpy as np
 import pytest
-from vcc.run.pieces import Block, Blocks
 
 import vcc
 from vcc.base.units import mm
-from vcc.run import pieces
+from vcc.fields.grid import Block
+from vcc.plan.how import How
+from vcc.plan.operators import BlurViews, SwapPixelAxes
+from vcc.run import drive
+from vcc.run.blocks import Blocks
 from vcc.shapes.patterns import CosineSum
 from vcc.store import open_store, save_store
 
@@ -61,13 +64,13 @@ def light_fields(request, tmp_path_factory):
 
 
 def cut_as(monkeypatch, each):
-    def cut(plan, light_field, engine, limit):
-        rows, columns = (0, SHAPE[0]), (0, SHAPE[1])
-        if hasattr(plan, "view_rows"):
-            rows, columns = pieces._looked_at(plan.view_rows), pieces._looked_at(plan.view_columns)
-        return Blocks(rows, columns, SHAPE[2], *each)
+    def cut(plan, grid, need, limit):
+        used = plan.core.used_views(grid.shape)
+        looked_at = (np.flatnonzero(used.any(axis=axis)) for axis in (1, 0))
+        spans = [(int(places[0]), int(places[-1]) + 1) for places in looked_at]
+        return Blocks(*spans, *SHAPE[2:], *each)
 
-    monkeypatch.setattr(pieces, "cut", cut)
+    monkeypatch.setattr(drive, "cut", cut)
 
 
 @pytest.mark.parametrize("each", list(CUTS))
@@ -87,10 +90,10 @@ def test_pieces_add_up(light_fields, monkeypatch, name, each):
 
 def test_the_cameras_here_do_what_their_names_say(light_fields):
     plans = {name: camera.compile(light_fields[1], **options) for name, (camera, options) in CAMERAS.items()}
-    assert plans["fine mask near the sensor"].refine > 1
-    assert plans["diffuser at the views"].view_blur is not None
+    assert plans["fine mask near the sensor"].core.refine > 1
+    assert any(isinstance(each, BlurViews) for each in plans["diffuser at the views"].before)
     turned = abs(light_fields[0].frame.linear[2, 2]) < 1e-9
-    assert plans["strong defocus"].swap_pixel_axes == turned
+    assert any(isinstance(each, SwapPixelAxes) for each in plans["strong defocus"].before) == turned
     # Turned, disparities along u say nothing of distances, and no gap is filled.
     assert turned or max(plans["strong defocus"].smear) > 1
 
@@ -147,11 +150,12 @@ def test_progress_counts_views(light_fields):
 
 
 def test_blocks_cover_each_sample_once():
-    blocks = Blocks((1, 4), (0, 5), 14, 2, 3, 6)
+    blocks = Blocks((1, 4), (0, 5), 14, 16, 2, 3, 6)
     seen = np.zeros((4, 5, 14), dtype=int)
     for block in blocks:
         assert isinstance(block, Block)
-        assert block.views <= 6
+        assert block.shape[0] * block.shape[1] <= 6
+        assert block.pixel_columns == (0, 16)
         seen[slice(*block.rows), slice(*block.columns), slice(*block.pixel_rows)] += 1
     assert (seen[1:] == 1).all()
     assert not seen[0].any()
@@ -165,12 +169,16 @@ def test_blocks_keep_to_the_limit(tmp_path, method):
     stored = save_store(vcc.LightField.from_views(values, 1 * mm, 1e-3, 1.0, (0.0, 0.0)), tmp_path / "a.zarr")
     camera = vcc.Camera([vcc.Lens(focal_length=50 * mm, diameter=11 * mm)], vcc.Sensor(FOCUS, (30, 20), 1e-5))
     plan = camera.compile(stored, method=method)
-    fixed, view = pieces._fixed(plan, stored.outline), stored.view_bytes
+
+    def driven(limit):
+        return drive.Drive(plan, stored, How(memory_limit=int(limit)))
+
+    fixed, view = driven(2**30).need.fixed, stored.view_bytes
     assert view == 300 * 200 * 3 * 4
     least = fixed + 20 * view / 300
     for limit in np.geomspace(least * 1.01, fixed + 150 * view, 12):
         border = 2 if method == "rays" else 0
-        blocks = pieces.cut(plan, stored, None, limit)
+        blocks = driven(limit).blocks
         whole = (blocks.rows_each, blocks.columns_each) == (9, 11)
         rows, columns = (blocks.rows_each, blocks.columns_each) if whole else (
             blocks.rows_each + border,
@@ -180,7 +188,7 @@ def test_blocks_keep_to_the_limit(tmp_path, method):
         assert fixed + samples <= limit
     assert (blocks.rows_each, blocks.columns_each, blocks.pixel_rows_each) == (9, 11, 300)
     with pytest.raises(vcc.InputError, match="is too little: this picture takes"):
-        pieces.cut(plan, stored, None, fixed)
+        _ = driven(fixed).blocks
 
 
 def test_a_limit_cuts_and_the_picture_stays(tmp_path):
@@ -189,8 +197,8 @@ def test_a_limit_cuts_and_the_picture_stays(tmp_path):
     stored = save_store(given, tmp_path / "a.zarr")
     camera = vcc.Camera([vcc.Lens(focal_length=50 * mm, diameter=6 * mm)], vcc.Sensor(FOCUS, (40, 40), 6e-5))
     plan = camera.compile(stored)
-    limit = pieces._fixed(plan, stored.outline) + 12 * stored.view_bytes
-    assert 1 < len(list(pieces.cut(plan, stored, None, limit))) < 20
+    limit = drive.Drive(plan, stored, How()).need.fixed + 12 * stored.view_bytes
+    assert 1 < len(list(drive.Drive(plan, stored, How(memory_limit=limit)).blocks)) < 20
     whole = camera.capture(given).values
     np.testing.assert_allclose(camera.capture(stored, memory_limit=limit).values, whole, atol=1e-5 * whole.max())
     words = camera.explain(stored, memory_limit=limit)
@@ -201,20 +209,25 @@ def test_a_limit_cuts_and_the_picture_stays(tmp_path):
     assert camera.explain(stored, method="rays").expected_seconds is None
 
 
-def test_what_cannot_be_is_refused(light_fields):
-    _, on_disk = light_fields
-    camera = CAMERAS["strong defocus"][0]
-    for limit in (0, -5, "much"):
-        with pytest.raises(vcc.InputError, match="memory_limit is a number of bytes above 0"):
-            camera.capture(on_disk, memory_limit=limit)
-    with pytest.raises(vcc.InputError, match="memory_limit=1000 bytes is too little"):
-        camera.capture(on_disk, memory_limit=1000)
-    with pytest.raises(vcc.InputError, match="tolerance is for pictures made by rays"):
-        camera.capture(on_disk, tolerance=0.1)
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"memory_limit": 0}, "memory_limit is a number of bytes above 0"),
+        ({"memory_limit": -5}, "memory_limit is a number of bytes above 0"),
+        ({"memory_limit": "much"}, "memory_limit is a number of bytes above 0"),
+        ({"memory_limit": 1000}, "memory_limit=1000 bytes is too little"),
+        ({"tolerance": 0.1}, "tolerance is for pictures made by rays"),
+        ({"method": "rays", "tolerance": -1}, "greater than 0"),
+    ],
+)
+def test_what_cannot_be_is_refused(light_fields, options, words):
+    with pytest.raises(vcc.InputError, match=words):
+        CAMERAS["strong defocus"][0].capture(light_fields[1], **options)
+
+
+def test_the_light_field_inside_is_made_in_memory(light_fields):
     with pytest.raises(vcc.InputError, match=r"stored\.read\(\)"):
-        camera.light_field_at(on_disk, 0.0)
-    with pytest.raises(vcc.InputError, match="greater than 0"):
-        camera.capture(on_disk, method="rays", tolerance=-1)
+        CAMERAS["strong defocus"][0].light_field_at(light_fields[1], 0.0)
 
 
 def test_electronics_take_it_too(light_fields):

@@ -70,7 +70,7 @@ def test_samples_and_frame_come_back_bit_for_bit(tmp_path, kind, channels):
 @pytest.mark.parametrize("sample", ["mean", "point"])
 def test_what_samples_are_comes_back(tmp_path, sample):
     stored = save_store(light_field(sample=sample), tmp_path / "a.zarr")
-    parts = [stored, stored.outline, stored.read(), stored[1:, :2, 3:], stored.scaled(2), open_store(stored.path)]
+    parts = [stored, stored.grid, stored.read(), stored[1:, :2, 3:], stored.scaled(2), open_store(stored.path)]
     parts.append(convert(stored, tmp_path / "b.zarr", dtype="float16"))
     parts.append(convert(stored.read(), tmp_path / "c.zarr"))
     assert {part.sample for part in parts} == {sample}
@@ -253,14 +253,14 @@ def test_work_goes_on_where_it_stopped(tmp_path):
         open_store(tmp_path / "a.zarr").check_complete()
     assert not open_store(tmp_path / "a.zarr").complete
     np.testing.assert_array_equal(open_store(tmp_path / "a.zarr")[2:, 3:].values[0, 0], views[2, 3])
-    with pytest.raises(vcc.InputError, match=r"another description.*scene is 1 there and 2 now"):
-        writer(scene=2)
-    with pytest.raises(vcc.InputError, match="dtype is 'float32' there and 'float16' now"):
-        writer(dtype="float16")
-    with pytest.raises(vcc.InputError, match="compression is"):
-        writer(compression=Lossless("lz4"))
-    with pytest.raises(vcc.InputError, match="sample is 'mean' there and 'point' now"):
-        writer(sample="point")
+    for other, words in (
+        ({"scene": 2}, r"another description.*scene is 1 there and 2 now"),
+        ({"dtype": "float16"}, "dtype is 'float32' there and 'float16' now"),
+        ({"compression": Lossless("lz4")}, "compression is"),
+        ({"sample": "point"}, "sample is 'mean' there and 'point' now"),
+    ):
+        with pytest.raises(vcc.InputError, match=words):
+            writer(**other)
     for row, column in again.missing():
         again.write_view(row, column, views[row, column])
     np.testing.assert_array_equal(again.finish().read().values, views)
@@ -367,15 +367,18 @@ def test_impossible_stores_are_refused(tmp_path, change, words):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_settings_of_compression_are_checked():
-    for wrong in (
-        lambda: Lossless("gzip"),
-        lambda: Lossless(level=12),
-        lambda: Lossy("jpeg"),
-        lambda: Lossy(quality=0),
-    ):
-        with pytest.raises(vcc.InputError):
-            wrong()
+@pytest.mark.parametrize(
+    ("packing", "options", "words"),
+    [
+        (Lossless, {"codec": "gzip"}, 'lossless compression is by "zstd" or "lz4", not \'gzip\''),
+        (Lossless, {"level": 12}, "a whole number from 0 to 9, not 12"),
+        (Lossy, {"codec": "jpeg"}, 'lossy compression is by "jpegxl" or "avif", not \'jpeg\''),
+        (Lossy, {"quality": 0}, "a whole number from 1 to 99, not 0"),
+    ],
+)
+def test_settings_of_compression_are_checked(packing, options, words):
+    with pytest.raises(vcc.InputError, match=words):
+        packing(**options)
 
 
 def test_a_store_is_replaced_only_when_asked_and_only_by_a_whole_one(tmp_path, stored):
@@ -526,26 +529,32 @@ def test_wrong_metadata_is_named(stored, file, keys, words):
     assert str(stored.path) in str(caught.value)
 
 
-def test_what_is_no_store_is_named(tmp_path):
-    with pytest.raises(vcc.InputError, match="there is no store"):
-        open_store(tmp_path / "lost.zarr")
-    (tmp_path / "file.zarr").write_text("")
-    with pytest.raises(vcc.InputError, match="it is a file"):
-        open_store(tmp_path / "file.zarr")
-    (tmp_path / "empty.zarr").mkdir()
-    with pytest.raises(vcc.InputError, match=r"holds no zarr\.json"):
-        open_store(tmp_path / "empty.zarr")
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda path: None, "there is no store"),
+        (lambda path: path.write_text(""), "it is a file"),
+        (lambda path: path.mkdir(), r"holds no zarr\.json"),
+        (zarr.create_group, "and no light field"),
+        (lambda path: zarr.create_group(path, zarr_format=2), "is Zarr version 2"),
+    ],
+)
+def test_what_is_no_store_is_named(tmp_path, make, words):
+    make(tmp_path / "a.zarr")
+    with pytest.raises(vcc.InputError, match=words):
+        open_store(tmp_path / "a.zarr")
+
+
+def test_any_group_is_a_store_to_speak_of(tmp_path):
     zarr.create_group(tmp_path / "other.zarr")
     assert is_store(tmp_path / "other.zarr")
-    with pytest.raises(vcc.InputError, match="and no light field"):
-        open_store(tmp_path / "other.zarr")
-    zarr.create_group(tmp_path / "old.zarr", zarr_format=2)
-    with pytest.raises(vcc.InputError, match="is Zarr version 2"):
-        open_store(tmp_path / "old.zarr")
-    with pytest.raises(vcc.InputError, match="is no store"):
-        create_store(tmp_path / "file.zarr", CAMERAS, SHAPE, "uint8", provenance={}, description={})
-    with pytest.raises(vcc.InputError, match="there is no folder"):
-        create_store(tmp_path / "lost/a.zarr", CAMERAS, SHAPE, "uint8", provenance={})
+
+
+@pytest.mark.parametrize(("place", "words"), [("file.zarr", "is no store"), ("lost/a.zarr", "there is no folder")])
+def test_stores_that_cannot_be_made_are_refused(tmp_path, place, words):
+    (tmp_path / "file.zarr").write_text("")
+    with pytest.raises(vcc.InputError, match=words):
+        create_store(tmp_path / place, CAMERAS, SHAPE, "uint8", provenance={}, description={})
     assert not list(tmp_path.glob(".*"))
 
 

@@ -1,6 +1,4 @@
-"""Single pictures: reading what is stored in a file, and writing an image for people or for
-programs.
-"""
+"""Single pictures: reading what is stored in a file, and writing one for people or for programs."""
 
 from __future__ import annotations
 
@@ -18,14 +16,16 @@ from vcc.base.errors import InputError
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
 from vcc.files.netpbm import read_netpbm
-from vcc.image import Image
 
 READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
 """The endings that `read_picture` knows."""
 WRITE_ENDINGS = (".png", ".tif", ".tiff", ".exr", ".npy")
-"""The endings that `save_image` knows."""
+"""The endings that `save_picture` knows."""
 RAW_ENDINGS = (".tif", ".tiff", ".png", ".npy")
 """The endings that `save_numbers` knows."""
+
+Exposure = float | Literal["auto"]
+"""A factor on light before the sRGB curve; "auto" is that of `auto_exposure`."""
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)  # IEC 61966-2-1
 _BRIGHT_PERCENTILE = 99.5
@@ -123,7 +123,7 @@ class SavedPicture:
     Args:
         path: the file.
         exposure: the factor between the image's values and what was stored (before the sRGB curve);
-            pass it to `save_image` for another picture, and the two can be compared.
+            pass it on for another picture, and the two can be compared.
         clipped: the share of the pixels, 0 to 1, in which a channel was brighter than the file can
             hold.
         description: one line for people.
@@ -135,42 +135,23 @@ class SavedPicture:
     description: str
 
 
-def save_image(
-    image: Image,
+def save_picture(
+    values: NDArray[np.float32],
     path: str | PathLike[str],
     *,
-    exposure: float | Literal["auto"] = "auto",
-    upright: bool = True,
+    exposure: Exposure = "auto",
     bits: int | None = None,
 ) -> SavedPicture:
-    """Write an image; the ending chooses the format.
-
-    ======================  ==================================================================
-    ``.png``                sRGB, 8 bits (or 16): for people
-    ``.tif``, ``.tiff``     sRGB, 16 bits (or 8)
-    ``.exr``                linear float32, values untouched; channels R, G, B or Y
-    ``.npy``                linear float32, values untouched
-    ======================  ==================================================================
+    """Write linear values; the ending chooses the format: sRGB in PNG and TIFF, untouched in OpenEXR and .npy.
 
     Args:
-        image: what to write; its values may be of any array library.
+        values: as they are to be seen, shape (rows, columns) or (rows, columns, channels).
         path: where to.
-        exposure: the factor that brings the image's values to the range 0…1 of an sRGB file. "auto"
-            takes 1 over the 99.5th percentile of the luminance: the brightest 0.5 % of the pixels
-            may clip. It is returned, so that a second picture can be written with the same.
-        upright: turn a real image (which lies upside down on the sensor) so that people see it
-            upright.
-        bits: bits per sample for PNG and TIFF.
-
-    Returns:
-        The path, the exposure used, the share of clipped pixels, and all that in words. The file
-        appears whole or not at all.
+        exposure: see `vcc.Image.save`, likewise the bits and what is returned.
+        bits: see there.
 
     Raises:
-        InputError: an unknown ending, a folder that does not exist or cannot be written to, an
-            exposure that is not a finite number above 0 (or not 1, for .exr and .npy), bits that
-            the format does not have, values that are not finite, or a number of channels that the
-            format cannot show.
+        InputError: see there.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -178,12 +159,8 @@ def save_image(
         raise InputError(
             f'a picture cannot be written as "{path.name}": end the name in {", ".join(WRITE_ENDINGS)}'
         )
-    values = (image.upright() if upright else image).to_numpy()
-    if values.ndim == 3 and values.shape[2] == 1:
-        values = values[..., 0]
-    if ending in (".exr", ".npy"):
-        return _save_linear(values, path, ending, exposure, bits)
-    return _save_display(values, path, ending, exposure, bits)
+    save = _save_linear if ending in (".exr", ".npy") else _save_display
+    return save(_grey_if_one(values), path, exposure, bits)
 
 
 def save_numbers(
@@ -208,22 +185,16 @@ def save_numbers(
         raise InputError(
             f'raw numbers cannot be written as "{path.name}": end the name in {", ".join(RAW_ENDINGS)}'
         )
-    if values.ndim == 3 and values.shape[2] == 1:
-        values = values[..., 0]
+    values = _grey_if_one(values)
     if ending != ".npy" and values.ndim == 3 and values.shape[2] != 3:
         raise InputError(
             f"{ending} files have 1 or 3 channels, and this recording has {values.shape[2]}: use .npy"
         )
     with atomic_path(path) as temporary:
         if ending == ".npy":
-            with temporary.open("wb") as file:
-                np.save(file, values)
-        elif ending == ".png":
-            import imagecodecs
-
-            temporary.write_bytes(imagecodecs.png_encode(np.ascontiguousarray(values)))
+            _write_npy(values, temporary)
         else:
-            _write_tiff(values, temporary, json.dumps(meaning))
+            write_codes(values, temporary, ending, description=json.dumps(meaning))
     description = f"{path}: {_size(values)}, {words}; {values.dtype} numbers as recorded, upside down"
     return SavedPicture(path, 1.0, saturated, description)
 
@@ -242,47 +213,57 @@ def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
     return 1.0 / bright if bright > 0 else 1.0
 
 
-def _save_linear(
-    values: NDArray[np.float32],
-    path: Path,
-    ending: str,
-    exposure: float | Literal["auto"],
-    bits: int | None,
-) -> SavedPicture:
+def write_codes(
+    codes: NDArray[Any], path: Path, ending: str, *, png_level: int | None = None, description: str | None = None
+) -> None:
+    """Write stored numbers as they are, in a PNG or a TIFF.
+
+    Args:
+        codes: uint8 or uint16, shape (rows, columns) or (rows, columns, channels).
+        path: where to; not atomic.
+        ending: ".png"; any other is TIFF.
+        png_level: how hard a PNG is packed, 0 to 9; None for the library's own.
+        description: what a TIFF says of itself.
+    """
+    codes = np.ascontiguousarray(_grey_if_one(codes))
+    if ending == ".png":
+        import imagecodecs
+
+        path.write_bytes(imagecodecs.png_encode(codes, level=png_level))
+        return
+    import tifffile
+
+    photometric = "rgb" if codes.ndim == 3 else "minisblack"
+    tifffile.imwrite(
+        path, codes, photometric=photometric, compression="zlib", metadata=None, description=description
+    )
+
+
+def _save_linear(values: NDArray[np.float32], path: Path, exposure: Exposure, bits: int | None) -> SavedPicture:
+    ending = path.suffix.lower()
     if exposure not in ("auto", 1):
         raise InputError(
-            f"exposure={exposure} has no place in {path.name}: {ending} files hold the values "
-            "untouched. "
+            f"exposure={exposure} has no place in {path.name}: {ending} files hold the values untouched. "
             "Leave it out, or write a .png or .tif"
         )
     if bits not in (None, 32):
         raise InputError(f"{ending} files hold 32-bit floating-point values, not {bits} bits")
     with atomic_path(path) as temporary:
-        if ending == ".npy":
-            with temporary.open("wb") as file:  # np.save would append an ending of its own
-                np.save(file, values)
-        else:
-            _write_exr(values, temporary)
+        (_write_npy if ending == ".npy" else _write_exr)(values, temporary)
     size = _size(values)
     return SavedPicture(path, 1.0, 0.0, f"{path}: {size}, linear float32, values untouched (exposure 1)")
 
 
-def _save_display(
-    values: NDArray[np.float32],
-    path: Path,
-    ending: str,
-    exposure: float | Literal["auto"],
-    bits: int | None,
-) -> SavedPicture:
+def _save_display(values: NDArray[np.float32], path: Path, exposure: Exposure, bits: int | None) -> SavedPicture:
+    ending = path.suffix.lower()
     if bits is None:
         bits = 8 if ending == ".png" else 16
     if bits not in (8, 16):
         raise InputError(f"{ending} files are written with 8 or 16 bits per sample, not {bits}")
     if values.ndim == 3 and values.shape[2] != 3:
         raise InputError(
-            f"an image of {values.shape[2]} channels cannot be shown as {ending}, which has 1 or "
-            "3: "
-            "write it as .npy or .exr, or choose channels, e.g. image[..., :3]"
+            f"an image of {values.shape[2]} channels cannot be shown as {ending}, which has 1 or 3: write it as "
+            ".npy or .exr, or choose channels, e.g. image[..., :3]"
         )
     finite = np.isfinite(values)
     if not finite.all():
@@ -295,14 +276,8 @@ def _save_display(
     exposed = values * np.float32(factor)
     clipped = _share_beyond(exposed > 1 + 0.5 / (2**bits - 1))  # what rounds to white is not lost
     negative = _share_beyond(exposed < 0)
-    codes = transfer.encode(exposed, bits)
     with atomic_path(path) as temporary:
-        if ending == ".png":
-            import imagecodecs
-
-            temporary.write_bytes(imagecodecs.png_encode(codes))
-        else:
-            _write_tiff(codes, temporary)
+        write_codes(transfer.encode(exposed, bits), temporary, ending)
     reason = " (auto: the 99.5th percentile of the luminance is white)" if automatic else ""
     below = f", {negative:.2%} below 0 and shown black" if negative > 0 else ""
     description = (
@@ -338,13 +313,14 @@ def _size(values: NDArray[Any]) -> str:
     return f"{values.shape[1]}×{values.shape[0]} pixels, {kind}"
 
 
-def _write_tiff(codes: NDArray[Any], path: Path, description: str | None = None) -> None:
-    import tifffile
+def _grey_if_one(values: NDArray[Any]) -> NDArray[Any]:
+    """A single channel is none."""
+    return values[..., 0] if values.ndim == 3 and values.shape[2] == 1 else values
 
-    photometric = "rgb" if codes.ndim == 3 else "minisblack"
-    tifffile.imwrite(
-        path, codes, photometric=photometric, compression="zlib", metadata=None, description=description
-    )
+
+def _write_npy(values: NDArray[Any], path: Path) -> None:
+    with path.open("wb") as file:  # np.save would append an ending of its own
+        np.save(file, values)
 
 
 def _write_exr(values: NDArray[np.float32], path: Path) -> None:
@@ -488,6 +464,4 @@ def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
         if not (samples[..., -1] >= opaque).all():
             raise InputError(f"{path}: {_NOT_OPAQUE}")
         samples = samples[..., :-1]
-    if samples.ndim == 3 and samples.shape[2] == 1:
-        samples = samples[..., 0]
-    return samples, samples.dtype.itemsize * 8
+    return _grey_if_one(samples), samples.dtype.itemsize * 8

@@ -1,9 +1,10 @@
 """Light fields and pictures in files. `open_light_field` finds out which format a folder or file has."""
 
 from vcc.formats.containers import read_container
+from vcc.formats.folder_info import FolderInfo
 from vcc.formats.ground_truth import GroundTruth, read_ground_truth
 from vcc.formats.lytro_lfp import LytroRaw, read_lytro
-from vcc.formats.reading import FolderInfo, open_light_field, open_sparse_views, read_geometry
+from vcc.formats.reading import open_light_field, open_sparse_views, read_geometry
 from vcc.formats.sparse import SparseViews
 from vcc.formats.writing import SavedLightField, save_light_field
 

@@ -10,22 +10,21 @@ from __future__ import annotations
 
 import math
 import zipfile
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
+from vcc.fields.arrays import all_samples
+from vcc.fields.grid import Sample
+from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
 from vcc.formats.grid import Decoded, Geometry
-
-if TYPE_CHECKING:
-    from vcc.fields.grid import Sample
-    from vcc.light_field import LightField
 
 ENDINGS = (".npy", ".npz")
 
@@ -45,7 +44,7 @@ def read(
     shape: tuple[int, ...] | None = None,
     axes: str | None = None,
     key: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Decoded:
     """The light field in an array.
 
@@ -90,29 +89,28 @@ def read(
     )
 
 
-def save(light_field: LightField, path: str | PathLike[str]) -> Path:
+def save(light_field: Samples, path: str | PathLike[str]) -> Path:
     """Write a light field as an ``.npz`` that keeps it whole: samples of any type, any frame. Nothing is lost.
 
     Args:
-        light_field: its values may be of any array library.
+        light_field: in memory, its values of any array library, or in a store.
         path: where to; the name ends in ``.npz``.
 
     Raises:
         InputError: another ending, or a place that cannot be written to.
     """
-    from vcc.fields.sampled import to_numpy
-
     path = Path(path).expanduser()
     if path.suffix.lower() != ".npz":
         raise InputError(f'a light field is written as arrays to a name that ends in .npz, not "{path.name}"')
+    grid = light_field.grid
     arrays: dict[str, Any] = {
-        "values": to_numpy(light_field.values),
-        "frame": light_field.frame.matrix,
+        "values": all_samples(light_field),
+        "frame": grid.frame.matrix,
         "transfer": np.array("linear"),
-        "sample": np.array(light_field.sample),
+        "sample": np.array(grid.sample),
     }
-    if light_field.disparity_range is not None:
-        arrays["disparity_range"] = np.array(light_field.measured_disparity_range())
+    if grid.disparity_range is not None:
+        arrays["disparity_range"] = np.array(grid.disparity_range)
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
     return path

@@ -6,17 +6,17 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from vcc.base.errors import InputError
-from vcc.base.units import mm
 from vcc.files.pictures import read_picture
-from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, mean_step, pictures_in
+from vcc.formats.grid import Geometry, ViewGrid
+from vcc.formats.positions import START, find_named, names_of, stepped
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
-_NAME = re.compile(rf"(.+?)_(\d+)_(\d+)_(-?\d+\.\d+)_(-?\d+\.\d+)_{_NUMBER}_{_NUMBER}")
+_NAME = re.compile(rf"{START}_{_NUMBER}_{_NUMBER}")
+_KIND = "names with camera, focal length and sensor"
 
 
 def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
@@ -25,12 +25,7 @@ def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
     Raises:
         InputError: a grid that `vcc.formats.grid.arrange` refuses, or cameras that are not alike.
     """
-    matches = {file: match for file in pictures_in(folder) if (match := _NAME.fullmatch(file.stem))}
-    if not matches:
-        return None
-    places = [Place(int(match[2]), int(match[3]), file) for file, match in matches.items()]
-    grid = ViewGrid("names with camera, focal length and sensor", arrange(places, folder, sparse=sparse))
-    return ViewGrid(grid.format, grid.files, read_geometry(grid) or Geometry())
+    return find_named(folder, _NAME, _KIND, read_geometry, sparse=sparse)
 
 
 def read_geometry(grid: ViewGrid) -> Geometry | None:
@@ -43,14 +38,12 @@ def read_geometry(grid: ViewGrid) -> Geometry | None:
     Raises:
         InputError: cameras of different focal lengths or sensors, or a focal length of 0.
     """
-    where = np.full((*grid.shape, 2), np.nan)
+    names = names_of(grid, _NAME)
+    if names is None:
+        return None
     kinds: dict[tuple[float, float], Path] = {}
-    for place, file in grid.present.items():
-        match = _NAME.fullmatch(file.stem)
-        if match is None:
-            return None
-        where[place] = float(match[4]), float(match[5])
-        kinds.setdefault((float(match[6]), float(match[7])), file)
+    for place, match in names.items():
+        kinds.setdefault((float(match[6]), float(match[7])), grid.present[place])
     if len(kinds) > 1 or min(next(iter(kinds))) <= 0:
         named = ", ".join(
             f"{file.name} (focal length {kind[0]:g}, sensor {kind[1]:g})" for kind, file in kinds.items()
@@ -60,13 +53,10 @@ def read_geometry(grid: ViewGrid) -> Geometry | None:
             f"{named}. All views have the same focal length and sensor, both above 0"
         )
     focal_length, sensor = next(iter(kinds))
-    down, right = mean_step(where[..., 0], 0), mean_step(where[..., 1], 1)
-    spacing = (abs(down) or abs(right), abs(right) or abs(down))  # a single row has no step down
     picture, _ = read_picture(next(iter(grid.present.values())))
-    return Geometry(
-        spacing=(spacing[0] * mm, spacing[1] * mm) if spacing[0] > 0 else None,
+    return replace(
+        stepped(names, grid.shape),
         slope_per_pixel=sensor / focal_length / max(picture.shape[:2]),
         focus_distance=math.inf,
-        directions=(-1 if down < 0 else 1, -1 if right < 0 else 1),
         directions_are_true=True,
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.fields.sampled import to_numpy
+from vcc.base.progress import Progress
+from vcc.fields.arrays import all_samples
+from vcc.fields.samples import Samples
 from vcc.files import transfer as curves
 from vcc.files.atomic import atomic_path
 from vcc.files.pictures import read_picture
 from vcc.formats.grid import Decoded
-from vcc.light_field import LightField
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".ppm")
 
@@ -32,7 +32,7 @@ def read(
     path: Path,
     *,
     views: tuple[int, int] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Decoded:
     """The views of a picture of lenslet blocks: pixel (l·rows + j, k·columns + i) is pixel (l, k) of view (j, i).
 
@@ -75,7 +75,7 @@ def read(
     )
 
 
-def save(light_field: LightField, path: str | PathLike[str], *, bits: int = 16) -> Path:
+def save(light_field: Samples, path: str | PathLike[str], *, bits: int = 16) -> Path:
     """Write a light field as an ESLF, sRGB-encoded PNG.
 
     Read back, samples differ by half a code of the sRGB curve at most; they carry no geometry.
@@ -93,9 +93,10 @@ def save(light_field: LightField, path: str | PathLike[str], *, bits: int = 16) 
     path = Path(path).expanduser()
     if path.suffix.lower() != ".png":
         raise InputError(f'an ESLF is written as .png, not "{path.name}"')
-    if light_field.channels not in (None, 1, 3):
-        raise InputError(f"a PNG has 1 or 3 channels, and this light field has {light_field.channels}")
-    values = np.asarray(to_numpy(light_field.values)).astype(np.float32) / np.float32(light_field.full_scale)
+    grid = light_field.grid
+    if grid.channels not in (None, 1, 3):
+        raise InputError(f"a PNG has 1 or 3 channels, and this light field has {grid.channels}")
+    values = all_samples(light_field).astype(np.float32) / np.float32(grid.full_scale)
     if values.max() > 1:
         raise InputError(
             f"an ESLF holds values up to 1, and this light field reaches {values.max():g}: scale it, "

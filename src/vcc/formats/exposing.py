@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.fields.sampled import to_numpy
+from vcc.fields.arrays import one_view
+from vcc.fields.samples import Samples
 from vcc.files import transfer
-from vcc.files.pictures import auto_exposure, checked_exposure
-
-if TYPE_CHECKING:
-    from vcc.light_field import LightField
-    from vcc.store import StoredLightField
-
-Exposure = float | Literal["auto"]
+from vcc.files.pictures import Exposure, auto_exposure, checked_exposure
 
 
 class Codes:
@@ -34,13 +30,10 @@ class Codes:
             above 0.
     """
 
-    def __init__(
-        self, light_field: LightField | StoredLightField, bits: int, curve: str, exposure: Exposure
-    ) -> None:
+    def __init__(self, light_field: Samples, bits: int, curve: str, exposure: Exposure) -> None:
         if bits not in (8, 16):
             raise InputError(f"pictures are written with 8 or 16 bits per sample, not {bits}")
-        if curve not in ("srgb", "linear"):
-            raise InputError(f'transfer is "srgb" or "linear", not {curve!r}')
+        checks.one_of("transfer", curve, ("srgb", "linear"))
         self._light_field, self._bits, self._curve = light_field, bits, curve
         self._seen = self._beyond = 0
         self.exposure = self._automatic() if exposure == "auto" else checked_exposure(exposure)
@@ -67,14 +60,12 @@ class Codes:
         return codes
 
     def _automatic(self) -> float:
-        rows, columns = self._light_field.shape[:2]
+        rows, columns = self._light_field.grid.shape[:2]
         samples, full_scale = stored_view(self._light_field, rows // 2, columns // 2)
         light = samples.astype(np.float32) / np.float32(full_scale)
         return auto_exposure(light if light.ndim == 2 or light.shape[2] == 3 else light.max(axis=2))
 
 
-def stored_view(light_field: LightField | StoredLightField, row: int, column: int) -> tuple[NDArray[Any], float]:
+def stored_view(light_field: Samples, row: int, column: int) -> tuple[NDArray[Any], float]:
     """A view's samples, linear, as they are held, and what of them stands for radiance 1."""
-    piece = light_field[row : row + 1, column : column + 1]
-    samples: NDArray[Any] = to_numpy(piece.values)[0, 0]
-    return samples, piece.full_scale
+    return one_view(light_field, row, column), light_field.grid.full_scale

@@ -6,25 +6,21 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import mm
-
-if TYPE_CHECKING:
-    from vcc.base.affine import Affine
-    from vcc.fields.grid import Sample
+from vcc.base.words import first_few
+from vcc.fields.grid import Sample
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")
 """The endings of the files that views may be stored in."""
 
 DEFAULT_SPACING = 1 * mm
 """The view spacing taken where nothing states one, metres."""
-
-_NAMED_AT_MOST = 12
 
 
 @dataclass(frozen=True)
@@ -187,20 +183,6 @@ def arrange(
     return tuple(tuple(at.get((row, column)) for column in columns) for row in rows)
 
 
-def mean_step(positions: NDArray[Any], axis: int) -> float:
-    """The mean step between neighbours along an axis of a grid; 0 if it has one place only, NaN where missing."""
-    if positions.shape[axis] < 2:
-        return 0.0
-    places = np.arange(positions.shape[axis])
-    along = np.moveaxis(positions, axis, -1).reshape(-1, positions.shape[axis])
-    slopes = []
-    for line in along:
-        there = np.isfinite(line)
-        if there.sum() > 1:
-            slopes.append(float(np.polyfit(places[there], line[there], 1)[0]))
-    return float(np.mean(slopes)) if slopes else 0.0
-
-
 def _counted(numbers: list[int]) -> range:
     """From the lowest number to the highest, in the largest step that meets all."""
     low, high = min(numbers), max(numbers)
@@ -214,9 +196,8 @@ def _refuse_extra(
     extra = [where for where in at if where[0] not in rows or where[1] not in columns]
     if extra:
         raise InputError(
-            f"{folder} has {len(extra)} views outside its grid of {len(rows)}×{len(columns)} "
-            "views, "
-            f"for instance {at[extra[0]].name} at (row {extra[0][0]}, column {extra[0][1]}). "
+            f"{folder} has {len(extra)} views outside its grid of {len(rows)}×{len(columns)} views, for instance "
+            f"{at[extra[0]].name} at (row {extra[0][0]}, column {extra[0][1]}). "
             "Move them away or correct the size of the grid"
         )
 
@@ -227,19 +208,10 @@ def _refuse_missing(
     total = len(rows) * len(columns)
     if len(at) == total:
         return
-    missing: list[tuple[int, int]] = []
-    for row in rows:
-        for column in columns:
-            if (row, column) not in at:
-                missing.append((row, column))
-            if len(missing) == _NAMED_AT_MOST:
-                break
-        if len(missing) == _NAMED_AT_MOST:
-            break
+    missing = ((row, column) for row in rows for column in columns if (row, column) not in at)
     count = total - len(at)
-    named = ", ".join(map(str, missing)) + (", …" if count > len(missing) else "")
     raise InputError(
         f"{folder} has {len(at)} of the {total} views of its {len(rows)}×{len(columns)} grid; "
-        f"{count} are missing, by (row, column): {named}. Incomplete grids are no light field: add the missing "
-        "files, or open those that there are with vcc.formats.open_sparse_views"
+        f"{count} are missing, by (row, column): {first_few(missing, count)}. Incomplete grids are no "
+        "light field: add the missing files, or open those that there are with vcc.formats.open_sparse_views"
     )

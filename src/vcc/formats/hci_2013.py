@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.formats import hdf5
 from vcc.formats.grid import Decoded, Geometry
 
@@ -18,7 +18,7 @@ def recognised(path: Path) -> bool:
     return path.suffix.lower() in (".h5", ".hdf5") and path.is_file()
 
 
-def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> Decoded:
+def read(path: Path, *, progress: Progress | None = None) -> Decoded:
     """The data set /LF, axes (v, h, y, x, channel), with the cameras of the root's attributes.
 
     disparity = dH·focalLength/Z − shift, focalLength in pixels. The unit of dH and of the depths is not stated;

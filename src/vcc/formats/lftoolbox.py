@@ -8,7 +8,6 @@ towards the scene with slope u comes from it with ours of −u.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -18,12 +17,13 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
+from vcc.fields.arrays import all_samples
 from vcc.fields.grid import Sample
-from vcc.fields.sampled import to_numpy
+from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
 from vcc.formats import hdf5
 from vcc.formats.grid import Decoded, Geometry
-from vcc.light_field import LightField
 
 _TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
 _FROM_ZERO = Affine.translation(1, 1, 1, 1)  # from indices counted from 0 to MATLAB's
@@ -37,7 +37,7 @@ def recognised(path: Path) -> bool:
     return path.suffix.lower() == ".mat" and path.is_file()
 
 
-def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> Decoded:
+def read(path: Path, *, progress: Progress | None = None) -> Decoded:
     """The light field ``LF`` with its weights and, if it was rectified, its full frame.
 
     Decoded and not colour-corrected samples are linear; those that DecodeOptions calls colour-corrected have been
@@ -127,7 +127,7 @@ def intrinsics_of(frame: Affine) -> NDArray[np.float64]:
     return matrix
 
 
-def save(light_field: LightField, path: str | PathLike[str], *, weights: NDArray[Any] | None = None) -> Path:
+def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[Any] | None = None) -> Path:
     """Write a light field as the Light Field Toolbox does, with its frame as RectOptions.RectCamIntrinsicsH.
 
     Samples keep their type and are linear. MATLAB reads the file with ``load``.
@@ -145,7 +145,7 @@ def save(light_field: LightField, path: str | PathLike[str], *, weights: NDArray
     if path.suffix.lower() != ".mat":
         raise InputError(f'a light field of the Light Field Toolbox is a .mat file, not "{path.name}"')
     h5py = hdf5.library()
-    values = np.asarray(to_numpy(light_field.values))
+    grid, values = light_field.grid, all_samples(light_field)
     if values.dtype == np.float16:
         values = values.astype(np.float32)
     if values.dtype.name not in _CLASSES:
@@ -163,13 +163,13 @@ def save(light_field: LightField, path: str | PathLike[str], *, weights: NDArray
                 file, "LF", np.ascontiguousarray(values.T), compression="gzip", compression_opts=1, shuffle=True
             )
             options = _struct(file, "RectOptions")
-            _variable(options, "RectCamIntrinsicsH", np.ascontiguousarray(intrinsics_of(light_field.frame).T))
+            _variable(options, "RectCamIntrinsicsH", np.ascontiguousarray(intrinsics_of(grid.frame).T))
             ours = _struct(file, _OURS)
-            for name, word in (("Transfer", "linear"), ("Sample", light_field.sample)):
+            for name, word in (("Transfer", "linear"), ("Sample", grid.sample)):
                 _variable(ours, name, np.frombuffer(word.encode("utf-16-le"), np.uint16)[:, None], "char")
             _variable(ours, "HasWeight", np.array([[float(weights is not None)]]))
-            if light_field.disparity_range is not None:
-                _variable(ours, "DisparityRange", np.array(light_field.disparity_range, float)[:, None])
+            if grid.disparity_range is not None:
+                _variable(ours, "DisparityRange", np.array(grid.disparity_range, float)[:, None])
         with temporary.open("r+b") as raw:
             # Text, no subsystem, version 2.0 and the byte order: what MATLAB looks at before it calls HDF5.
             raw.write(_HEADER.encode().ljust(116) + bytes(8) + b"\x00\x02IM")

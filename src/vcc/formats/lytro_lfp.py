@@ -1,46 +1,28 @@
-"""Containers of Lytro cameras, ``.lfp`` and ``.lfr``: the raw mosaic behind the microlenses, and the
-camera's account of itself.
+"""Recordings of Lytro cameras, ``.lfp`` and ``.lfr``: the raw mosaic behind the microlenses, and the camera's
+account of itself.
 
 Such a file holds no light field yet: its mosaic must first be decoded, microlens by microlens.
 `read_lytro` gives the mosaic and what is needed for that; `read`, which `vcc.open_light_field` calls,
 refuses and says so.
-
-The container is a header, a table of contents in JSON and blobs that the table calls by their SHA-1::
-
-    89 4C 46 50 0D 0A 1A 0A  00 00 00 01  00 00 00 00    the file begins
-    89 4C 46 4D 0D 0A 1A 0A  00 00 00 00                 the table of contents; 43 for 4D: a blob
-        length, 4 bytes, big-endian
-        "sha1-" and 40 hexadecimal digits
-        35 zeros
-        data, and zeros up to a multiple of 16 bytes
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.formats.grid import Decoded
+from vcc.formats.lytro_container import Container, begins_as_container, stated_at
 
 ENDINGS = (".lfp", ".lfr", ".lfx")
-
-_FILE = bytes.fromhex("894C46500D0A1A0A")
-_CONTENTS = bytes.fromhex("894C464D0D0A1A0A")
-_BLOB = bytes.fromhex("894C46430D0A1A0A")
-_FILE_HEADER = 16
-_SECTION_HEADER = 96  # magic 8, zeros 4, length 4, name 45, zeros 35
-_NAME = slice(16, 61)
-_ALIGNMENT = 16
 
 _CORNERS = {"r": "RGGB", "gr": "GRBG", "gb": "GBRG", "b": "BGGR"}
 """What colour the upper left pixel has, and the tile that this makes."""
@@ -177,25 +159,17 @@ def unpack(packed: bytes, bits: int, shape: tuple[int, int]) -> NDArray[np.uint1
 
 def recognised(path: Path) -> bool:
     """Whether this is meant to be such a container, by its ending or its first bytes."""
-    if not path.is_file():
-        return False
-    if path.suffix.lower() in ENDINGS:
-        return True
-    try:
-        with path.open("rb") as file:
-            return file.read(len(_FILE)) == _FILE
-    except OSError:
-        return False
+    return path.is_file() and (path.suffix.lower() in ENDINGS or begins_as_container(path))
 
 
-def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> Decoded:
+def read(path: Path, *, progress: Progress | None = None) -> Decoded:
     """Refuse: a raw recording is no light field yet.
 
     Raises:
         InputError: always; of a damaged file what `read_lytro` says, of a sound one what it holds and
             how to get it.
     """
-    with _Container(Path(path)) as container:
+    with Container(Path(path)) as container:
         image = _Recording(container)
         rows, columns = image.shape
         raise InputError(
@@ -217,7 +191,7 @@ def read_lytro(path: str | PathLike[str]) -> LytroRaw:
             recording (Lytro's web files hold only pictures made of one), metadata that cannot be understood, or
             an unknown packing.
     """
-    with _Container(Path(path).expanduser()) as container:
+    with Container(Path(path).expanduser()) as container:
         image = _Recording(container)
         return LytroRaw(
             mosaic=unpack(image.packed(), image.bits, image.shape),
@@ -233,107 +207,17 @@ def read_lytro(path: str | PathLike[str]) -> LytroRaw:
         )
 
 
-class _Container:
-    """The sections of a file, found by walking through their headers; their bytes are read when asked for."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        if not path.is_file():
-            raise InputError(f"there is no file {path}")
-        self._file: BinaryIO = path.open("rb")
-        try:
-            self._size = path.stat().st_size
-            self._blobs: dict[str, tuple[int, int]] = {}
-            self._contents = self._walk()
-        except BaseException:
-            self._file.close()
-            raise
-
-    def __enter__(self) -> _Container:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()
-
-    def fault(self, words: str) -> InputError:
-        """What is wrong with this file, to be raised."""
-        return InputError(f"{self.path}: {words}")
-
-    def contents(self) -> dict[str, Any]:
-        """The table of contents."""
-        return self.json(self._contents, "its table of contents")
-
-    def bytes_of(self, name: str, what: str) -> bytes:
-        """The bytes of a section, whose SHA-1 is its name."""
-        if name not in self._blobs:
-            raise self.fault(f"{what} ({name}) is not in the file. Copy it again from where it came from")
-        start, length = self._blobs[name]
-        self._file.seek(start)
-        data = self._file.read(length)
-        if "sha1-" + hashlib.sha1(data, usedforsecurity=False).hexdigest() != name:
-            raise self.fault(
-                f"{what} is damaged: its SHA-1 is not {name}. Copy the file again from where it came from"
-            )
-        return data
-
-    def json(self, name: str, what: str) -> dict[str, Any]:
-        """The JSON object that a section holds."""
-        try:
-            found = json.loads(self.bytes_of(name, what).rstrip(b"\0"))
-        except ValueError as error:  # not JSON, or not UTF-8
-            raise self.fault(f"{what} is not JSON: {error}") from None
-        if not isinstance(found, dict):
-            raise self.fault(f"{what} is not a JSON object")
-        return found
-
-    def _walk(self) -> str:
-        """Find all sections; returns the name of the table of contents."""
-        header = self._file.read(_FILE_HEADER)
-        if header[: len(_FILE)] != _FILE:
-            raise self.fault(
-                f"it begins with {header[:8].hex(' ').upper() or 'nothing'}, not with "
-                f"{_FILE.hex(' ').upper()}, so it is no container of a Lytro camera"
-            )
-        place, contents = _FILE_HEADER, None
-        while place < self._size:
-            self._file.seek(place)
-            header = self._file.read(_SECTION_HEADER)
-            if header[:8] not in (_CONTENTS, _BLOB):
-                if not header.strip(b"\0"):
-                    break  # padding behind the last section
-                raise self.fault(
-                    f"at byte {place:,} stands {header[:8].hex(' ').upper()}, and no section begins so"
-                )
-            length = int.from_bytes(header[12:16], "big")
-            start = place + _SECTION_HEADER
-            if start + length > self._size:
-                missing = start + length - self._size
-                raise self.fault(
-                    f"{missing:,} bytes are missing at its end (the section at byte {place:,} has {length:,} "
-                    "bytes). Copy it again from where it came from"
-                )
-            name = header[_NAME].decode("ascii", "replace")
-            self._blobs[name] = (start, length)
-            if header[:8] == _CONTENTS:
-                contents = name
-            place = start + -(-length // _ALIGNMENT) * _ALIGNMENT
-        if contents is None:
-            raise self.fault("it has no table of contents. Copy it again from where it came from")
-        return contents
-
-
 class _Recording:
     """The raw picture of a container: what its metadata state, with the metadata's own names hidden here."""
 
-    def __init__(self, container: _Container) -> None:
+    def __init__(self, container: Container) -> None:
         self._container = container
         frame = _frame(container)
         self._image_name = _reference(container, frame, "imageRef")
         self.metadata = container.json(_reference(container, frame, "metadataRef"), "its metadata")
         private = frame.get("privateMetadataRef")
         self.private_metadata = container.json(private, "its private metadata") if isinstance(private, str) else {}
-        _, length = container._blobs.get(self._image_name, (0, -1))
-        self.bits, self.shape, packing = self._packing(length)
+        self.bits, self.shape, packing = self._packing(container.length_of(self._image_name))
         self.camera = self._camera(packing)
         self.color_filter = self._color_filter(packing)
 
@@ -356,7 +240,7 @@ class _Recording:
     def levels(self, name: str) -> tuple[float, float, float, float] | None:
         """The black or white levels of the pixels of a tile, row by row."""
         for image in self._images():
-            if isinstance(_at(self.metadata, *image, "pixelFormat", name), dict):
+            if isinstance(stated_at(self.metadata, *image, "pixelFormat", name), dict):
                 found = [self._number(*image, "pixelFormat", name, kind) for kind in _PLACES[self.color_filter]]
                 if None in found:
                     raise self._container.fault(f"its metadata state {name} levels for some of the colours only")
@@ -368,7 +252,7 @@ class _Recording:
     def color_matrix(self) -> NDArray[np.float64] | None:
         """From the camera's colours to sRGB."""
         for name in ("ccm", "ccmRgbToSrgbArray"):
-            given = _at(self.metadata, "image", "color", name)
+            given = stated_at(self.metadata, "image", "color", name)
             if given is None:
                 continue
             try:
@@ -399,20 +283,20 @@ class _Recording:
 
     def _stated(self, *keys: str) -> Any:
         for image in self._images():
-            found = _at(self.metadata, *image, *keys)
+            found = stated_at(self.metadata, *image, *keys)
             if found is not None:
                 return found
         return None
 
-    def _packing(self, length: int) -> tuple[int, tuple[int, int], _Packing]:
+    def _packing(self, length: int | None) -> tuple[int, tuple[int, int], _Packing]:
         """Bits, shape, and the camera that packs so; from what is stated, and else from the number of bytes."""
         fault = self._container.fault
-        if length < 0:
+        if length is None:
             raise fault(
                 f"its picture ({self._image_name}) is not in the file. Copy it again from where it came from"
             )
         bits = self._stated("pixelPacking", "bitsPerPixel")
-        size = (_at(self.metadata, "image", "height"), _at(self.metadata, "image", "width"))
+        size = (stated_at(self.metadata, "image", "height"), stated_at(self.metadata, "image", "width"))
         for packing in _PACKINGS:
             shape = packing.shape if None in size else size
             if not all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in shape):
@@ -438,7 +322,7 @@ class _Recording:
         )
 
     def _camera(self, packing: _Packing) -> str:
-        make, model = (_at(self.metadata, "camera", key) for key in ("make", "model"))
+        make, model = (stated_at(self.metadata, "camera", key) for key in ("make", "model"))
         words = [word for word in (make, model) if isinstance(word, str) and word]
         return " ".join(words) if words else packing.camera
 
@@ -453,7 +337,7 @@ class _Recording:
         return _CORNERS[corner]
 
     def _number(self, *keys: str) -> float | None:
-        value = _at(self.metadata, *keys)
+        value = stated_at(self.metadata, *keys)
         if value is None:
             return None
         if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
@@ -470,11 +354,11 @@ class _Recording:
         return value
 
 
-def _frame(container: _Container) -> dict[str, Any]:
+def _frame(container: Container) -> dict[str, Any]:
     """The names of a container's picture and metadata."""
     contents = container.contents()
     for keys in (("frames",), ("picture", "frameArray")):
-        frames = _at(contents, *keys)
+        frames = stated_at(contents, *keys)
         if isinstance(frames, list) and frames and isinstance(frames[0], dict):
             frame = frames[0].get("frame")
             if isinstance(frame, dict):
@@ -485,15 +369,8 @@ def _frame(container: _Container) -> dict[str, Any]:
     )
 
 
-def _reference(container: _Container, frame: dict[str, Any], key: str) -> str:
+def _reference(container: Container, frame: dict[str, Any], key: str) -> str:
     name = frame.get(key)
     if not isinstance(name, str):
         raise container.fault(f"its table of contents has no {key}, so it holds no raw recording")
     return name
-
-
-def _at(tree: Any, *keys: str) -> Any:
-    """What stands in a tree of JSON under these keys; None if nothing does."""
-    for key in keys:
-        tree = tree.get(key) if isinstance(tree, dict) else None
-    return tree

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.words import first_few
 from vcc.files.pictures import read_picture
 from vcc.formats.grid import ViewGrid, pictures_in
 
@@ -125,9 +126,9 @@ def _line(
     line = [numbered.get(first + n * step) for n in range(count)]
     missing = [first + n * step for n, file in enumerate(line) if file is None]
     if missing and not sparse:
-        named = ", ".join(map(str, missing[:12])) + (", …" if len(missing) > 12 else "")
         raise InputError(
-            f"{folder} has {len(numbered)} of {count} numbered views; {len(missing)} are missing: {named}. Add "
+            f"{folder} has {len(numbered)} of {count} numbered views; {len(missing)} are missing: "
+            f"{first_few(missing, len(missing))}. Add "
             "them, or open those that there are with vcc.formats.open_sparse_views"
         )
     return line

@@ -12,7 +12,6 @@ which is a camera array in the plane of the main lens that converges where the l
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.base.units import mm, um
 from vcc.formats import hdf5
 from vcc.formats.grid import Decoded, Geometry
@@ -40,7 +40,7 @@ def recognised(path: Path) -> bool:
     return path.suffix.lower() in ENDINGS and path.is_file()
 
 
-def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> Decoded:
+def read(path: Path, *, progress: Progress | None = None) -> Decoded:
     """The light field of a ``.vox`` file, with the frame that its camera makes.
 
     Args:

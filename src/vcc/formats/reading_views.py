@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.files.pictures import read_picture, read_png_into
 from vcc.files.transfer import decode
 
@@ -25,7 +26,7 @@ def read_views(
     stored: type[np.generic],
     *,
     linear: bool,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     first: Collection[tuple[int, int]] = (),
     meanwhile: Callable[[NDArray[Any]], None] | None = None,
 ) -> NDArray[Any]:

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.fields.grid import Sample
+from vcc.base.words import first_few
+from vcc.fields.grid import Grid, Sample
+from vcc.fields.sampled import as_slice
 from vcc.light_field import LightField
 
 
@@ -73,31 +75,27 @@ class SparseViews:
         Raises:
             InputError: a view of the part is missing, or there is none in it.
         """
-        rows, columns = (_numbers(wanted, size) for wanted, size in zip(part, self.shape, strict=True))
+        rows, columns = (_places(wanted, size) for wanted, size in zip(part, self.shape, strict=True))
         number = {place: n for n, place in enumerate(self.places)}
         missing = [(row, column) for row in rows for column in columns if (row, column) not in number]
         if missing or not rows or not columns:
-            named = ", ".join(map(str, missing[:12])) + (", …" if len(missing) > 12 else "")
+            named = first_few(missing, len(missing))
             raise InputError(
                 f"this part of the grid has no light field: its views {named} are missing"
                 if missing
                 else f"there is no view in this part of a grid of {self.shape[0]}×{self.shape[1]}"
             )
         picture = self.pictures.shape[1:]
+        whole = Grid((*self.shape, *picture), self.frame, self.pictures.dtype, self.sample, self.disparity_range)
+        grid, _ = whole.piece((as_slice(rows), as_slice(columns)))
         chosen = [number[row, column] for row in rows for column in columns]
         values = self.pictures[chosen].reshape(len(rows), len(columns), *picture)
-        steps = [places[1] - places[0] if len(places) > 1 else 1 for places in (rows, columns)]
-        place = Affine.scaling(steps[1], steps[0], 1, 1)
-        frame = self.frame @ Affine.translation(columns[0], rows[0], 0, 0) @ place
-        known = self.disparity_range
-        if known is not None:
-            known = (known[0] * steps[1], known[1] * steps[1]) if steps[1] > 0 else None
-        return LightField(values, frame, known, self.sample)
+        return LightField(values, grid.frame, grid.disparity_range, self.sample)
 
 
-def _numbers(wanted: int | slice, size: int) -> list[int]:
+def _places(wanted: int | slice, size: int) -> range:
     if isinstance(wanted, slice):
-        return list(range(*wanted.indices(size)))
+        return range(size)[wanted]
     if not -size <= wanted < size:
         raise InputError(f"there is no row or column {wanted} of views in {size}")
-    return [wanted % size]
+    return range(size)[wanted % size : wanted % size + 1]

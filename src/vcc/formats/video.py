@@ -5,23 +5,23 @@ for people.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
+from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
-from vcc.formats.exposing import Codes, Exposure
+from vcc.files.pictures import Exposure
+from vcc.formats.exposing import Codes
 from vcc.formats.grid import Decoded
-
-if TYPE_CHECKING:
-    from vcc.light_field import LightField
-    from vcc.store import StoredLightField
 
 ENDINGS = (".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v")
 
@@ -47,7 +47,7 @@ def read(
     first: int = 0,
     last: int | None = None,
     moves: Movement = "right",
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Decoded:
     """The frames of a video as views from places in equal steps along a line.
 
@@ -117,7 +117,7 @@ def read(
 
 
 def save(
-    light_field: LightField | StoredLightField,
+    light_field: Samples,
     path: str | PathLike[str],
     *,
     flight: Flight = "serpentine",
@@ -151,13 +151,14 @@ def save(
     path = Path(path).expanduser()
     if path.suffix.lower() != ".mp4":
         raise InputError(f'a flight is written to a name that ends in .mp4, not "{path.name}"')
-    if light_field.channels not in (None, 1, 3):
-        raise InputError(f"a video has 1 or 3 channels, and this light field has {light_field.channels}")
+    grid = light_field.grid
+    if grid.channels not in (None, 1, 3):
+        raise InputError(f"a video has 1 or 3 channels, and this light field has {grid.channels}")
     if not (frames_per_second > 0 and math.isfinite(frames_per_second)):
         raise InputError(f"frames_per_second is a number above 0, not {frames_per_second}")
     if not 0 <= quality <= 51:
         raise InputError(f"quality is libx264's constant rate factor, 0 to 51, not {quality}")
-    rows, columns, height, width = light_field.shape[:4]
+    rows, columns, height, width = grid.shape[:4]
     way = _way(rows, columns, flight)
     numbers = Codes(light_field, 8, "srgb", exposure)
     av = library()
@@ -192,8 +193,7 @@ def library() -> Any:
 
 
 def _check_selection(every: int, first: int, last: int | None, moves: str) -> None:
-    if moves not in get_args(Movement):
-        raise InputError(f"moves is one of {', '.join(map(repr, get_args(Movement)))}, not {moves!r}")
+    checks.one_of("moves", moves, get_args(Movement))
     for name, value, least in (("every", every, 1), ("first", first, 0), ("last", last, first)):
         if value is not None and (not isinstance(value, int | np.integer) or value < least):
             raise InputError(f"{name} is a whole number of {least} or more, not {value!r}")
@@ -244,24 +244,23 @@ def _check_complete(stream: Any, decoded: int, end: float, path: Path) -> None:
         )
 
 
-def _way(rows: int, columns: int, flight: str) -> list[tuple[int, int]]:
+def _way(rows: int, columns: int, flight: Flight) -> list[tuple[int, int]]:
     """(row, column) of the views of a flight."""
+    checks.one_of("flight", flight, get_args(Flight))
     if flight == "serpentine":
         return [(r, c if r % 2 == 0 else columns - 1 - c) for r in range(rows) for c in range(columns)]
     if flight == "row":
         if columns == 1:
             return [(r, 0) for r in range(rows)]
         return [((rows - 1) // 2, c) for c in range(columns)]
-    if flight == "circle":
-        angles = np.linspace(0, 2 * np.pi, 16 * (rows + columns), endpoint=False)
-        down = np.rint((rows - 1) / 2 * (1 - np.cos(angles))).astype(int)
-        right = np.rint((columns - 1) / 2 * (1 + np.sin(angles))).astype(int)
-        way: list[tuple[int, int]] = []
-        for place in zip(down.tolist(), right.tolist(), strict=True):
-            if not way or place != way[-1]:
-                way.append(place)
-        return way[:-1] if len(way) > 1 and way[0] == way[-1] else way
-    raise InputError(f"flight is one of {', '.join(map(repr, get_args(Flight)))}, not {flight!r}")
+    angles = np.linspace(0, 2 * np.pi, 16 * (rows + columns), endpoint=False)
+    down = np.rint((rows - 1) / 2 * (1 - np.cos(angles))).astype(int)
+    right = np.rint((columns - 1) / 2 * (1 + np.sin(angles))).astype(int)
+    way: list[tuple[int, int]] = []
+    for place in zip(down.tolist(), right.tolist(), strict=True):
+        if not way or place != way[-1]:
+            way.append(place)
+    return way[:-1] if len(way) > 1 and way[0] == way[-1] else way
 
 
 def encode(

@@ -18,7 +18,7 @@ import math
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.base.units import mm
 from vcc.files.pictures import read_picture
 from vcc.formats.grid import Decoded, Geometry, Place, arrange
@@ -48,7 +49,7 @@ def recognised(path: Path) -> bool:
     return path.suffix.lower() == ".zip" or (path.suffix.lower() == ".xml" and _is_list(path))
 
 
-def read(path: Path, *, progress: Callable[[int, int], None] | None = None) -> Decoded:
+def read(path: Path, *, progress: Progress | None = None) -> Decoded:
     """The light field that a viewer's list describes.
 
     Args:
@@ -255,7 +256,7 @@ def _grid(positions: list[float], axis: str, path: Path) -> tuple[list[int], flo
 
 
 def _pictures(
-    store: _Store, files: tuple[tuple[Path | None, ...], ...], progress: Callable[[int, int], None] | None
+    store: _Store, files: tuple[tuple[Path | None, ...], ...], progress: Progress | None
 ) -> NDArray[Any]:
     """All views in one array, shape (v, u, t, s[, channel])."""
     names = [file.as_posix() for row in files for file in row if file is not None]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 import os
 import secrets
 import shutil
@@ -13,24 +12,25 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress
 from vcc.base.units import mm
-from vcc.formats.exposing import Codes, Exposure, stored_view
+from vcc.fields.grid import Grid
+from vcc.fields.samples import Samples
+from vcc.files.pictures import Exposure, save_picture, write_codes
+from vcc.formats import arrays, eslf, lftoolbox, video
+from vcc.formats.cameras import Cameras, cameras_of
+from vcc.formats.exposing import Codes, stored_view
 from vcc.formats.hci import PARAMETERS
-
-if TYPE_CHECKING:
-    from vcc.light_field import LightField
-    from vcc.store import StoredLightField
+from vcc.store import save_store
 
 Kind = Literal["zarr", "hci", "views", "mat", "eslf", "mp4", "npz"]
 """What a light field may be written as; see `save_light_field`."""
-Progress = Callable[[int, int], None]
-
 _ENDINGS: dict[str, Kind] = {
     ".zarr": "zarr",
     ".mat": "mat",
@@ -53,7 +53,6 @@ _POINTS_UNSAID = (
     "nothing here says that its samples are values at points, and they are read back as means over pixels: "
     'dataclasses.replace(light_field, sample="point") says it again'
 )
-_PRECISION = 1e-9  # of a step: where a frame is that of a camera array
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ class SavedLightField:
 
 
 def save_light_field(
-    light_field: LightField | StoredLightField,
+    light_field: Samples,
     path: str | PathLike[str],
     *,
     kind: Kind | None = None,
@@ -119,7 +118,7 @@ def save_light_field(
     """
     path = Path(path).expanduser()
     chosen = kind_of(path, kind)
-    writer = _writer(chosen)
+    writer = _WRITERS[chosen]
     taken = set(inspect.signature(writer).parameters) - {"light_field", "path", "kind", "progress"}
     for option in options:
         if option not in taken:
@@ -132,13 +131,11 @@ def save_light_field(
         count, exposure, clipped = writer(light_field, path, **options)
         _warn_of_clipping(path, clipped, options.get("exposure", 1.0))
         said = f"{count} frames of a flight, exposure {exposure:.6g}, {clipped:.2%} of the samples clipped"
-        saved = SavedLightField(path, chosen, exposure, clipped, _words(light_field, path, said))
+        saved = SavedLightField(path, chosen, exposure, clipped, _words(light_field.grid, path, said))
     else:
-        from vcc.light_field import LightField
-
-        writer(light_field if isinstance(light_field, LightField) else light_field.read(), path, **options)
-        saved = SavedLightField(path, chosen, 1.0, 0.0, _words(light_field, path, _HOW[chosen]))
-    if light_field.sample != "mean" and chosen in ("eslf", "mp4"):
+        writer(light_field, path, **options)
+        saved = SavedLightField(path, chosen, 1.0, 0.0, _words(light_field.grid, path, _HOW[chosen]))
+    if light_field.grid.sample != "mean" and chosen in ("eslf", "mp4"):
         warnings.warn(f"{path}: {_POINTS_UNSAID}", ResultWarning, stacklevel=2)
     if progress is not None:
         progress(1, 1)
@@ -146,7 +143,7 @@ def save_light_field(
 
 
 def save_folder(
-    light_field: LightField | StoredLightField,
+    light_field: Samples,
     path: str | PathLike[str],
     *,
     kind: Literal["hci", "views"] = "hci",
@@ -181,11 +178,10 @@ def save_folder(
             be written to, cameras that ``parameters.cfg`` cannot hold ("hci"), or a frame that is not that of a
             camera array.
     """
-    path = Path(path).expanduser()
-    _check_folder_options(light_field, kind, ending, exposure)
-    cameras = _cameras(light_field)
-    text, remark = _parameters(light_field, cameras, path, kind)
-    rows, columns = light_field.shape[:2]
+    path, grid = Path(path).expanduser(), light_field.grid
+    _check_folder_options(grid, kind, ending, exposure)
+    text, remark = _parameters(grid, cameras_of(grid), path, kind)
+    rows, columns = grid.shape[:2]
     codes = Codes(light_field, bits, transfer, exposure)
     with _new_folder(path) as folder:
         if text:
@@ -195,9 +191,9 @@ def save_folder(
             file = folder / f"{name}{ending}"
             if ending == ".exr":
                 samples, full_scale = stored_view(light_field, row, column)
-                _write_exr(samples, full_scale, file)
+                save_picture(samples.astype(np.float32) / np.float32(full_scale), file)
             else:
-                _write_codes(codes.view(row, column), file)
+                write_codes(codes.view(row, column), file, ending, png_level=_PNG_LEVEL)
             if progress is not None:
                 progress(number + 1, rows * columns)
     if remark:
@@ -205,12 +201,12 @@ def save_folder(
     _warn_of_clipping(path, codes.clipped, exposure)
     layout = "HCI-style folder" if kind == "hci" else "folder of views"
     if ending == ".exr":
-        return SavedLightField(path, kind, 1.0, 0.0, _words(light_field, path, f"{layout}, linear float32"))
+        return SavedLightField(path, kind, 1.0, 0.0, _words(light_field.grid, path, f"{layout}, linear float32"))
     curve = "sRGB" if transfer == "srgb" else 'linear numbers (open with transfer="linear")'
     words = (
         f"{layout}, {bits}-bit {curve}, exposure {codes.exposure:.6g}, {codes.clipped:.2%} of the samples clipped"
     )
-    return SavedLightField(path, kind, codes.exposure, codes.clipped, _words(light_field, path, words))
+    return SavedLightField(path, kind, codes.exposure, codes.clipped, _words(light_field.grid, path, words))
 
 
 def kind_of(path: Path, kind: Kind | None) -> Kind:
@@ -228,35 +224,26 @@ def kind_of(path: Path, kind: Kind | None) -> Kind:
                 'folder (kind="hci" or "views" for a folder with a dot in its name)'
             )
         return _ENDINGS[ending]
-    if kind not in get_args(Kind):
-        raise InputError(f"kind is one of {', '.join(map(repr, get_args(Kind)))}, not {kind!r}")
+    checks.one_of("kind", kind, get_args(Kind))
     if kind not in _FOLDERS and _ENDINGS.get(ending) != kind:
         wanted = next(each for each, name in _ENDINGS.items() if name == kind)
         raise InputError(f'"{path.name}" is to be of the kind "{kind}": end its name in {wanted}')
     return kind
 
 
-def _writer(kind: Kind) -> Callable[..., Any]:
-    """What writes a format, imported when it is wanted."""
-    if kind in ("hci", "views"):
-        return save_folder
-    if kind == "zarr":
-        from vcc.store import save_store
-
-        return save_store
-    from vcc.formats import arrays, eslf, lftoolbox, video
-
-    writers: dict[Kind, Callable[..., Any]] = {
-        "npz": arrays.save,
-        "mat": lftoolbox.save,
-        "eslf": eslf.save,
-        "mp4": video.save,
-    }
-    return writers[kind]
+_WRITERS: dict[Kind, Callable[..., Any]] = {
+    "zarr": save_store,
+    "hci": save_folder,
+    "views": save_folder,
+    "mat": lftoolbox.save,
+    "eslf": eslf.save,
+    "mp4": video.save,
+    "npz": arrays.save,
+}
 
 
-def _words(light_field: LightField | StoredLightField, path: Path, more: str) -> str:
-    rows, columns, height, width = light_field.shape[:4]
+def _words(grid: Grid, path: Path, more: str) -> str:
+    rows, columns, height, width = grid.shape[:4]
     return f"{path}: {rows}×{columns} views of {width}×{height} pixels, {more}"
 
 
@@ -273,11 +260,8 @@ def _warn_of_clipping(path: Path, clipped: float, exposure: Exposure) -> None:
 # --- folders ---
 
 
-def _check_folder_options(
-    light_field: LightField | StoredLightField, kind: str, ending: str, exposure: Exposure
-) -> None:
-    if kind not in ("hci", "views"):
-        raise InputError(f'the kind of a folder is "hci" or "views", not {kind!r}')
+def _check_folder_options(grid: Grid, kind: str, ending: str, exposure: Exposure) -> None:
+    checks.one_of("the kind of a folder", kind, ("hci", "views"))
     endings = (".png",) if kind == "hci" else (".png", ".tif", ".exr")
     if ending not in endings:
         raise InputError(
@@ -285,9 +269,9 @@ def _check_folder_options(
         )
     if ending == ".exr" and exposure != 1:
         raise InputError(f"exposure={exposure} has no place in .exr files, which hold the samples untouched")
-    if light_field.channels not in (None, 1, 3):
+    if grid.channels not in (None, 1, 3):
         raise InputError(
-            f"pictures have 1 or 3 channels, and this light field has {light_field.channels}: choose channels, "
+            f"pictures have 1 or 3 channels, and this light field has {grid.channels}: choose channels, "
             "light_field[..., :3], or write a .zarr or .npz"
         )
 
@@ -316,84 +300,10 @@ def _new_folder(path: Path) -> Iterator[Path]:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _write_codes(codes: NDArray[Any], file: Path) -> None:
-    codes = np.ascontiguousarray(codes[..., 0] if codes.ndim == 3 and codes.shape[2] == 1 else codes)
-    if file.suffix == ".png":
-        import imagecodecs
-
-        file.write_bytes(imagecodecs.png_encode(codes, level=_PNG_LEVEL))
-    else:
-        import tifffile
-
-        photometric = "rgb" if codes.ndim == 3 else "minisblack"
-        tifffile.imwrite(file, codes, photometric=photometric, compression="zlib", metadata=None)
-
-
-def _write_exr(samples: NDArray[Any], full_scale: float, file: Path) -> None:
-    from vcc.base.affine import Affine
-    from vcc.image import Image
-
-    light = samples.astype(np.float32) / np.float32(full_scale) if full_scale != 1 else samples.astype(np.float32)
-    Image(light, Affine.identity(2), inverted=False).save(file)
-
-
 # --- cameras ---
 
 
-@dataclass(frozen=True)
-class _Cameras:
-    """A frame as `LightField.from_views` takes it."""
-
-    spacing: tuple[float, float]
-    slope_per_pixel: tuple[float, float]
-    focus_distance: float
-
-    @property
-    def arguments(self) -> tuple[tuple[float, float], tuple[float, float], float]:
-        """In the order of `LightField.from_views`."""
-        return self.spacing, self.slope_per_pixel, self.focus_distance
-
-    @property
-    def are_square(self) -> bool:
-        """Whether rows and columns are alike, as parameters.cfg has it."""
-        pairs = (self.spacing, self.slope_per_pixel)
-        return all(math.isclose(*pair, rel_tol=_PRECISION) for pair in pairs)
-
-
-def _cameras(light_field: LightField | StoredLightField) -> _Cameras:
-    """The cameras of a light field.
-
-    Raises:
-        InputError: its frame is not that of a centred array of parallel or converging cameras.
-    """
-    from vcc.light_field import LightField
-
-    linear, shape = light_field.frame.linear, light_field.shape[:4]
-    fault = InputError(
-        "the frame of this light field is not that of cameras on a grid centred on the axis (it was cut, turned "
-        "or has flown on), which a folder of pictures cannot state. Write a .zarr, .npz or .mat, which keep any "
-        "frame"
-    )
-    du, dv, ps, pt = map(float, (linear[0, 0], linear[1, 1], -linear[2, 2], -linear[3, 3]))
-    if not min(du, dv, ps, pt) > 0:
-        raise fault
-    vergence = float(linear[2, 0]) / du
-    across = max(shape[1] * du, shape[0] * dv)
-    parallel = abs(vergence) * across < _PRECISION * min(ps, pt)
-    if vergence < 0 and not parallel:
-        raise fault
-    cameras = _Cameras((dv, du), (pt, ps), math.inf if parallel else 1 / vergence)
-    frame = LightField.from_views(np.broadcast_to(np.uint8(0), shape), *cameras.arguments).frame
-    nv, nu, nt, ns = shape
-    corners = np.array(np.meshgrid((0, nu - 1), (0, nv - 1), (0, ns - 1), (0, nt - 1))).reshape(4, -1).T
-    if np.abs((frame(corners) - light_field.frame(corners)) / (du, dv, ps, pt)).max() > _PRECISION * max(shape):
-        raise fault
-    return cameras
-
-
-def _parameters(
-    light_field: LightField | StoredLightField, cameras: _Cameras, path: Path, kind: str
-) -> tuple[str, str]:
+def _parameters(grid: Grid, cameras: Cameras, path: Path, kind: str) -> tuple[str, str]:
     """The text of parameters.cfg, empty where it cannot hold the cameras; and then what to tell."""
     if not cameras.are_square:
         dv, du = cameras.spacing
@@ -404,15 +314,14 @@ def _parameters(
                 f"m (rows) and {du:g} m (columns), slopes per pixel of {pt:g} and {ps:g}. Write a .zarr, .npz or "
                 '.mat, or kind="views" without the file'
             )
-        more = "" if light_field.sample == "mean" else f". And {_POINTS_UNSAID}"
+        more = "" if grid.sample == "mean" else f". And {_POINTS_UNSAID}"
         return "", (
             f"{PARAMETERS} cannot hold its cameras, and there is none. Open it with spacing=({dv!r}, {du!r}), "
             f"slope_per_pixel=({pt!r}, {ps!r}), focus_distance={cameras.focus_distance!r}{more}"
         )
-    rows, columns, height, width = light_field.shape[:4]
-    focus = 0.0 if math.isinf(cameras.focus_distance) else cameras.focus_distance
+    rows, columns, height, width = grid.shape[:4]
+    focus = 0.0 if cameras.are_parallel else cameras.focus_distance
     sensor = cameras.slope_per_pixel[1] * max(width, height) * _FOCAL_LENGTH
-    disparities = _stated_disparities(light_field)
     lines = [
         "[intrinsics]",
         f"focal_length_mm = {_FOCAL_LENGTH / mm!r}",
@@ -430,20 +339,9 @@ def _parameters(
         "[meta]",
         f"scene = {' '.join(path.name.split())}",
     ]
-    if disparities is not None:
-        lines += [f"disp_min = {disparities[0]!r}", f"disp_max = {disparities[1]!r}"]
-    if light_field.sample != "mean":
-        lines.append(f"sample = {light_field.sample}")
+    if grid.disparity_range is not None:
+        low, high = map(float, grid.disparity_range)
+        lines += [f"disp_min = {low!r}", f"disp_max = {high!r}"]
+    if grid.sample != "mean":
+        lines.append(f"sample = {grid.sample}")
     return "\n".join(lines) + "\n", ""
-
-
-def _stated_disparities(light_field: LightField | StoredLightField) -> tuple[float, float] | None:
-    """The disparity range where it was given; what is measured is not written as if it were known."""
-    from vcc.light_field import LightField
-
-    if light_field.disparity_range is None:
-        return None
-    known = light_field.disparity_range
-    if isinstance(light_field, LightField):
-        known = light_field.measured_disparity_range() or known
-    return float(known[0]), float(known[1])

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from vcc.base.errors import InputError
 
+PICTURES = "vcc.picture"
+"""How Zarr calls the codec of `vcc.store.picture_codec`."""
 CHUNK_BYTES = 2**17
 """About how many bytes of samples an inner chunk holds: some rows of pixels of one view."""
 
@@ -118,6 +121,11 @@ def chunk_rows(rows: int, row_bytes: int, wanted: int | None) -> int:
     return target if wanted is not None else math.ceil(rows / math.ceil(rows / target))
 
 
+def know_pictures() -> None:
+    """Tell Zarr of the codec that keeps views as pictures, which loads Zarr: it is a class of its kind."""
+    importlib.import_module("vcc.store.picture_codec")
+
+
 def layout(
     shape: tuple[int, ...], kind: np.dtype[Any], compression: Compression, chunks: int | None
 ) -> dict[str, Any]:
@@ -126,12 +134,11 @@ def layout(
 
     rows = shape[2]
     if isinstance(compression, Lossy):
-        from vcc.store.picture_codec import PictureCodec
-
         if chunks is not None:
             raise InputError("chunks is for lossless compression: a picture is packed as a whole")
         view = (1, 1, *shape[2:])
-        codec = PictureCodec(codec=compression.codec, quality=compression.quality)
+        know_pictures()
+        codec = {"name": PICTURES, "configuration": asdict(compression)}
         return {"chunks": view, "serializer": codec, "compressors": [Crc32cCodec()]}
     inner = chunk_rows(rows, math.prod(shape[3:]) * kind.itemsize, chunks)
     blosc = BloscCodec(

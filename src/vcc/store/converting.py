@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.errors import InputError
-from vcc.fields.sampled import to_numpy
+from vcc.base.progress import Progress
+from vcc.base.version import VERSION
+from vcc.fields.arrays import one_view
+from vcc.fields.samples import Samples
 from vcc.files.transfer import decode, encode
-from vcc.light_field import LightField
 from vcc.store.attributes import DTYPES, Transfer
 from vcc.store.compression import Compression
 from vcc.store.reading import StoredLightField
-from vcc.store.writing import disparities_of, write_views
+from vcc.store.writing import write_views
 
-Progress = Callable[[int, int], None]
 View = Callable[[int, int], NDArray[Any]]
 
 
 def convert(
-    source: LightField | StoredLightField,
+    source: Samples,
     path: str | PathLike[str],
     *,
     transfer: Transfer = "linear",
@@ -53,44 +55,30 @@ def convert(
         InputError: another type; samples that it cannot hold, brighter than 1 as integers (named by view); a store
             that is not complete; what `vcc.store.save_store` refuses.
     """
-    from vcc import __version__
-
-    view: View
+    grid = source.grid
+    view: View = partial(one_view, source)
+    kind, names, made = grid.kind, None, {"written_by": f"vcc {VERSION}"}
     if isinstance(source, StoredLightField):
         source.check_complete()
-        stored, rows = source, source.shape[2]
-        shape, kind, transfer, frame = source.shape, source.dtype, source.transfer, source.frame
-        names, disparity_range = source.channel_names, source.disparity_range
-        made = source.provenance if provenance is None else provenance
-
-        def view(row: int, column: int) -> NDArray[Any]:
-            return stored.stored_view(row, column, 0, rows)
-    else:
-        values = to_numpy(source.values)
-        shape, kind, frame, names = tuple(values.shape), values.dtype, source.frame, None
-        disparity_range = disparities_of(source)
-        made = {"written_by": f"vcc {__version__}"} if provenance is None else provenance
-
-        def view(row: int, column: int) -> NDArray[Any]:
-            return cast("NDArray[Any]", values[row, column])
-
+        view = partial(source.stored_view, first=0, stop=grid.shape[2])  # as stored: codes stay codes
+        kind, transfer, names, made = source.dtype, source.transfer, source.channel_names, source.provenance
     wanted = kind if dtype is None else np.dtype(dtype)
     if wanted.name not in DTYPES:
         raise InputError(f"samples are stored as {', '.join(DTYPES)}, not {wanted}")
     recoded, now = _recoding(kind, transfer, wanted)
     return write_views(
         Path(path).expanduser(),
-        frame,
-        shape,
+        grid.frame,
+        grid.shape,
         wanted,
         lambda row, column: recoded(view(row, column), f"view ({row}, {column})"),
         overwrite=overwrite,
         progress=progress,
-        provenance=made,
+        provenance=made if provenance is None else provenance,
         transfer=now,
         channel_names=names,
-        disparity_range=disparity_range,
-        sample=source.sample,
+        disparity_range=grid.disparity_range,
+        sample=grid.sample,
         chunks=chunks,
         compression=compression,
     )

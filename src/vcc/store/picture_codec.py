@@ -16,8 +16,7 @@ from zarr.core.common import JSON
 from zarr.registry import register_codec
 
 from vcc.base.errors import InputError
-
-NAME = "vcc.picture"
+from vcc.store.compression import PICTURES
 
 
 @dataclass(frozen=True)
@@ -39,12 +38,12 @@ class PictureCodec(ArrayBytesCodec):
         """The codec from the metadata of an array."""
         settings: Any = data.get("configuration", {})
         if settings.get("codec") not in ("jpegxl", "avif"):
-            raise InputError(f'{NAME} is by "jpegxl" or "avif", not {settings.get("codec")!r}')
+            raise InputError(f'{PICTURES} is by "jpegxl" or "avif", not {settings.get("codec")!r}')
         return cls(settings["codec"], int(settings.get("quality", 0)))
 
     def to_dict(self) -> dict[str, JSON]:
         """The codec in the metadata of an array."""
-        return {"name": NAME, "configuration": {"codec": self.codec, "quality": self.quality}}
+        return {"name": PICTURES, "configuration": {"codec": self.codec, "quality": self.quality}}
 
     def compute_encoded_size(self, input_byte_length: int, _chunk_spec: ArraySpec) -> int:
         """Not known beforehand."""
@@ -73,4 +72,4 @@ class PictureCodec(ArrayBytesCodec):
         return np.asarray(decode(packed))
 
 
-register_codec(NAME, PictureCodec)
+register_codec(PICTURES, PictureCodec)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress
+from vcc.base.words import first_few
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, told_along_u
 from vcc.fields.parallax import Axis, disparity_range
@@ -25,8 +27,8 @@ from vcc.files.transfer import decode
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
-
-Progress = Callable[[int, int], None]
+from vcc.store.compression import know_pictures
+from vcc.store.disparity_maps import keep_maps, read_maps
 
 MEASURED_BYTES = 2**26
 """Views from which disparities are measured are cut to a band of rows if they take more than this as stored."""
@@ -286,11 +288,10 @@ class StoredLightField:
         total = self.shape[0] * self.shape[1]
         if not missing:
             return f"all {total} views are there, but the store was not finished: go on with what makes it"
-        named = ", ".join(map(str, missing[:8])) + (", …" if len(missing) > 8 else "")
         way_out = "Copy or make the store again" if self.complete else "Go on with what makes it"
         return (
-            f"{len(missing)} of its {total} views are missing, by (row, column): {named}. {way_out}; or take a "
-            "part that is complete, stored[a:b, c:d]"
+            f"{len(missing)} of its {total} views are missing, by (row, column): "
+            f"{first_few(missing, len(missing), 8)}. {way_out}; or take a part that is complete, stored[a:b, c:d]"
         )
 
     def _piece(self, index: Any, progress: Progress | None = None) -> LightField:
@@ -328,10 +329,6 @@ class StoredLightField:
         return Affine.scaling(factor, factor, 1, 1) @ self.frame
 
     def _kept_or_found(self, progress: Progress | None) -> DisparityMaps:
-        import warnings
-
-        from vcc.store.disparity_maps import keep_maps, read_maps
-
         kept = read_maps(self.path, self.shape)
         if kept is not None:
             return kept
@@ -441,7 +438,7 @@ def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
     if not where.is_file():
         raise InputError(f'{folder} has no array "{ARRAY}": {where} is missing')
     if attributes.lossy is not None or "vcc.picture" in where.read_text(encoding="utf-8"):
-        from vcc.store import picture_codec  # noqa: F401  # Zarr then knows the codec
+        know_pictures()
     import zarr
 
     try:

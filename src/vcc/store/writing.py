@@ -8,28 +8,29 @@ import secrets
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
+from vcc.base.version import VERSION
+from vcc.base.words import first_few
+from vcc.fields.arrays import one_view
 from vcc.fields.disparity import DisparityMaps
 from vcc.fields.grid import Sample
-from vcc.light_field import LightField
+from vcc.fields.samples import Samples
 from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
 from vcc.store.compression import Compression, Lossless, Lossy, layout
 from vcc.store.disparity_maps import keep_maps
 from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata
 
-if TYPE_CHECKING:
-    from typing import Self
-
-Progress = Callable[[int, int], None]
 SETTINGS = "settings"
 """Under which the description of a store keeps how it was made, beside what the maker said."""
 
@@ -118,10 +119,9 @@ class StoreWriter:
             return open_store(self.path)
         missing = self.missing()
         if missing:
-            named = ", ".join(map(str, missing[:8])) + (", …" if len(missing) > 8 else "")
             raise InputError(
                 f"{self.path} cannot be finished: {len(missing)} of {self.shape[0] * self.shape[1]} views are "
-                f"missing, by (row, column): {named}"
+                f"missing, by (row, column): {first_few(missing, len(missing), 8)}"
             )
         self.attributes = self.attributes.finished(self._measured_loss())
         _write_attributes(self.path, self.attributes)
@@ -251,7 +251,7 @@ def create_store(
 
 
 def save_store(
-    light_field: LightField,
+    light_field: Samples,
     path: str | PathLike[str],
     *,
     provenance: dict[str, Any] | None = None,
@@ -265,7 +265,7 @@ def save_store(
     """Write a light field to a store. It appears whole or not at all.
 
     Args:
-        light_field: of uint8, uint16, float16 or float32 samples.
+        light_field: of uint8, uint16, float16 or float32 samples; one that is not in memory is read view by view.
         path: folder of the store.
         provenance: where the light field comes from, as JSON can hold it.
         transfer: ``"srgb"`` if integer samples are not linear but sRGB codes.
@@ -279,25 +279,21 @@ def save_store(
         InputError: the path exists (and is no store, or is not to be replaced), or what `create_store` and
             `StoreWriter.write_view` refuse.
     """
-    from vcc import __version__
-    from vcc.fields.sampled import to_numpy
-
-    values = to_numpy(light_field.values)
-    known = light_field.disparity.maps() if light_field.disparity.known else None
+    grid = light_field.grid
     return write_views(
         Path(path).expanduser(),
-        light_field.frame,
-        tuple(values.shape),
-        values.dtype,
-        lambda j, i: values[j, i],
+        grid.frame,
+        grid.shape,
+        grid.kind,
+        partial(one_view, light_field),
         overwrite=overwrite,
         progress=progress,
-        disparity=known,
-        provenance={"written_by": f"vcc {__version__}"} if provenance is None else provenance,
+        disparity=grid.disparities.maps() if grid.disparities.known else None,
+        provenance={"written_by": f"vcc {VERSION}"} if provenance is None else provenance,
         transfer=transfer,
         channel_names=channel_names,
-        disparity_range=disparities_of(light_field),
-        sample=light_field.sample,
+        disparity_range=grid.disparity_range,
+        sample=grid.sample,
         chunks=chunks,
         compression=compression,
     )
@@ -471,8 +467,3 @@ def _put_in_place(part: Path, folder: Path) -> None:
             old.replace(folder)
         raise InputError(f"{folder} could not be written: {error.strerror or error}") from error
     shutil.rmtree(old, ignore_errors=True)
-
-
-def disparities_of(light_field: LightField) -> tuple[float, float] | None:
-    """The disparity range that a light field states, in its own steps."""
-    return None if light_field.disparity_range is None else light_field.measured_disparity_range()

@@ -1,0 +1,131 @@
+"""Which grid of views a folder holds, and which cameras its files state."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+
+from vcc.base import checks
+from vcc.base.errors import InputError
+from vcc.formats import cambridge, camera_names, hci, numbered, rowcol, stanford, views_csv
+from vcc.formats.grid import Geometry, ViewGrid
+from vcc.formats.numbered import ORDERS, Order
+
+_FINDERS = (views_csv.find, hci.find, camera_names.find, stanford.find, rowcol.find)
+"""The formats in the order in which they are tried."""
+
+
+def find_grid(
+    folder: Path,
+    views: tuple[int, int] | None = None,
+    order: Order | None = None,
+    *,
+    sparse: bool = False,
+    options: Collection[str] = (),
+) -> ViewGrid:
+    """The grid of views in a folder, from the first format that fits.
+
+    Args:
+        folder: where the pictures are.
+        views: see `vcc.formats.open_light_field`.
+        order: likewise.
+        sparse: leave None where a view is missing, instead of refusing the folder.
+        options: names of others, which no folder takes.
+
+    Raises:
+        InputError: no such folder, no views in it, views that are missing or too many, or impossible options.
+    """
+    _check(folder, views, order, options)
+    for find in _FINDERS:
+        grid = find(folder, sparse=sparse)
+        # A single "row" whose size is not as told is a running number after another number.
+        if grid is None or (find is rowcol.find and views not in (None, grid.shape) and 1 in grid.shape):
+            continue
+        if order is not None:
+            grid = _reordered(grid, order)
+        if views not in (None, grid.shape):
+            raise InputError(
+                f"{folder} has a grid of {grid.shape[0]}×{grid.shape[1]} views ({grid.format}), not {views}"
+            )
+        return _with_cameras(grid, folder)
+    counted = numbered.find(folder, views=views, order=order, sparse=sparse)
+    if counted is not None:
+        return _with_cameras(counted, folder)
+    raise _nothing_found(folder)
+
+
+def towards_positions(grid: ViewGrid) -> tuple[ViewGrid, str]:
+    """The grid with the top left view first, where true positions say that its files are counted otherwise.
+
+    Returns:
+        The grid, and what to say of it; empty where it stays as it was.
+    """
+    directions = grid.geometry.directions
+    if directions is None or not grid.geometry.directions_are_true or directions == (1, 1):
+        return grid, ""
+    files = tuple(row[:: directions[1]] for row in grid.files[:: directions[0]])
+    axes = " and ".join(name for name, way in zip(("rows", "columns"), directions, strict=True) if way < 0)
+    remark = (
+        f"the order of the {axes} of views was reversed, because the positions in the names of the files run the "
+        'other way. To take them as they are, pass orientation="as-is"'
+    )
+    return replace(grid, files=files, geometry=replace(grid.geometry, directions=(1, 1))), remark
+
+
+def _check(folder: Path, views: tuple[int, int] | None, order: Order | None, options: Collection[str]) -> None:
+    if not folder.exists():
+        raise InputError(f"there is no folder or file {folder}")
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder} is a file in no format that is known. A light field is opened from a folder with a picture "
+            "for each view, or from one of the files that docs/files.md lists"
+        )
+    if (folder / "zarr.json").is_file():
+        raise InputError(f"{folder} is a store, which is read in pieces: open it with vcc.store.open_store")
+    for option in options:
+        raise InputError(f"{option}= means nothing to a folder of views")
+    if order is not None:
+        checks.one_of("order", order, ORDERS)
+    if views is not None and (len(views) != 2 or min(views) < 1):
+        raise InputError(f"views are (rows, columns), whole numbers of 1 or more, not {views}")
+
+
+def _reordered(grid: ViewGrid, order: Order) -> ViewGrid:
+    """The grid with its files, row by row, counted in another order."""
+    flat = [file for line in grid.files for file in line]
+    shape = grid.shape[::-1] if order in ("column-major", "serpentine-columns") else grid.shape
+    numbers = numbered.running_numbers(shape, order)
+    return replace(grid, files=tuple(tuple(flat[number] for number in line) for line in numbers))
+
+
+def _with_cameras(grid: ViewGrid, folder: Path) -> ViewGrid:
+    """The grid with the cameras that names or a file of the folder state, where its own format has none."""
+    if grid.geometry != Geometry():
+        return grid
+    for read in (camera_names.read_geometry, stanford.read_geometry):
+        named = read(grid)
+        if named is not None:
+            return replace(grid, geometry=named)
+    shape, geometry, where = hci.read_grid_shape(folder), hci.read_geometry(folder), hci.parameters_file(folder)
+    if geometry is None and (stated := cambridge.read_parameters(folder)) is not None:
+        (shape, geometry), where = stated, folder / cambridge.PARAMETERS
+    if geometry is None or shape is None or where is None:
+        return grid
+    if shape != grid.shape:
+        raise InputError(
+            f"{folder} has a grid of {grid.shape[0]}×{grid.shape[1]} views ({grid.format}), and {where.name} "
+            f"states {shape[0]}×{shape[1]}: its baseline would be wrong for them. Correct {where.name} or move it "
+            "away"
+        )
+    return replace(grid, geometry=geometry)
+
+
+def _nothing_found(folder: Path) -> InputError:
+    names = sorted(file.name for file in folder.iterdir())
+    holds = f"holds {len(names)} files, for instance {names[0]}" if names else "is empty"
+    return InputError(
+        f"no light field was found in {folder}, which {holds}. A light field is a picture for each view, named "
+        "like input_Cam000.png (HCI), out_00_00_-12.5_3.0.png (Stanford) or view_00_00.png (row and column), or "
+        "listed in a file views.csv with the header row,col,file"
+    )
