@@ -572,7 +572,7 @@ MASK = r'element 2 \(mask "code"\): pattern'
         ),
         (
             SENSOR + "[sensor.electronics]\nfull_well = 0\n",
-            "camera.toml: sensor: electronics: full_well is 0.0: it is",
+            "camera.toml: sensor: electronics: full_well must be greater than 0 electrons, not 0.0",
         ),
         (SENSOR + "[sensor.electronics]\ncolor_filter = 5\n", "color_filter is 5: it is text in quotes"),
     ],

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
 from vcc.image import Image
-from vcc.optics.electronics import Electronics, checked_seed
+from vcc.optics.electronics import Electronics
 from vcc.optics.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -238,7 +239,7 @@ def expose(
     electronics = electronics_of(camera.sensor)  # all that can be refused is, before the work begins
     if not _is_auto(exposure):
         _checked_exposure(exposure)
-    checked_seed(seed)
+    checks.seed(seed)
     _checked_radiance(radiance)
     electronics.check_channels(light_field.channels)
     image = camera.capture(light_field, seed=ray_seed, **options)
@@ -268,7 +269,7 @@ def expose_image(
             is taken as dark there, as it is where sharp interpolation undershoots by less beside a hard edge.
     """
     electronics = electronics_of(sensor)
-    seed, radiance = checked_seed(seed), _checked_radiance(radiance)
+    seed, radiance = checks.seed(seed), _checked_radiance(radiance)
     light = image.to_numpy()
     if light.shape[:2] != sensor.shape:
         raise InputError(f"the sensor has {sensor.shape} pixels (rows, columns), the picture {light.shape[:2]}")
@@ -605,7 +606,7 @@ def photon_transfer(
             f"{electronics.gain * noise:.3g} DN: raise it to four times that"
         )
     charges = np.arange(levels + 1) / levels * 1.1 * electronics.saturation
-    seeds = np.random.SeedSequence(checked_seed(seed)).generate_state(2 * (levels + 1), np.uint64).tolist()
+    seeds = np.random.SeedSequence(checks.seed(seed)).generate_state(2 * (levels + 1), np.uint64).tolist()
     means, variances = np.empty(levels + 1), np.empty(levels + 1)
     for level, charge in enumerate(charges):
         rate = np.full(shape, charge / time)

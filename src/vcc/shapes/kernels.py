@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import abc
 import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
+from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
+from vcc.base.values import Value
 
 Array = NDArray[np.float64]
 
@@ -83,9 +85,7 @@ class Kernel(abc.ABC):
             InputError: a matrix that is not 2×2 finite numbers, or a kernel over more than `LARGEST_WEIGHTS`
                 steps.
         """
-        matrix = np.asarray(steps_from_slopes, dtype=np.float64)
-        if matrix.shape != (2, 2) or not np.isfinite(matrix).all():
-            raise InputError(f"steps_from_slopes is a 2×2 matrix of finite numbers, not {steps_from_slopes!r}")
+        matrix = checks.array("steps_from_slopes", steps_from_slopes, "a 2×2 matrix of numbers", 2, 2)
         reach = np.array(self.reach)
         half_width, half_height = (
             int(np.ceil(min(steps, 1e9) - FULL_STEP)) if steps > 0 else 0 for steps in np.abs(matrix) @ reach
@@ -111,11 +111,8 @@ class Kernel(abc.ABC):
 
     def described(self) -> str:
         """The kernel in words."""
-        from vcc.base.describe import parameters_in_words
-
-        parameters = parameters_in_words(self)
-        name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", type(self).__name__).lower().removesuffix(" kernel")
-        return f"{name} ({parameters})" if parameters else name
+        name = kind_in_words(type(self)).removesuffix(" kernel")
+        return with_parameters(name, parameters_in_words(self))
 
 
 @dataclass(frozen=True)
@@ -212,10 +209,8 @@ class TopHat(Kernel):
     shape: str = "disc"
 
     def __post_init__(self) -> None:
-        if not (self.width > 0 and math.isfinite(self.width)):
-            raise InputError(f"width of a top hat is a slope greater than 0, not {self.width}")
-        if self.shape not in ("disc", "square"):
-            raise InputError(f"shape of a top hat is 'disc' or 'square', not {self.shape!r}")
+        checks.above_zero("width of a top hat", self.width, "a slope")
+        checks.one_of("shape of a top hat", self.shape, ("disc", "square"))
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -288,16 +283,11 @@ class Radial(Kernel):
             raise InputError(
                 f"radii of a radial kernel rise from 0, each greater than the one before, not {radii}"
             )
-        profile = _checked_densities(profile, "the profile of a radial kernel")
+        what = "the profile of a radial kernel"
+        _check_densities(what, profile)
         total = float(_disc_integrals(radii, profile).sum())
-        if self.normalise:
-            profile = profile / total
-            object.__setattr__(self, "normalise", False)
-        elif abs(total - 1) > SUM_TOLERANCE:
-            raise InputError(
-                f"the profile of a radial kernel integrates to ∫ D(r) 2πr dr = {total:.9g}, and must to 1: divide "
-                "it, or pass normalise=True"
-            )
+        profile = _normalised(what, profile, total, self.normalise, "integrates to ∫ D(r) 2πr dr =")
+        object.__setattr__(self, "normalise", False)
         object.__setattr__(self, "radii", tuple(radii.tolist()))
         object.__setattr__(self, "profile", tuple(profile.tolist()))
 
@@ -365,7 +355,7 @@ class Radial(Kernel):
 
 
 @dataclass(frozen=True, eq=False)
-class Samples(Kernel):
+class Samples(Value, Kernel):
     """A kernel from an array, measured or computed: even within each cell of the array.
 
     Args:
@@ -384,22 +374,13 @@ class Samples(Kernel):
     normalise: bool = False
 
     def __post_init__(self) -> None:
-        values = np.array(self.values, dtype=np.float64)
-        if values.ndim != 2 or values.size == 0:
-            raise InputError(f"a kernel's array has (rows of δt, columns of δs), not shape {values.shape}")
-        if self.slope_pitch is None or not (self.slope_pitch > 0 and math.isfinite(self.slope_pitch)):
-            raise InputError(f"slope_pitch of a kernel's array must be greater than 0, not {self.slope_pitch}")
-        values = _checked_densities(values, "a kernel's array")
-        total = float(values.sum())
-        if self.normalise:
-            values = values / total
-            object.__setattr__(self, "normalise", False)
-        elif abs(total - 1) > SUM_TOLERANCE:
-            raise InputError(
-                f"a kernel's array sums to {total:.9g}, and must to 1, or light would be made or lost: divide it "
-                "by its sum, or pass normalise=True"
-            )
+        what = "a kernel's array"
+        values = checks.array(what, self.values, "numbers (rows of δt, columns of δs)", None, None)
+        checks.above_zero("slope_pitch of a kernel's array", self.slope_pitch)
+        _check_densities(what, values)
+        values = _normalised(what, values, float(values.sum()), self.normalise, "sums to")
         values.flags.writeable = False
+        object.__setattr__(self, "normalise", False)
         object.__setattr__(self, "values", values)
 
     @property
@@ -469,16 +450,6 @@ class Samples(Kernel):
         )
         return np.asarray(down @ shares @ across.T)
 
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, Samples)
-            and np.array_equal(self.values, other.values)
-            and self.slope_pitch == other.slope_pitch
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.values.shape, self.values.tobytes(), self.slope_pitch))
-
     def described(self) -> str:
         """The number of cells and their pitch in words."""
         rows, columns = self.values.shape
@@ -492,19 +463,22 @@ class Samples(Kernel):
 # --- densities ---
 
 
-def _checked_densities(values: Array, what: str) -> Array:
-    """The values, none of them negative, not a number or infinite, and not all of them zero."""
-    if not np.isfinite(values).all():
-        bad = tuple(int(n) for n in np.argwhere(~np.isfinite(values))[0])
-        raise InputError(f"{what} needs finite numbers; at index {bad} it has {values[bad]}")
-    if values.min() < 0:
-        bad = tuple(int(n) for n in np.unravel_index(values.argmin(), values.shape))
-        raise InputError(
-            f"{what} is not negative anywhere; at index {bad} it has {values[bad]:g}: light adds only"
-        )
+def _check_densities(what: str, values: Array) -> None:
+    """Refuse what is negative, not a number or infinite somewhere, or zero everywhere."""
+    checks.all_finite(what, values)
+    checks.none_negative(what, values)
     if not values.any():
         raise InputError(f"{what} is 0 throughout: no light would leave")
-    return values
+
+
+def _normalised(what: str, values: Array, total: float, normalise: bool, sums_to: str) -> Array:
+    """Values whose sum or integral is 1: divided by it where that is asked for, else refused if it is not."""
+    if not normalise and abs(total - 1) > SUM_TOLERANCE:
+        raise InputError(
+            f"{what} {sums_to} {total:.9g}, and must to 1, or light would be made or lost: divide it by that, or "
+            "pass normalise=True"
+        )
+    return values / total if normalise else values
 
 
 def _normal(z: ArrayLike) -> Array:

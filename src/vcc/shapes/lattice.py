@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.base.errors import InputError
+from vcc.base import checks
+from vcc.base.describe import parameters_in_words
 from vcc.shapes.patterns import RASTER_LIMIT, RASTER_PER_CELL, Cells, Pattern
 
 Array = NDArray[np.float64]
@@ -42,15 +43,10 @@ class Lattice:
     offset: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        if self.layout not in LAYOUTS:
-            raise InputError(f"layout is {' or '.join(map(repr, LAYOUTS))}, not {self.layout!r}")
-        if not (self.pitch > 0 and math.isfinite(self.pitch)):
-            raise InputError(f"pitch must be greater than 0 m, not {self.pitch}")
-        if not math.isfinite(self.rotation):
-            raise InputError(f"rotation must be a finite number of radians, not {self.rotation}")
-        if len(self.offset) != 2 or not all(math.isfinite(place) for place in self.offset):
-            raise InputError(f"offset is (x, y) in metres, not {self.offset}")
-        object.__setattr__(self, "offset", (float(self.offset[0]), float(self.offset[1])))
+        checks.one_of("layout", self.layout, LAYOUTS)
+        checks.above_zero("pitch", self.pitch, unit="m")
+        checks.finite("rotation", self.rotation, "radians")
+        object.__setattr__(self, "offset", checks.pair("offset", self.offset, "(x, y) in metres"))
 
     @property
     def row_height(self) -> float:
@@ -84,8 +80,6 @@ class Lattice:
 
     def described(self) -> str:
         """The cells in words, such as ``"hexagonal cells (pitch 0.125 mm)"``."""
-        from vcc.base.describe import parameters_in_words
-
         return f"{self.layout} cells ({parameters_in_words(self, leave_out=('layout',))})"
 
     def cell_of(self, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -180,8 +174,7 @@ class CellApertures(Pattern):
     circular: bool = False
 
     def __post_init__(self) -> None:
-        if not 0 < self.scale <= 1:
-            raise InputError(f"scale of openings is greater than 0 and at most 1, not {self.scale}")
+        checks.above_zero("scale of openings", self.scale, most=1)
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """One in the openings, zero between them."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import abc
 import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -18,8 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
+from vcc.base.units import text
+from vcc.base.values import Value
 
 Array = NDArray[np.float64]
 
@@ -42,11 +45,7 @@ class Pattern(abc.ABC):
 
     def described(self) -> str:
         """The pattern in words, such as ``"circle (diameter 3 mm)"``."""
-        from vcc.base.describe import parameters_in_words
-
-        name = re.sub(r"(?<!^)(?=[A-Z])", " ", type(self).__name__).lower()
-        parameters = parameters_in_words(self)
-        return f"{name} ({parameters})" if parameters else name
+        return with_parameters(kind_in_words(type(self)), parameters_in_words(self))
 
     @property
     def size(self) -> tuple[float, float]:
@@ -161,7 +160,7 @@ class Circle(Pattern):
     diameter: float = field(metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        _positive(self, "diameter", self.diameter)
+        checks.above_zero("diameter of circle", self.diameter, unit="m")
 
     @property
     def size(self) -> tuple[float, float]:
@@ -216,9 +215,8 @@ class Polygon(Pattern):
     rotation: float = field(default=0.0, metadata={"unit": "angle"})
 
     def __post_init__(self) -> None:
-        _positive(self, "diameter", self.diameter)
-        if self.sides < 3:
-            raise InputError(f"a polygon has 3 sides or more, not {self.sides}")
+        checks.above_zero("diameter of polygon", self.diameter, unit="m")
+        checks.whole_number_between("sides of polygon", self.sides, 3)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -237,7 +235,7 @@ class Polygon(Pattern):
 
 
 @dataclass(frozen=True, eq=False)
-class Cells(Pattern):
+class Cells(Value, Pattern):
     """A transmission array, values and a frame: uniform rectangular cells side by side, opaque outside.
 
     Args:
@@ -261,18 +259,17 @@ class Cells(Pattern):
             raise InputError(f"a transmission array has (rows, columns), not shape {values.shape}")
         if values.size == 0:
             raise InputError(f"a transmission array of shape {values.shape} is empty")
-        if not np.isfinite(values).all():
-            raise InputError("a transmission array needs finite numbers")
+        checks.all_finite("a transmission array", values)
         if values.min() < 0 or values.max() > 1:
             raise InputError(
                 f"transmission lies between 0 and 1; this array goes from {values.min():g} to {values.max():g}: "
                 "divide it by its full scale (255 for 8-bit values)"
             )
         object.__setattr__(self, "values", values)
-        _positive(self, "width", self.width)
+        checks.above_zero("width of cells", self.width, unit="m")
         if self.height is None:
             object.__setattr__(self, "height", self.width * values.shape[0] / values.shape[1])
-        _positive(self, "height", self.size[1])
+        checks.above_zero("height of cells", self.height, unit="m")
 
     @property
     def size(self) -> tuple[float, float]:
@@ -305,7 +302,7 @@ class Cells(Pattern):
         """Mean transmission over rectangles, exact (differences of the array's integral)."""
         width, height = max(width, self.width * 1e-5), max(height, self.size[1] * 1e-5)
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        if _is_grid(x, y):  # then two small products do it
+        if is_grid(x, y):  # then two small products do it
             overlap_x = self._overlaps(x.reshape(-1), width, 1)
             overlap_y = self._overlaps(y.reshape(-1), height, 0)
             content = overlap_y @ self.values @ overlap_x.T
@@ -347,20 +344,8 @@ class Cells(Pattern):
         assert self.height is not None
         return np.asarray(content * (self.width / columns) * (self.height / rows))
 
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, Cells)
-            and np.array_equal(self.values, other.values)
-            and (self.width, self.height, self.middle) == (other.width, other.height, other.middle)
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.values.tobytes(), self.width, self.height, self.middle))
-
     def described(self) -> str:
         """The number of cells and the size of the array in words."""
-        from vcc.base.units import text
-
         rows, columns = self.values.shape
         return f"{rows}×{columns} cells ({text(self.width)} wide)"
 
@@ -388,9 +373,8 @@ class CosineSum(Pattern):
 
     def __post_init__(self) -> None:
         for period in self.periods:
-            _positive(self, "period", period, finite=False)
-        if self.harmonics < 1:
-            raise InputError(f"a sum of cosines has 1 harmonic or more, not {self.harmonics}")
+            checks.above_zero("period of cosine sum", period, unit="m", infinite=True)
+        checks.whole_number_between("harmonics of cosine sum", self.harmonics, 1)
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The product of the two axes' sums."""
@@ -535,11 +519,6 @@ def mura(prime: int) -> NDArray[np.float64]:
     return np.asarray(cells)
 
 
-def _is_grid(x: Array, y: Array) -> bool:
-    """Whether x varies along the last axis only and y along the one before only."""
+def is_grid(x: Array, y: Array) -> bool:
+    """Whether places are rows y, (rows, 1), times columns x, (1, columns)."""
     return x.ndim == y.ndim == 2 and x.shape[0] == 1 and y.shape[1] == 1
-
-
-def _positive(thing: object, name: str, value: float, finite: bool = True) -> None:
-    if not value > 0 or (finite and not math.isfinite(value)):
-        raise InputError(f"{name} of {type(thing).__name__.lower()} must be greater than 0 m, not {value}")

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import abc
 import math
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from numbers import Real
 from typing import Any
@@ -21,10 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
-from vcc.base.describe import parameters_in_words
+from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
 from vcc.base.units import short
+from vcc.shapes.patterns import is_grid
 
 Array = NDArray[np.float64]
 
@@ -72,8 +73,7 @@ class Surface(abc.ABC):
 
     def described(self) -> str:
         """The surface in words, such as ``"quadratic (focal length 50 mm)"``."""
-        parameters = parameters_in_words(self)
-        return f"{_in_words(self)} ({parameters})" if parameters else _in_words(self)
+        return with_parameters(kind_in_words(type(self)), parameters_in_words(self))
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,7 @@ class Quadratic(Surface):
     focal_length: float = field(metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        if self.focal_length == 0 or math.isnan(self.focal_length):
-            raise InputError(f"focal_length of a quadratic surface is {self.focal_length} m: it must not be 0")
+        checks.not_zero("focal_length of a quadratic surface", self.focal_length)
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """−r²/2f, metres."""
@@ -128,9 +127,8 @@ class Tilt(Surface):
     deflection: tuple[float, float]
 
     def __post_init__(self) -> None:
-        if len(self.deflection) != 2 or not all(math.isfinite(slope) for slope in self.deflection):
-            raise InputError(f"deflection of a tilt is two slopes (δs, δt), not {self.deflection}")
-        object.__setattr__(self, "deflection", (float(self.deflection[0]), float(self.deflection[1])))
+        slopes = checks.pair("deflection of a tilt", self.deflection, "two slopes (δs, δt)")
+        object.__setattr__(self, "deflection", slopes)
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """δs·x + δt·y, metres."""
@@ -169,8 +167,7 @@ class Cubic(Surface):
     strength: float
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.strength):
-            raise InputError(f"strength of a cubic surface is a finite number of 1/m², not {self.strength}")
+        checks.finite("strength of a cubic surface", self.strength, "1/m²")
 
     @classmethod
     def from_alpha(cls, alpha: float, half_width: float, wavelength: float) -> Cubic:
@@ -184,8 +181,8 @@ class Cubic(Surface):
         Raises:
             InputError: a half width or wavelength of 0 or less.
         """
-        _positive("half_width of a cubic surface", half_width)
-        _positive("wavelength of a cubic surface", wavelength)
+        checks.above_zero("half_width of a cubic surface", half_width, unit="m")
+        checks.above_zero("wavelength of a cubic surface", wavelength, unit="m")
         return cls(alpha * wavelength / (2 * math.pi * half_width**3))
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
@@ -230,8 +227,7 @@ class Axicon(Surface):
     slope: float
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.slope):
-            raise InputError(f"slope of an axicon is a finite number, not {self.slope}")
+        checks.finite("slope of an axicon", self.slope)
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """−slope·r, metres."""
@@ -290,19 +286,10 @@ class Zernike(Surface):
     diameter: float = field(metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        try:
-            coefficients = tuple(float(value) for value in self.coefficients)
-        except (TypeError, ValueError):
-            raise InputError(
-                f"coefficients of a Zernike surface are numbers of metres of Noll's terms 1, 2, 3, …, "
-                f"not {self.coefficients!r}"
-            ) from None
-        if not coefficients or not all(math.isfinite(value) for value in coefficients):
-            raise InputError(
-                f"coefficients of a Zernike surface are one or more finite numbers of metres, not {coefficients}"
-            )
-        object.__setattr__(self, "coefficients", coefficients)
-        _positive("diameter of a Zernike surface", self.diameter)
+        terms = "one or more numbers of metres of Noll's terms 1, 2, 3, …"
+        coefficients = checks.array("coefficients of a Zernike surface", self.coefficients, terms, None)
+        object.__setattr__(self, "coefficients", tuple(coefficients.tolist()))
+        checks.above_zero("diameter of a Zernike surface", self.diameter, unit="m")
 
     @classmethod
     def from_terms(cls, terms: Mapping[int, float], diameter: float) -> Zernike:
@@ -315,7 +302,7 @@ class Zernike(Surface):
         Raises:
             InputError: no terms, a number below 1, and as for the class.
         """
-        if not terms or not all(_is_integer(j) and j >= 1 for j in terms):
+        if not terms or not all((checks.whole_number(j) or 0) >= 1 for j in terms):
             raise InputError(f"terms of a Zernike surface are numbered 1, 2, 3, … after Noll, not {list(terms)}")
         return cls(tuple(terms.get(j, 0.0) for j in range(1, max(terms) + 1)), diameter)
 
@@ -460,7 +447,8 @@ class Sheet(Surface):
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         # A millionth more, so that a place on the edge is on the sheet whatever rounding did to it
         inside = (np.abs(x) <= self.size[0] * 0.500001) & (np.abs(y) <= self.size[1] * 0.500001)
-        if _is_lattice(x, y):  # then the spline is a product along both axes: 50 times as fast as place by place
+        if is_grid(x, y) and (np.diff(x[0]) > 0).all() and (np.diff(y[:, 0]) > 0).all():
+            # The spline is a product along both axes: 50 times as fast as place by place
             return np.where(inside, spline(y[:, 0], x[0], grid=True), 0.0)
         x, y = np.broadcast_arrays(x, y)
         values = np.zeros(x.shape)
@@ -487,8 +475,59 @@ def _coefficient_bound(spline: Any, half_width: float, half_height: float) -> fl
     return float(np.abs(table[np.ix_(near_y, near_x)]).max())
 
 
-@dataclass(frozen=True, eq=False)
-class HeightMap(Sheet):
+class _Table(Sheet):
+    """A surface known at the middles of square or rectangular cells side by side, which fill its sheet."""
+
+    @property
+    @abc.abstractmethod
+    def _cells(self) -> Array:
+        """What is known of each cell, (rows, columns)."""
+
+    @property
+    def _factor(self) -> float:
+        """The optical path for 1 of what is known."""
+        return 1.0
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """(width, height) of the sheet, metres."""
+        rows, columns = self._cells.shape
+        return self.width, self.width * rows / columns if self.height is None else self.height
+
+    def _samples(self) -> tuple[Array, Array, Array]:
+        y, x = (
+            ((np.arange(cells) + 0.5) / cells - 0.5) * length
+            for cells, length in zip(self._cells.shape, self.size[::-1], strict=True)
+        )
+        return y, x, self._factor * self._cells
+
+    def __eq__(self, other: object) -> bool:
+        # By the size, since a height that is left out is one that makes the cells square.
+        return isinstance(other, type(self)) and (
+            np.array_equal(self._cells, other._cells) and (self.size, self._factor) == (other.size, other._factor)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self._cells.tobytes(), self.size, self._factor))
+
+    @property
+    def _in_words(self) -> str:
+        rows, columns = self._cells.shape
+        width, height = self.size
+        return f"{rows}×{columns} points, {short(width)} × {short(height)}"
+
+    def described(self) -> str:
+        """The number of points and the size of the sheet in words."""
+        return f"{kind_in_words(type(self))} ({self._in_words})"
+
+    def __repr__(self) -> str:
+        rows, columns = self._cells.shape
+        numbers = ", ".join(f"{each.name}={getattr(self, each.name)!r}" for each in fields(self)[1:])  # type: ignore[arg-type]
+        return f"{type(self).__name__}({rows}×{columns}, {numbers})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HeightMap(_Table):
     """Glass of measured or designed height h: OPL = (n − 1)·h, sampled on a grid.
 
     The sheet is ``width`` wide and bounds a plate made of it; values stand at the middles of its cells.
@@ -509,42 +548,25 @@ class HeightMap(Sheet):
     refractive_index: float = 1.5
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "heights", _table(self.heights, "heights of a height map"))
-        _check_sheet("a height map", self.width, self.height)
+        object.__setattr__(self, "heights", _table("heights of a height map", self.heights))
+        checks.sizes("a height map", width=self.width, height=self.height)
         _check_glass("a height map", self.refractive_index)
 
     @property
-    def size(self) -> tuple[float, float]:
-        """(width, height) of the sheet, metres."""
-        return _size_of_cells(self.heights, self.width, self.height)
+    def _cells(self) -> Array:
+        return self.heights
 
-    def _samples(self) -> tuple[Array, Array, Array]:
-        return *_middles(self.heights, self.size), (self.refractive_index - 1) * self.heights
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, HeightMap)
-            and np.array_equal(self.heights, other.heights)
-            and (self.size, self.refractive_index) == (other.size, other.refractive_index)
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.heights.tobytes(), self.size, self.refractive_index))
+    @property
+    def _factor(self) -> float:
+        return self.refractive_index - 1
 
     def described(self) -> str:
         """The number of points, the size of the sheet and the glass in words."""
-        return f"{_table_in_words(self, self.heights)}, refractive index {self.refractive_index:g})"
-
-    def __repr__(self) -> str:
-        rows, columns = self.heights.shape
-        return (
-            f"HeightMap({rows}×{columns}, width={self.width!r}, height={self.height!r}, "
-            f"refractive_index={self.refractive_index!r})"
-        )
+        return f"height map ({self._in_words}, refractive index {self.refractive_index:g})"
 
 
-@dataclass(frozen=True, eq=False)
-class PathMap(Sheet):
+@dataclass(frozen=True, eq=False, repr=False)
+class PathMap(_Table):
     """Optical path lengths sampled on a grid, from another program or a wavefront measurement.
 
     The sheet is ``width`` wide and bounds a plate made of it; values stand at the middles of its cells.
@@ -563,30 +585,12 @@ class PathMap(Sheet):
     height: float | None = field(default=None, metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "paths", _table(self.paths, "paths of a path map"))
-        _check_sheet("a path map", self.width, self.height)
+        object.__setattr__(self, "paths", _table("paths of a path map", self.paths))
+        checks.sizes("a path map", width=self.width, height=self.height)
 
     @property
-    def size(self) -> tuple[float, float]:
-        """(width, height) of the sheet, metres."""
-        return _size_of_cells(self.paths, self.width, self.height)
-
-    def _samples(self) -> tuple[Array, Array, Array]:
-        return *_middles(self.paths, self.size), self.paths
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, PathMap) and np.array_equal(self.paths, other.paths) and self.size == other.size
-
-    def __hash__(self) -> int:
-        return hash((self.paths.tobytes(), self.size))
-
-    def described(self) -> str:
-        """The number of points and the size of the sheet in words."""
-        return _table_in_words(self, self.paths) + ")"
-
-    def __repr__(self) -> str:
-        rows, columns = self.paths.shape
-        return f"PathMap({rows}×{columns}, width={self.width!r}, height={self.height!r})"
+    def _cells(self) -> Array:
+        return self.paths
 
 
 @dataclass(frozen=True)
@@ -619,14 +623,11 @@ class Rough(Sheet):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not (self.height_rms >= 0 and math.isfinite(self.height_rms)):
-            raise InputError(f"height_rms of a rough surface must be 0 m or more, not {self.height_rms}")
-        _positive("correlation_length of a rough surface", self.correlation_length)
-        _check_sheet("a rough surface", self.width, self.height)
+        checks.zero_or_more("height_rms of a rough surface", self.height_rms, unit="m")
+        checks.above_zero("correlation_length of a rough surface", self.correlation_length, unit="m")
+        checks.sizes("a rough surface", width=self.width, height=self.height)
         _check_glass("a rough surface", self.refractive_index)
-        if not _is_integer(self.seed) or self.seed < 0:
-            raise InputError(f"seed of a rough surface is an integer of 0 or more, not {self.seed!r}")
-        object.__setattr__(self, "seed", int(self.seed))
+        object.__setattr__(self, "seed", checks.seed(self.seed, "seed of a rough surface"))
         rows, columns = self.grid
         if max(rows, columns) > LARGEST_GRID:
             room = (LARGEST_GRID - 1 - 2 * _MARGIN) * self._step
@@ -686,57 +687,14 @@ _MARGIN = 3
 """Points of a rough surface beyond each edge of its sheet, where the spline's ends do no harm."""
 
 
-def _is_lattice(x: Array, y: Array) -> bool:
-    """Whether places are rows y, (rows, 1), times columns x, (1, columns), in order."""
-    if not (x.ndim == y.ndim == 2 and x.shape[0] == 1 and y.shape[1] == 1):
-        return False
-    return bool((np.diff(x[0]) > 0).all() and (np.diff(y[:, 0]) > 0).all())
-
-
 def _places(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
     x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
     return x, y
 
 
-def _in_words(surface: Surface) -> str:
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", type(surface).__name__).lower()
-
-
-def _table_in_words(surface: Surface, values: Array) -> str:
-    rows, columns = values.shape
-    width, height = surface.size
-    return f"{_in_words(surface)} ({rows}×{columns} points, {short(width)} × {short(height)}"
-
-
-def _positive(what: str, value: float) -> None:
-    if not (value > 0 and math.isfinite(value)):
-        raise InputError(f"{what} must be greater than 0 m, not {value}")
-
-
-def _is_integer(value: object) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
-
-
-def _table(given: Any, what: str) -> Array:
-    try:
-        values = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} are a table of numbers of metres, (rows, columns)") from None
-    if values.ndim != 2 or min(values.shape) < 4:
-        raise InputError(
-            f"{what} are a table of 4×4 or more (a cubic spline needs 4), not of shape {values.shape}"
-        )
-    if not np.isfinite(values).all():
-        row, column = np.argwhere(~np.isfinite(values))[0]
-        raise InputError(f"{what} must be finite numbers; row {row}, column {column} is {values[row, column]}")
-    values.flags.writeable = False
-    return values
-
-
-def _check_sheet(what: str, width: float, height: float | None) -> None:
-    _positive(f"width of {what}", width)
-    if height is not None:
-        _positive(f"height of {what}", height)
+def _table(what: str, given: Any) -> Array:
+    needed = "a table of 4×4 numbers of metres or more, (rows, columns) (a cubic spline needs 4)"
+    return checks.array(what, given, needed, None, None, least=4)
 
 
 def _check_glass(what: str, refractive_index: Any) -> None:
@@ -745,17 +703,3 @@ def _check_glass(what: str, refractive_index: Any) -> None:
             f"refractive_index of {what} is {refractive_index}: a surface with no glass bends "
             "nothing; glass has more than 1, such as 1.5"
         )
-
-
-def _size_of_cells(values: Array, width: float, height: float | None) -> tuple[float, float]:
-    rows, columns = values.shape
-    return width, width * rows / columns if height is None else height
-
-
-def _middles(values: Array, size: tuple[float, float]) -> tuple[Array, Array]:
-    """Places (y of rows, x of columns) of the middles of cells, metres."""
-    rows, columns = values.shape
-    return (
-        ((np.arange(rows) + 0.5) / rows - 0.5) * size[1],
-        ((np.arange(columns) + 0.5) / columns - 0.5) * size[0],
-    )

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.optics.deflections import CellDeflection, FacetDeflection
-from vcc.optics.electronics import checked_seed
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import steps
@@ -64,7 +64,7 @@ def compile_rays(
     if interpolation not in ("sharp", "linear"):
         raise InputError(f"interpolation by rays is 'sharp' or 'linear', not {interpolation!r}")
     samples = _checked_samples(samples)
-    seed = checked_seed(seed)
+    seed = checks.seed(seed)
     motion, followed = _motion(light_field, scene_distance)
     if between_views == "none":
         motion = np.zeros((2, 2))
