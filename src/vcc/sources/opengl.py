@@ -17,7 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.files.transfer import to_linear
 from vcc.sources.views import CameraArray, ViewCamera
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply")
@@ -50,8 +52,7 @@ class Viewpoint:
     unit: float = field(default=1.0, metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        if not (self.unit > 0 and math.isfinite(self.unit)):
-            raise InputError(f"the unit of a scene is a length in metres above 0, not {self.unit}")
+        checks.above_zero("the unit of a scene", self.unit, "a length in metres")
         back = np.subtract(self.eye, self.target)
         if not np.linalg.norm(back) > 0:
             raise InputError(f"a viewpoint looks from eye to target, and both are {self.eye}")
@@ -95,11 +96,16 @@ class Lighting:
 
     def __post_init__(self) -> None:
         for name in ("ambient", "sun", "fill"):
-            light = getattr(self, name)
-            if len(light) != 3 or not all(part >= 0 and math.isfinite(part) for part in light):
-                raise InputError(f"{name} is light as (red, green, blue), each 0 or more, not {light}")
+            _light(name, getattr(self, name))
         if not 0 < math.hypot(*self.sun_from) < math.inf:
             raise InputError(f"sun_from is a direction of three numbers, not {self.sun_from}")
+
+
+def _light(name: str, given: Vector) -> Vector:
+    """Radiance as floats, none of them below 0."""
+    if len(given) != 3 or not all(part >= 0 and math.isfinite(part) for part in given):
+        raise InputError(f"{name} is light as (red, green, blue), each 0 or more, not {given}")
+    return float(given[0]), float(given[1]), float(given[2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,13 +157,10 @@ class OpenGLRenderer:
         multisampling: int = 4,
     ) -> None:
         for name, count in (("supersampling", supersampling), ("multisampling", multisampling)):
-            if not isinstance(count, int) or not 1 <= count <= 16:
-                raise InputError(f"{name} is a whole number from 1 to 16, not {count}")
-        if len(background) != 3 or not all(part >= 0 and math.isfinite(part) for part in background):
-            raise InputError(f"background is (red, green, blue), each 0 or more, not {background}")
+            checks.whole_number_between(name, count, 1, 16)
         self.viewpoint = viewpoint or Viewpoint()
         self.lighting = lighting or Lighting()
-        self.background = tuple(float(part) for part in background)
+        self.background = _light("background", background)
         self.supersampling, self.multisampling = supersampling, multisampling
         self._names, scenes = _loaded(meshes)
         self._parts = _parts(scenes, self.viewpoint.array_from_scene())
@@ -413,12 +416,8 @@ class _Drawing:
 
 
 def _context() -> Any:
-    try:
+    with checks.package("drawing meshes", "moderngl", "opengl"):
         import moderngl
-    except ImportError:
-        raise InputError(
-            'drawing meshes needs the package moderngl: pip install "virtual-computational-camera[opengl]"'
-        ) from None
     try:
         create: Any = moderngl.create_context  # whose stubs leave out its options
         return create(standalone=True, backend="egl", require=330)
@@ -431,13 +430,8 @@ def _context() -> Any:
 
 def _loaded(meshes: Any) -> tuple[list[str], list[Any]]:
     """Names, and trimesh scenes with where they came from (file ending or "")."""
-    try:
+    with checks.package("reading meshes", "trimesh", "opengl"):
         import trimesh
-    except ImportError:
-        raise InputError(
-            "reading meshes needs the packages trimesh and pillow: "
-            'pip install "virtual-computational-camera[opengl]"'
-        ) from None
     given = list(meshes) if isinstance(meshes, list | tuple) else [meshes]
     if not given:
         raise InputError("there are no meshes to draw: give at least one file")
@@ -576,8 +570,6 @@ def _interleaved(*columns: NDArray[np.float64]) -> NDArray[np.float32]:
 
 def _linear(colours: NDArray[Any], already: bool) -> NDArray[np.float64]:
     """Linear colour and opacity, 0 to 1, of 8-bit ones."""
-    from vcc.files.transfer import to_linear
-
     shares = colours.astype(np.float64) / 255
     if not already:
         shares[..., :3] = to_linear(shares[..., :3])
