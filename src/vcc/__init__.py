@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from vcc.optics.electronics import Electronics as Electronics
     from vcc.optics.sensor import Sensor as Sensor
     from vcc.prescriptions import load_lens as load_lens
-    from vcc.run.recording import Recording as Recording
-    from vcc.run.recording import expose_image as expose_image
-    from vcc.run.recording import photon_transfer as photon_transfer
+    from vcc.recording import Recording as Recording
+    from vcc.recording import expose_image as expose_image
+    from vcc.run.photon_transfer import photon_transfer as photon_transfer
 
 __version__ = "0.1.0"
 
@@ -59,14 +59,14 @@ _HOMES = {
     "Prism": "vcc.optics",
     "PrismArray": "vcc.optics",
     "Pyramid": "vcc.optics",
-    "Recording": "vcc.run.recording",
+    "Recording": "vcc.recording",
     "ResultWarning": "vcc.base.errors",
     "Sensor": "vcc.optics.sensor",
-    "expose_image": "vcc.run.recording",
+    "expose_image": "vcc.recording",
     "load_camera": "vcc.files.camera_file",
     "load_lens": "vcc.prescriptions",
     "open_light_field": "vcc.formats",
-    "photon_transfer": "vcc.run.recording",
+    "photon_transfer": "vcc.run.photon_transfer",
 }
 _MODULES = {
     "analysis",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from vcc.image import Image
     from vcc.plan.footprints.model import Plan
     from vcc.plan.rays.model import RayPlan
-    from vcc.run.recording import Recording
+    from vcc.recording import Recording
     from vcc.store import StoredLightField
 
 
@@ -216,9 +216,12 @@ class Camera(Train):
         Warns:
             ResultWarning: as `capture` and `vcc.expose_image`.
         """
-        from vcc.run.recording import expose
+        from vcc.recording import recorded
+        from vcc.run.expose import Exposure
 
-        return expose(self, light_field, exposure, seed=seed, radiance=radiance, ray_seed=ray_seed, **options)
+        asked = Exposure(self.sensor, exposure, seed, radiance, options.get("threads"))
+        asked.check_channels(light_field.channels)  # before the work begins
+        return recorded(self.capture(light_field, seed=ray_seed, **options), asked)
 
     def explain(self, light_field: LightField | StoredLightField, **options: Any) -> Explanation:
         """The plan for a light field in words: what was folded, pulled to the sensor, chosen, and its cost.

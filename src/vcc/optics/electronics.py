@@ -7,7 +7,7 @@ standard's)::
     charge ~ Poisson(η·μ_p + μ_I·t)                photo-electrons and dark current, at most the full well
     y = black level + K · (charge + read noise)    rounded to a whole number, 0 to 2^bits − 1
 
-`vcc.run.recording` draws recordings from it.
+`vcc.run.expose` draws recordings from it.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ class Electronics:
             if isinstance(value := getattr(self, name), tuple)
         }
         if self.color_filter is not None:
-            counts["color_filter"] = 1 + max(max(row) for row in self.tile)
+            counts["color_filter"] = self.filter_channels
         return counts
 
     @property
@@ -130,6 +130,21 @@ class Electronics:
             return ((0,),)
         rows = _rows(self.color_filter)
         return tuple(tuple(_channel(sign) for sign in row) for row in rows)
+
+    @property
+    def filter_channels(self) -> int:
+        """How many channels the tile has; 1 without a colour filter."""
+        return 1 + max(max(row) for row in self.tile)
+
+    @property
+    def filters(self) -> list[tuple[tuple[slice, slice], int]]:
+        """The pixels behind each filter of the tile, as slices of rows and columns, and its channel."""
+        rows, columns = len(self.tile), len(self.tile[0])
+        return [
+            ((slice(row, None, rows), slice(column, None, columns)), channel)
+            for row, line in enumerate(self.tile)
+            for column, channel in enumerate(line)
+        ]
 
     @property
     def is_bayer(self) -> bool:
