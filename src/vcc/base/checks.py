@@ -299,7 +299,24 @@ def none_negative(name: str, values: Array) -> None:
         raise InputError(f"{name} must be 0 or more; at index {_place(values == lowest)} there is {lowest:g}")
 
 
-# --- packages ---
+# --- around what may be refused ---
+
+
+@contextmanager
+def within(place: str) -> Iterator[None]:
+    """Refusals within this name a place, unless they do already: a file, an element.
+
+    Args:
+        place: such as ``'camera.toml: element 2'``.
+
+    Raises:
+        InputError: what is raised within, with the place before it.
+    """
+    try:
+        yield
+    except InputError as error:
+        said = str(error)
+        raise InputError(said if place in said else f"{place}: {said}") from None
 
 
 @contextmanager

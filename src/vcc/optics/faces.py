@@ -140,11 +140,8 @@ class Element(abc.ABC):
         A thick element lists `Faces` and, between them, the `Affine` steps by which rays get from one to the
         next; the first starts at z, the last ends at z + `length`.
         """
-        try:
+        with checks.within(self.label):
             faces = self.faces()
-        except InputError as error:
-            said = str(error)
-            raise InputError(said if self.label in said else f"{self.label}: {said}") from None
         if not isinstance(faces, Faces):
             raise InputError(f"faces() of {self.label} must return vcc.Faces, not {type(faces).__name__}")
         return (faces,)

@@ -110,10 +110,8 @@ class FirstOrder(Element):
             raise InputError(
                 f"{name} of {self.label} is {shape}: give 2×2 (A, B, C, D), 4×4 on (u, v, s, t) or 5×5"
             )
-        try:
+        with checks.within(f"{name} of {self.label}"):
             step = as_ray_map(rows)
-        except InputError as error:
-            raise InputError(f"{name} of {self.label}: {error}") from None
         # Each axis of a symmetric system counts: its 4×4 determinant is the square of the 2×2 one.
         determinant = float(np.linalg.det(rows)) if len(rows) == 2 else step.determinant
         if abs(determinant - 1) > ETENDUE_TOLERANCE:

@@ -215,7 +215,5 @@ class PrismArray(Value, Element):
 
 def _lattice(array: LensArray | PrismArray, offset: tuple[float, float]) -> Lattice:
     """The cells of an array; errors name it."""
-    try:
+    with checks.within(array.label):
         return Lattice(array.layout, array.pitch, array.rotation, offset)
-    except InputError as error:
-        raise InputError(f"{array.label}: {error}") from None
