@@ -487,14 +487,15 @@ class Bounded(Pattern):
         Exact where no rectangle crosses the border of the sheet, or the pattern is even across it.
         """
         x, y = np.asarray(x, float), np.asarray(y, float)
-        share_x = _overlap_share(x, max(width, self.width * 1e-5), self.width)
-        share_y = _overlap_share(y, max(height, self.height * 1e-5), self.height)
+        share_x = overlap_share(x, max(width, self.width * 1e-5), self.width)
+        share_y = overlap_share(y, max(height, self.height * 1e-5), self.height)
         return self.pattern.mean(x, y, width, height) * share_x * share_y
 
 
-def _overlap_share(centre: Array, length: float, sheet: float) -> Array:
+def overlap_share(centre: Array, length: Array | float, sheet: float) -> Array:
+    """The share of intervals of some length around places that lies within ±sheet/2."""
     covered = np.minimum(centre + length / 2, sheet / 2) - np.maximum(centre - length / 2, -sheet / 2)
-    return np.clip(covered / length, 0.0, 1.0)
+    return np.asarray(np.clip(covered / length, 0.0, 1.0))
 
 
 def mura(prime: int) -> NDArray[np.float64]:

@@ -21,6 +21,7 @@ from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.light_field import LightField
 from vcc.plan.how import cores
+from vcc.shapes.patterns import overlap_share
 from vcc.sources.kernels import views_of_row
 from vcc.sources.textures import Array, Texture, mean_radiance_and_opacity, radiance_and_opacity
 from vcc.sources.views import CameraArray, ViewCamera
@@ -200,8 +201,7 @@ def _share_inside(place: Array, size: float, cell: Array | float) -> Array:
     """The share of cells around places that lies within ±size/2, along one axis."""
     if math.isinf(size) or (np.ndim(cell) == 0 and cell == 0):
         return (np.abs(place) <= size / 2).astype(np.float64)
-    covered = np.minimum(place + cell / 2, size / 2) - np.maximum(place - cell / 2, -size / 2)
-    return np.asarray(np.clip(covered / cell, 0.0, 1.0))
+    return overlap_share(place, cell, size)
 
 
 class PlanesScene:
