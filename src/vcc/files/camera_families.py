@@ -22,18 +22,19 @@ from vcc.base.describe import kind_in_words
 from vcc.base.errors import InputError
 from vcc.optics import Element, FirstOrder
 from vcc.prescriptions import load_lens
-from vcc.shapes import kernels, lattice, patterns, surfaces
+from vcc.shapes import height_maps, kernels, lattice, patterns, surfaces, zernike
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern
 from vcc.shapes.sheets import Product
-from vcc.shapes.surfaces import Surface
+from vcc.shapes.surface import Surface
 
 
 def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
     """The classes of modules that can be made, by their names in a file: CosineSum is "cosine_sum"."""
-    things = [thing for module in modules for thing in vars(module).values()]
-    kinds = [kind for kind in things if inspect.isclass(kind) and issubclass(kind, base)]
-    return {kind_in_words(kind, "_"): kind for kind in kinds if not inspect.isabstract(kind)}
+    things = [(thing, module) for module in modules for thing in vars(module).values() if inspect.isclass(thing)]
+    own = [kind for kind, module in things if kind.__module__.startswith(module.__name__)]
+    kinds = [kind for kind in own if issubclass(kind, base) and not inspect.isabstract(kind)]
+    return {kind_in_words(kind, "_"): kind for kind in kinds}
 
 
 ELEMENT_KINDS: dict[str, type[Element]] = dict(sorted(_named(Element, optics).items()))
@@ -46,7 +47,7 @@ del PATTERN_NAMES["function_pattern"]  # Python, which no file can hold
 KERNEL_NAMES: dict[str, type[Kernel]] = _named(Kernel, kernels)
 """Which class each ``name`` of a diffuser's kernel in a camera file stands for. Add your own."""
 
-SURFACE_NAMES: dict[str, type[Surface]] = _named(Surface, surfaces)
+SURFACE_NAMES: dict[str, type[Surface]] = _named(Surface, surfaces, zernike, height_maps)
 """Which class each ``name`` of a phase plate's surface in a camera file stands for. Add your own."""
 
 

@@ -18,7 +18,7 @@ from vcc.base.units import short
 from vcc.optics.deflections import Deflection, SlopeFunction, checked_slopes
 from vcc.optics.faces import Element, Faces
 from vcc.shapes.patterns import Bounded, Circle, Open, Pattern
-from vcc.shapes.surfaces import Surface
+from vcc.shapes.surface import Surface
 
 Array = NDArray[np.float64]
 
