@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.describe import parameters_in_words
-from vcc.shapes.patterns import RASTER_LIMIT, RASTER_PER_CELL, Cells, Pattern
+from vcc.shapes.patterns import RASTER_LIMIT, RASTER_PER_CELL, Pattern, Raster, mean_over
 
 Array = NDArray[np.float64]
 
@@ -263,17 +263,20 @@ class CellApertures(Pattern):
         return np.clip(2 * half - math.sqrt(3) * level, 0.0, half)
 
     def _sampled_mean(self, x: Array, y: Array, width: float, height: float) -> Array:
-        opening = 2 * self._half_width
-        low = x.min() - width / 2, y.min() - height / 2
-        extent = x.max() + width / 2 - low[0], y.max() + height / 2 - low[1]
-        sizes = min(width, opening), min(height, opening)
-        if min(sizes) <= 0 or max(extent[n] / sizes[n] for n in (0, 1)) * RASTER_PER_CELL > RASTER_LIMIT:
+        across, down = self._raster(x, width), self._raster(y, height)
+        if across is None or down is None:
             return super().mean(x, y, width, height)
-        columns, rows = (math.ceil(extent[n] / sizes[n] * RASTER_PER_CELL) for n in (0, 1))
-        grid_x = low[0] + (np.arange(columns) + 0.5) * (extent[0] / columns)
-        grid_y = low[1] + (np.arange(rows) + 0.5) * (extent[1] / rows)
-        middle = low[0] + extent[0] / 2, low[1] + extent[1] / 2
-        return Cells(self(grid_x[None, :], grid_y[:, None]), *extent, middle=middle).mean(x, y, width, height)
+        return mean_over(across, down, lambda a, b, _: self(a, b), x, y, width, height)
+
+    def _raster(self, centre: Array, length: float) -> Raster | None:
+        """16 points across an opening or a rectangle, whichever is smaller; None where those are too many."""
+        low = float(centre.min()) - length / 2
+        extent, finest = float(centre.max()) + length / 2 - low, min(length, 2 * self._half_width)
+        if finest <= 0 or extent / finest * RASTER_PER_CELL > RASTER_LIMIT:
+            return None
+        points = math.ceil(extent / finest * RASTER_PER_CELL)
+        places = np.asarray(low + (np.arange(points) + 0.5) * (extent / points), dtype=np.float64)
+        return Raster(places, low, low + extent)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import abc
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -98,32 +98,63 @@ def mean_by_raster(
         The means; None where even the fewest points across each rectangle are too many.
     """
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    places: list[Array] = []
-    points: list[tuple[float, float]] = []
-    steps: list[float] = []
-    for centre, length, bound in ((x, width, size[0]), (y, height, size[1])):
-        low = max(float(centre.min()) - length / 2, -bound / 2)
-        high = max(min(float(centre.max()) + length / 2, bound / 2), low)
-        across = RASTER_PER_CELL
-        # By the pattern's own size where it has one, so that pieces of a light field see the same raster.
-        extent = bound if math.isfinite(bound) else high - low
-        while across > fewest and length > 0 and extent / length * across > RASTER_LIMIT:
-            across //= 2
-        step = length / across
-        if step <= 0 or (high - low) / step > LONGEST_RASTER:
-            return None
-        first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
-        places.append(np.asarray((np.arange(first, last) + 0.5) * step, dtype=np.float64))
-        points.append((first * step, last * step))
-        steps.append(step)
-    rows, columns = places[1].size, places[0].size
-    if rows * columns > RASTER_LIMIT**2:
+    across, down = (
+        _raster(centre, length, bound, fewest)
+        for centre, length, bound in ((x, width, size[0]), (y, height, size[1]))
+    )
+    if across is None or down is None or across.places.size * down.places.size > RASTER_LIMIT**2:
         return None
-    found = np.asarray(values(places[0][None, :], places[1][:, None], (steps[0], steps[1])), dtype=np.float64)
-    (left, right), (top, bottom) = points
-    middle = (left + right) / 2, (top + bottom) / 2
-    raster = Cells(np.broadcast_to(found, (rows, columns)), right - left, bottom - top, middle)
-    return raster.mean(x, y, width, height)
+    return mean_over(across, down, values, x, y, width, height)
+
+
+class Raster(NamedTuple):
+    """Points along an axis, in the middles of equal steps from low to high, metres."""
+
+    places: Array
+    low: float
+    high: float
+
+    @property
+    def length(self) -> float:
+        """Of all steps, metres."""
+        return self.high - self.low
+
+    @property
+    def step(self) -> float:
+        """Metres."""
+        return self.length / self.places.size
+
+
+def _raster(centre: Array, length: float, bound: float, fewest: int) -> Raster | None:
+    """The points of `mean_by_raster` along an axis; None where even the fewest are too many."""
+    low = max(float(centre.min()) - length / 2, -bound / 2)
+    high = max(min(float(centre.max()) + length / 2, bound / 2), low)
+    across = RASTER_PER_CELL
+    # By the pattern's own size where it has one, so that pieces of a light field see the same raster.
+    extent = bound if math.isfinite(bound) else high - low
+    while across > fewest and length > 0 and extent / length * across > RASTER_LIMIT:
+        across //= 2
+    step = length / across
+    if step <= 0 or (high - low) / step > LONGEST_RASTER:
+        return None
+    first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
+    return Raster(np.asarray((np.arange(first, last) + 0.5) * step), first * step, last * step)
+
+
+def mean_over(
+    across: Raster,
+    down: Raster,
+    values: Callable[[Array, Array, tuple[float, float]], ArrayLike],
+    x: Array,
+    y: Array,
+    width: float,
+    height: float,
+) -> Array:
+    """Means over rectangles of what the points of a raster show; the rest as for `mean_by_raster`."""
+    found = np.asarray(values(across.places[None, :], down.places[:, None], (across.step, down.step)), float)
+    cells = np.broadcast_to(found, (down.places.size, across.places.size))
+    middle = (across.low + across.high) / 2, (down.low + down.high) / 2
+    return Cells(cells, across.length, down.length, middle).mean(x, y, width, height)
 
 
 def _mean_from_integral(
