@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vcc.base import checks
+from vcc.base.errors import InputError
 from vcc.optics.deflections import FacetDeflection
 from vcc.optics.faces import Element, Faces
 from vcc.shapes.patterns import Circle
@@ -65,8 +66,11 @@ class Pyramid(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        sides = int(self.sides) if self.sides == self.sides // 1 else self.sides  # 3.0 is whole enough
-        checks.whole_number_between(f"sides of {self.label}", sides, 3, way_out="two sides make a vcc.Biprism")
+        if not (self.sides >= 3 and self.sides % 1 == 0):  # 3.0 will do
+            raise InputError(
+                f"sides of {self.label} is a whole number, 3 or more, not {self.sides}; "
+                "two sides make a vcc.Biprism"
+            )
         _check(self)
 
     def faces(self) -> Faces:
