@@ -49,6 +49,7 @@ def test_whole_numbers_of_any_library_come_back_as_int():
         (lambda: checks.one_of("shape", "oval", ("disc", "square")), "shape is 'disc' or 'square', not 'oval'"),
         (lambda: checks.one_of("way", 3, ("a", "b", "c")), "way is 'a', 'b' or 'c', not 3"),
         (lambda: checks.one_of("way", "b", ("a",)), "way is 'a', not 'b'"),
+        (lambda: checks.one_of("way", "b", "acde"), "way is one of 'a', 'c', 'd' or 'e', not 'b'"),
         (lambda: checks.whole_number_between("bits", 17, 1, 16), "bits is a whole number from 1 to 16, not 17"),
         (
             lambda: checks.whole_number_between("sides", 2.0, 3, way_out="two make a biprism"),

@@ -39,7 +39,7 @@ def one_of(name: str, value: object, choices: Iterable[str]) -> str:
     words = list(choices)
     if value not in words:
         listed = " or ".join([*filter(None, [", ".join(map(repr, words[:-1]))]), repr(words[-1])])
-        raise InputError(f"{name} is {listed}, not {value!r}")
+        raise InputError(f"{name} is {'one of ' if len(words) > 3 else ''}{listed}, not {value!r}")
     return str(value)
 
 
