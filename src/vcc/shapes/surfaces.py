@@ -10,23 +10,13 @@ from numpy.typing import ArrayLike
 
 from vcc.base import checks
 from vcc.base.affine import Affine
-from vcc.shapes.height_maps import HeightMap, PathMap, Rough, Sheet
+from vcc.shapes.height_maps import HeightMap as HeightMap
+from vcc.shapes.height_maps import PathMap as PathMap
+from vcc.shapes.height_maps import Rough as Rough
+from vcc.shapes.height_maps import Sheet as Sheet
 from vcc.shapes.surface import Array, Surface, places
-from vcc.shapes.zernike import Zernike, noll
-
-__all__ = [
-    "Axicon",
-    "Cubic",
-    "HeightMap",
-    "PathMap",
-    "Quadratic",
-    "Rough",
-    "Sheet",
-    "Surface",
-    "Tilt",
-    "Zernike",
-    "noll",
-]
+from vcc.shapes.zernike import Zernike as Zernike
+from vcc.shapes.zernike import noll as noll
 
 
 @dataclass(frozen=True)
