@@ -14,7 +14,8 @@ from vcc.shapes.height_maps import HeightMap as HeightMap
 from vcc.shapes.height_maps import PathMap as PathMap
 from vcc.shapes.height_maps import Rough as Rough
 from vcc.shapes.height_maps import Sheet as Sheet
-from vcc.shapes.surface import Array, Surface, places
+from vcc.shapes.surface import Array, places
+from vcc.shapes.surface import Surface as Surface
 from vcc.shapes.zernike import Zernike as Zernike
 from vcc.shapes.zernike import noll as noll
 
