@@ -24,7 +24,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.sources.depth_kernels import draw_surface, fill_gaps
 from vcc.sources.views import CameraArray, ViewCamera
 
 Array = NDArray[np.float64]
@@ -204,6 +203,8 @@ class DepthMapScene:
         return np.asarray(1 - self._drawn(camera)[..., 3])
 
     def _drawn(self, camera: ViewCamera) -> NDArray[np.float32]:
+        from vcc.sources.depth_kernels import draw_surface, fill_gaps  # Numba takes a moment to import
+
         self._check(camera)
         if self._surfaces is None:
             self._surfaces = _surfaces(

@@ -22,7 +22,6 @@ from vcc.base.errors import InputError
 from vcc.light_field import LightField
 from vcc.plan.how import cores
 from vcc.shapes.patterns import overlap_share
-from vcc.sources.kernels import views_of_row
 from vcc.sources.textures import Array, Texture, mean_radiance_and_opacity, radiance_and_opacity
 from vcc.sources.views import CameraArray, ViewCamera
 
@@ -285,6 +284,8 @@ class PlanesScene:
         return picture
 
     def _from_rasters(self, camera: ViewCamera, slope: float) -> NDArray[np.float32]:
+        from vcc.sources.kernels import views_of_row  # Numba takes a moment to import
+
         # By how many pixels each plane is displaced in this view, negated: rows, columns
         middle = ((camera.top + camera.bottom) / 2, (camera.left + camera.right) / 2)
         place = (camera.y, camera.x)
@@ -462,6 +463,8 @@ def _fill(
     pool: ThreadPoolExecutor,
     progress: Callable[[int, int], None] | None,
 ) -> None:
+    from vcc.sources.kernels import views_of_row  # Numba takes a moment to import
+
     row, row_share = _starts(planes, grid, 0)
     column, column_share = _starts(planes, grid, 1)
     whole = values.dtype.kind == "u"
