@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.files.camera_file import ELEMENT_KINDS
+from vcc.camera_file import ELEMENT_KINDS
 from vcc.gallery.page import plain
 from vcc.sources import PlanesScene, TexturedPlane
 

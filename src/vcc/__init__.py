@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from vcc.base.errors import InputError as InputError
     from vcc.base.errors import ResultWarning as ResultWarning
     from vcc.camera import Camera as Camera
-    from vcc.files.camera_file import load_camera as load_camera
+    from vcc.camera_file import load_camera as load_camera
     from vcc.formats import open_light_field as open_light_field
     from vcc.image import Image as Image
     from vcc.light_field import LightField as LightField
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from vcc.optics.sensor import Sensor as Sensor
     from vcc.plan.how import How as How
     from vcc.prescriptions import load_lens as load_lens
-    from vcc.run.recording import Recording as Recording
-    from vcc.run.recording import expose_image as expose_image
-    from vcc.run.recording import photon_transfer as photon_transfer
+    from vcc.recording import Recording as Recording
+    from vcc.recording import expose_image as expose_image
+    from vcc.run.photon_transfer import photon_transfer as photon_transfer
 
 __version__ = VERSION
 
@@ -63,14 +63,14 @@ _HOMES = {
     "Prism": "vcc.optics",
     "PrismArray": "vcc.optics",
     "Pyramid": "vcc.optics",
-    "Recording": "vcc.run.recording",
+    "Recording": "vcc.recording",
     "ResultWarning": "vcc.base.errors",
     "Sensor": "vcc.optics.sensor",
-    "expose_image": "vcc.run.recording",
-    "load_camera": "vcc.files.camera_file",
+    "expose_image": "vcc.recording",
+    "load_camera": "vcc.camera_file",
     "load_lens": "vcc.prescriptions",
     "open_light_field": "vcc.formats",
-    "photon_transfer": "vcc.run.recording",
+    "photon_transfer": "vcc.run.photon_transfer",
 }
 _MODULES = {
     "analysis",

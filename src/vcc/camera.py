@@ -11,15 +11,17 @@ from vcc.advice.explain import Explanation, explained
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress
 from vcc.fields.samples import InMemory, Samples
+from vcc.files.camera_writing import write_train
 from vcc.image import Image
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
 from vcc.plan.how import How, Options
 from vcc.plan.model import Plan
 from vcc.plot.camera_plot import plot_camera
+from vcc.recording import Recording, recorded
 from vcc.run.drive import drive
+from vcc.run.expose import Exposure
 from vcc.run.operators import carried_to
-from vcc.run.recording import Recording, expose
 
 Field = TypeVar("Field", bound=InMemory)
 
@@ -158,8 +160,10 @@ class Camera(Train):
         Warns:
             ResultWarning: as `capture` and `vcc.expose_image`.
         """
-        further = {"how": how, "plan": plan, "progress": progress, **options}
-        return expose(self, light_field, exposure, seed=seed, radiance=radiance, ray_seed=ray_seed, **further)
+        chosen = How.of(how, {**options, "seed": ray_seed})
+        asked = Exposure(self.sensor, exposure, seed, radiance, chosen.threads)
+        asked.check_channels(light_field.grid.channels)  # before the work begins
+        return recorded(self.capture(light_field, chosen, plan=plan, progress=progress), asked)
 
     def explain(
         self,
@@ -213,7 +217,5 @@ class Camera(Train):
         return plot_camera(self, **options)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.files.camera_file`."""
-        from vcc.files.camera_file import save_camera
-
-        save_camera(self, path)
+        """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.camera_file`."""
+        write_train(self, path)

@@ -26,14 +26,16 @@ ROOMS = [
     "plan",
     "engines",
     "run",
+    "prescriptions",
     "files",
     "advice",
     "plot",
     "image",
+    "recording",
     "camera",
+    "camera_file",
     "light_field",
     "store",
-    "prescriptions",
     "formats",
     "sources",
     "analysis",
@@ -45,10 +47,10 @@ ROOMS = [
 ]
 """From the ground up: data and what is computed of it, the facades, and what is built on them."""
 
-FACADES = {"image", "camera", "light_field"}
+FACADES = {"image", "recording", "camera", "camera_file", "light_field"}
 """The classes that users meet: verbs on data below. Nothing before them in `ROOMS` knows of them."""
 
-FACES = {"affine", "camera_file", "errors", "kernels", "operators", "patterns", "surfaces", "units"}
+FACES = {"affine", "errors", "kernels", "operators", "patterns", "surfaces", "units"}
 """Modules by which users import what stands in a folder: nothing of ours imports them."""
 
 BY_NAME = {

@@ -78,6 +78,8 @@ def test_a_map_is_frozen_and_keeps_its_own_numbers():
 def test_equal_maps_are_equal_and_hash_alike():
     assert Affine.lens(0.1) == Affine.lens(0.1)
     assert hash(Affine.lens(0.1)) == hash(Affine.lens(0.1))
+    assert Affine.translation(0.0, 1.0) == Affine.translation(-0.0, 1.0)
+    assert hash(Affine.translation(0.0, 1.0)) == hash(Affine.translation(-0.0, 1.0))
     assert Affine.lens(0.1) != Affine.lens(0.2)
     assert Affine.identity(2) != Affine.identity(4)
     assert not Affine.identity(2).isclose(Affine.identity(4))

@@ -72,10 +72,10 @@ def test_a_camera_without_electronics_is_refused_before_the_light_field_is_read(
     [
         (["--exposure", "10"], "--exposure"),
         (["--exposure", "10 mm"], "--exposure"),
-        (["--exposure", "0 ms"], "above 0"),
+        (["--exposure", "0 ms"], "greater than 0"),
         (["--seed", "-1"], "seed is -1"),
         (["--seed", "1.5"], '--seed is "1.5": it is a whole number'),
-        (["--radiance", "0"], "radiance is 0"),
+        (["--radiance", "0"], "radiance is what a sample value of 1 stands for, greater than 0"),
         (["-o", "raw.exr"], ".tif, .tiff, .png, .npy"),
         (["--picture", "raw.gif"], ".png"),
     ],

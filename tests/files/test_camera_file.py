@@ -34,7 +34,10 @@ from vcc import (
     load_lens,
 )
 from vcc.base.units import deg, mm, nm, um
-from vcc.files.camera_file import ELEMENT_KINDS, KERNEL_NAMES, PATTERN_NAMES, SURFACE_NAMES, save_camera
+from vcc.camera_file import ELEMENT_KINDS, KERNEL_NAMES, PATTERN_NAMES, SURFACE_NAMES, save_camera
+from vcc.files.camera_reading import read_train
+from vcc.files.camera_writing import write_train
+from vcc.optics.train import Train
 from vcc.shapes import kernels, patterns, surfaces
 from vcc.shapes.lattice import CellApertures, CellBlock, Lattice
 from vcc.shapes.sheets import Product
@@ -94,6 +97,16 @@ def test_reads_the_documented_form(tmp_path, written):
     assert camera.elements[1].source == "mask.png"
     assert camera.elements[2] == Prism((0.01, 0), z=41 * mm, decentre=(1 * mm, -2 * mm))
     assert camera.sensor == Sensor(z=52 * mm, shape=(500, 400), pitch=48 * um)
+
+
+def test_an_optical_train_is_what_is_read_and_written(tmp_path, written):
+    camera = written(LENS + SENSOR)
+    train = read_train(tmp_path / "camera.toml")
+    assert type(train) is Train
+    assert (train.elements, train.sensor) == (camera.elements, camera.sensor)
+    write_train(train, tmp_path / "again.toml")
+    assert read_train(tmp_path / "again.toml") == train
+    assert load_camera(tmp_path / "again.toml") == camera
 
 
 @pytest.mark.parametrize(
@@ -572,7 +585,7 @@ MASK = r'element 2 \(mask "code"\): pattern'
         ),
         (
             SENSOR + "[sensor.electronics]\nfull_well = 0\n",
-            "camera.toml: sensor: electronics: full_well is 0.0: it is",
+            "camera.toml: sensor: electronics: full_well must be greater than 0 electrons, not 0.0",
         ),
         (SENSOR + "[sensor.electronics]\ncolor_filter = 5\n", "color_filter is 5: it is text in quotes"),
     ],

@@ -43,10 +43,13 @@ def test_a_diffuser_is_unbounded_round_or_rectangular():
     [
         ({"kernel": [[1.0]]}, "is an array: give the width of its cells in slope"),
         ({"kernel": [[0.7]], "slope_pitch": 1e-3}, r"sums to 0\.7, and must to 1.*normalise=True"),
-        ({"kernel": [[1.2, -0.2]], "slope_pitch": 1e-3}, r"not negative anywhere; at index \(0, 1\) it has -0\.2"),
+        (
+            {"kernel": [[1.2, -0.2]], "slope_pitch": 1e-3},
+            r"kernel's array must be 0 or more; at index \(0, 1\) there is -0\.2",
+        ),
         ({"kernel": [[math.nan]], "slope_pitch": 1e-3}, "finite numbers"),
         ({"kernel": [[1.0]], "slope_pitch": 0}, "slope_pitch .* greater than 0, not 0"),
-        ({"kernel": [1.0], "slope_pitch": 1e-3}, r"not shape \(1,\)"),
+        ({"kernel": [1.0], "slope_pitch": 1e-3}, r"not of shape \(1,\)"),
         ({"kernel": [[1.0], [1.0, 2.0]], "slope_pitch": 1e-3}, "rows of equally many numbers"),
         ({"kernel": "gaussian", "slope_pitch": 1e-3}, "Kernel or rows of equally many numbers, not str"),
         ({"kernel": KERNEL, "slope_pitch": 1e-3}, "are for an array, not for gaussian"),
@@ -104,20 +107,23 @@ def test_weights_are_normalised_only_when_asked():
         ({"kernels": (KERNEL, "top hat")}, "are vcc.kernels.Kernel, not str"),
         ({"kernels": TWO}, r"2 kernels and no weights: give an array \(2, rows, columns\)"),
         ({"kernels": KERNEL}, "alike everywhere, and that is vcc.Diffuser"),
-        ({"kernels": TWO, "weights": HALVES[0]}, r"shape \(2, rows, columns\).*not \(3, 3\)"),
-        ({"kernels": TWO, "weights": np.ones((3, 2, 2)) / 3}, r"not \(3, 2, 2\)"),
+        ({"kernels": TWO, "weights": HALVES[0]}, r"numbers \(2, rows, columns\).*not of shape \(3, 3\)"),
+        ({"kernels": TWO, "weights": np.ones((3, 2, 2)) / 3}, r"not of shape \(3, 2, 2\)"),
         ({"kernels": TWO, "weights": HALVES * 0.5}, r"sum to 0\.5 in cell \(0, 0\), and must to 1"),
         (
             {"kernels": TWO, "weights": HALVES * [[[1.0]], [[-1.0]]]},
             r"0 or more; at index \(1, 0, 1\) there is -1",
         ),
-        ({"kernels": TWO, "weights": HALVES * math.nan}, r"finite; at index \(0, 0, 0\) there is nan"),
+        ({"kernels": TWO, "weights": HALVES * math.nan}, r"finite numbers; at index \(0, 0, 0\) there is nan"),
         ({"kernels": TWO, "weights": HALVES * 0, "normalise": True}, r"all 0 in cell \(0, 0\)"),
-        ({"kernels": TWO, "weights": np.zeros((2, 0, 3))}, "are empty"),
-        ({"kernels": TWO, "weights": [[[1], [1, 2]]]}, "an array of numbers"),
+        ({"kernels": TWO, "weights": np.zeros((2, 0, 3))}, "not of shape \\(2, 0, 3\\)"),
+        (
+            {"kernels": TWO, "weights": [[[1], [1, 2]]]},
+            r"must be numbers \(2, rows, columns\).*not \[\[\[1\], \[1, 2\]\]\]",
+        ),
         ({"kernels": KERNEL, "widths": [[1, -0.5]]}, r"0 or more; at index \(0, 1\) there is -0\.5"),
         ({"kernels": KERNEL, "widths": [[0.0, 0.0]]}, "0 throughout"),
-        ({"kernels": KERNEL, "widths": [1.0]}, r"shape \(rows, columns\), not \(1,\)"),
+        ({"kernels": KERNEL, "widths": [1.0]}, r"numbers \(rows, columns\), not of shape \(1,\)"),
         ({"kernels": KERNEL, "widths": [[math.inf]]}, "must be finite"),
         (
             {"kernels": TWO, "weights": HALVES, "widths": [[1.0, 1.0]]},
@@ -166,9 +172,9 @@ def test_a_sheet_map_is_bilinear_between_the_middles_of_cells_and_flat_outside()
 @pytest.mark.parametrize(
     ("values", "width", "message"),
     [
-        ([1.0], 1.0, r"not \(1,\)"),
-        (np.zeros((2, 0)), 1.0, r"not \(2, 0\)"),
-        ([[math.nan]], 1.0, r"finite numbers; at index \(0, 0\) it has nan"),
+        ([1.0], 1.0, r"not of shape \(1,\)"),
+        (np.zeros((2, 0)), 1.0, r"not of shape \(2, 0\)"),
+        ([[math.nan]], 1.0, r"finite numbers; at index \(0, 0\) there is nan"),
         ([[1.0]], 0.0, "width of a map over a sheet"),
     ],
 )
@@ -183,7 +189,7 @@ def test_a_sheet_map_refuses_what_is_no_map(values, width, message):
         ({"kernels": ()}, "one kernel or more"),
         ({"kernels": (1.0,)}, "are vcc.kernels.Kernel, not float"),
         ({"kernels": TWO}, "2 kernels needs weights"),
-        ({"kernels": (KERNEL,), "largest_width": -1.0}, "largest_width is finite and 0 or more, not -1"),
+        ({"kernels": (KERNEL,), "largest_width": -1.0}, "largest_width must be 0 or more, not -1"),
     ],
 )
 def test_a_scatterer_refuses_what_it_cannot_be(arguments, message):
@@ -196,8 +202,11 @@ def test_a_scatterer_refuses_what_it_cannot_be(arguments, message):
     [
         ({"weights": lambda x, y: np.stack([x * 0, x * 0 + 2], -1)}, "sum to 1 at each place, not to"),
         ({"weights": lambda x, y: x}, re.escape("weights of a scatterer returned shape (3,) where (3, 2)")),
-        ({"weights": lambda x, y: np.stack([x * 0 + 2, x * 0 - 1], -1)}, "0 or more, not -1"),
-        ({"width": lambda x, y: x * math.nan}, "not finite"),
+        (
+            {"weights": lambda x, y: np.stack([x * 0 + 2, x * 0 - 1], -1)},
+            r"0 or more; at index \(0, 1\) there is -1",
+        ),
+        ({"width": lambda x, y: x * math.nan}, "width of a scatterer must be finite numbers"),
         ({"width": lambda x, y: x * 0 + 3}, "width reaches 3, above its largest_width 2"),
     ],
 )

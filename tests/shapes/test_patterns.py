@@ -235,10 +235,10 @@ def test_arrays_that_are_no_transmission_are_refused(values, message):
         (lambda: Cells(np.ones((2, 2)), 1.0, -1.0), "height of cells .* not -1.0"),
         (lambda: Circle(0.0), "diameter of circle must be greater than 0 m, not 0.0"),
         (lambda: Circle(math.nan), "diameter of circle .* not nan"),
-        (lambda: Polygon(2, 1.0), "3 sides or more, not 2"),
+        (lambda: Polygon(2, 1.0), "sides of polygon is a whole number, 3 or more, not 2"),
         (lambda: Polygon(5, -1.0), "diameter of polygon .* not -1.0"),
-        (lambda: CosineSum(0.0), "period of cosinesum .* not 0.0"),
-        (lambda: CosineSum(1.0, 0), "1 harmonic or more, not 0"),
+        (lambda: CosineSum(0.0), "period of cosine sum .* not 0.0"),
+        (lambda: CosineSum(1.0, 0), "harmonics of cosine sum is a whole number, 1 or more, not 0"),
         (lambda: as_pattern("circle"), "a pattern is .*, not str"),
     ],
 )

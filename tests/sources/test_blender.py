@@ -266,18 +266,17 @@ def test_scripts_are_python_3_10_and_need_nothing_but_blender():
     assert script.isascii()
 
 
-def test_what_the_script_cannot_say_is_refused():
-    for array, words in (
-        (CameraArray((3, 3), spacing=(1 * mm, 2 * mm)), "same spacing .* not 0.002 and 0.001"),
-        (CameraArray((3, 3), slope_per_pixel=(1e-3, 2e-3)), "same slope_per_pixel"),
-    ):
-        with pytest.raises(InputError, match=words):
-            blender_script(array)
-    for options, words in (
-        ({"picture_format": "jpg"}, 'exr, png, not "jpg"'),
-        ({"engine": "luxrender"}, "cycles, eevee"),
-        ({"samples": 0}, "samples .* not 0"),
-        ({"folder": " "}, "no name"),
-    ):
-        with pytest.raises(InputError, match=words):
-            blender_script(ARRAY, **options)
+@pytest.mark.parametrize(
+    ("array", "options", "words"),
+    [
+        ({"spacing": (1 * mm, 2 * mm)}, {}, "same spacing .* not 0.002 and 0.001"),
+        ({"slope_per_pixel": (1e-3, 2e-3)}, {}, "same slope_per_pixel"),
+        ({}, {"picture_format": "jpg"}, "picture_format is 'exr' or 'png', not 'jpg'"),
+        ({}, {"engine": "luxrender"}, "engine is .*'cycles' or 'eevee', not 'luxrender'"),
+        ({}, {"samples": 0}, "samples .* not 0"),
+        ({}, {"folder": " "}, "no name"),
+    ],
+)
+def test_what_the_script_cannot_say_is_refused(array, options, words):
+    with pytest.raises(InputError, match=words):
+        blender_script(CameraArray((3, 3), **array), **options)

@@ -205,30 +205,34 @@ def test_descriptions_tell_pictures_apart():
     assert all(other.description() != one for other in others)
 
 
-def test_what_cannot_be_is_refused():
-    picture, depth = np.full((20, 30), 0.5), np.full((20, 30), 2.0)
-    holes = depth.copy()
-    holes[3, 4] = 0
-    for arguments, words in (
-        ((np.zeros((20, 30, 2)), depth), "1 or 3 channels"),
-        ((picture, depth[:, 1:]), r"\(20, 29\), and the picture \(20, 30\)"),
-        ((picture - 1, depth), "radiance is"),
-        ((picture, holes), r"at \(3, 4\) \(row, column\) it is 0"),
-        ((picture, depth * np.nan), "it is nan"),
-    ):
-        with pytest.raises(InputError, match=words):
-            DepthMapScene(*arguments, 1e-3, reach=0.01)
-    for options, words in (
-        ({"slope_per_pixel": 0.0, "reach": 0.01}, "slope_per_pixel"),
-        ({"slope_per_pixel": 1e-3, "reach": -0.01}, "reach .* not -0.01"),
-        ({"slope_per_pixel": 1e-3, "reach": 0.01, "edge": 0.0}, "edge"),
-        ({"slope_per_pixel": 1e-3, "reach": 0.01, "supersampling": 0}, "supersampling"),
-        ({"slope_per_pixel": 1e-3, "reach": 0.01, "focus_distance": -1.0}, "focus_distance .* not -1"),
-        ({"slope_per_pixel": 1e-3, "reach": 1.0}, "500 pixels .* smaller reach"),
-    ):
-        with pytest.raises(InputError, match=words):
-            DepthMapScene(picture, depth, **options)
-    scene = DepthMapScene(picture, depth, 1e-3, reach=0.01)
+PLAIN, FLAT = np.full((20, 30), 0.5), np.full((20, 30), 2.0)
+HOLES = np.where(np.arange(600).reshape(20, 30) == 3 * 30 + 4, 0.0, FLAT)
+
+
+@pytest.mark.parametrize(
+    ("radiance", "depth", "options", "words"),
+    [
+        (np.zeros((20, 30, 2)), FLAT, {}, "1 or 3 channels"),
+        (PLAIN, FLAT[:, 1:], {}, r"\(20, 29\), and the picture \(20, 30\)"),
+        (PLAIN - 1, FLAT, {}, "radiance must be 0 or more; at index .* there is -0.5"),
+        (PLAIN * np.nan, FLAT, {}, "radiance must be finite numbers; at index .* there is nan"),
+        (PLAIN, HOLES, {}, r"at \(3, 4\) \(row, column\) it is 0"),
+        (PLAIN, FLAT * np.nan, {}, "it is nan"),
+        (PLAIN, FLAT, {"slope_per_pixel": 0.0}, "slope_per_pixel"),
+        (PLAIN, FLAT, {"reach": -0.01}, "reach .* not -0.01"),
+        (PLAIN, FLAT, {"edge": 0.0}, "edge"),
+        (PLAIN, FLAT, {"supersampling": 0}, "supersampling"),
+        (PLAIN, FLAT, {"focus_distance": -1.0}, "focus_distance .* not -1"),
+        (PLAIN, FLAT, {"reach": 1.0}, "500 pixels .* smaller reach"),
+    ],
+)
+def test_what_cannot_be_is_refused(radiance, depth, options, words):
+    with pytest.raises(InputError, match=words):
+        DepthMapScene(radiance, depth, **{"slope_per_pixel": 1e-3, "reach": 0.01, **options})
+
+
+def test_views_that_look_past_the_picture_are_refused():
+    scene = DepthMapScene(PLAIN, FLAT, 1e-3, reach=0.01)
     with pytest.raises(InputError, match=r"view \(0, 0\) is 0.05 m from the middle.*reach=0.05"):
         scene.render(CameraArray((1, 3), (20, 30), 0.05).camera(0, 0))
     with pytest.raises(InputError, match="to a side, and the picture"):

@@ -228,57 +228,67 @@ def test_descriptions_tell_pictures_apart():
         assert other.description() != one
 
 
-def test_what_cannot_be_drawn_is_refused(tmp_path, monkeypatch):
-    target = disc((0, 0, -1), 0.1)
-    (tmp_path / "broken.glb").write_bytes(b"glTF\x02\x00\x00\x00\xff\xff\x00\x00rest")
-    (tmp_path / "bare.obj").write_text("mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    (tmp_path / "pale.obj").write_text("mtllib pale.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+TARGET = disc((0, 0, -1), 0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("none.glb", None, "no mesh file .*none.glb"),
+        ("scene.blend", None, 'ending ".blend"'),
+        ("broken.glb", b"glTF\x02\x00\x00\x00\xff\xff\x00\x00rest", "broken.glb cannot be read"),
+        ("bare.obj", b"mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "material file none.mtl"),
+        ("pale.obj", b"mtllib pale.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "my wood.png"),
+        ("points.ply", trimesh.PointCloud(np.eye(3)).export(file_type="ply"), "points.ply holds no triangles"),
+    ],
+)
+def test_files_that_cannot_be_drawn_are_refused(tmp_path, name, content, words):
     (tmp_path / "pale.mtl").write_text("newmtl a\nmap_Kd my wood.png\n")
-    trimesh.PointCloud(np.eye(3)).export(tmp_path / "points.ply")
-    for mesh, words in (
-        ([], "no meshes"),
-        (tmp_path / "none.glb", "no mesh file .*none.glb"),
-        (tmp_path / "scene.blend", 'ending ".blend"'),
-        (tmp_path / "broken.glb", "broken.glb cannot be read"),
-        (tmp_path / "bare.obj", "material file none.mtl"),
-        (tmp_path / "pale.obj", "my wood.png"),
-        (tmp_path / "points.ply", "points.ply holds no triangles"),
-        (3, "not int"),
-        (disc((0, 0, 1), 0.1), "behind the cameras"),
-    ):
-        with pytest.raises(InputError, match=words):
-            OpenGLRenderer(mesh)
-    for options, words in (
-        ({"supersampling": 0}, "supersampling .* not 0"),
-        ({"multisampling": 2.5}, "multisampling"),
-        ({"background": (0, -1, 0)}, "background"),
-    ):
-        with pytest.raises(InputError, match=words):
-            OpenGLRenderer(target, **options)
-    with pytest.raises(InputError, match="both are"):
-        Viewpoint((1, 1, 1), (1, 1, 1))
-    with pytest.raises(InputError, match="along the view"):
-        Viewpoint(up=(0, 0, 2))
-    with pytest.raises(InputError, match="unit"):
-        Viewpoint(unit=0)
-    with pytest.raises(InputError, match="sun is light"):
-        Lighting(sun=(1, -1, 0))
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=words):
+        OpenGLRenderer(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: OpenGLRenderer([]), "no meshes"),
+        (lambda: OpenGLRenderer(3), "not int"),
+        (lambda: OpenGLRenderer(disc((0, 0, 1), 0.1)), "behind the cameras"),
+        (lambda: OpenGLRenderer(TARGET, supersampling=0), "supersampling .* not 0"),
+        (lambda: OpenGLRenderer(TARGET, multisampling=2.5), "multisampling"),
+        (lambda: OpenGLRenderer(TARGET, background=(0, -1, 0)), "background"),
+        (lambda: Viewpoint((1, 1, 1), (1, 1, 1)), "both are"),
+        (lambda: Viewpoint(up=(0, 0, 2)), "along the view"),
+        (lambda: Viewpoint(unit=0), "unit"),
+        (lambda: Lighting(sun=(1, -1, 0)), "sun is light"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(call, words):
+    with pytest.raises(InputError, match=words):
+        call()
+
+
+def test_what_this_machine_cannot_draw_is_refused(monkeypatch):
     context = moderngl.create_context(standalone=True, backend="egl")
     most = context.max_samples
     context.release()
     if most < 16:
         with pytest.raises(InputError, match="multisampling is 16, and the OpenGL here"):
-            drawn(OpenGLRenderer(target, multisampling=16))
+            drawn(OpenGLRenderer(TARGET, multisampling=16))
     with pytest.raises(InputError, match=r"draws up to .* each way"):
-        drawn(OpenGLRenderer(target), 0, 0, CameraArray((1, 1), (1, 40000)))
+        drawn(OpenGLRenderer(TARGET), 0, 0, CameraArray((1, 1), (1, 40000)))
     monkeypatch.setattr(
         moderngl, "create_context", lambda **_: (_ for _ in ()).throw(Exception("libEGL.so not found"))
     )
     with pytest.raises(InputError, match=r"libEGL.so not found.*apt install libegl1"):
-        drawn(OpenGLRenderer(target))
-    monkeypatch.setitem(sys.modules, "moderngl", None)
-    with pytest.raises(InputError, match=r"\[opengl\]"):
-        drawn(OpenGLRenderer(target))
-    monkeypatch.setitem(sys.modules, "trimesh", None)
-    with pytest.raises(InputError, match=r"\[opengl\]"):
-        OpenGLRenderer(target)
+        drawn(OpenGLRenderer(TARGET))
+
+
+@pytest.mark.parametrize("package", ["moderngl", "trimesh"])
+def test_packages_that_are_missing_are_named(monkeypatch, package):
+    renderer = OpenGLRenderer(TARGET)
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(InputError, match=rf"needs the package {package}: .*\[opengl\]"):
+        drawn(renderer) if package == "moderngl" else OpenGLRenderer(TARGET)

@@ -147,23 +147,31 @@ def test_glyphs() -> None:
         glyphs("Aü")
 
 
-def test_what_cannot_be_is_refused() -> None:
-    scene = PlanesScene([TexturedPlane(Uniform(), 1.0)])
-    with pytest.raises(vcc.InputError, match="at least one plane"):
-        PlanesScene([])
-    with pytest.raises(vcc.InputError, match="distance of a plane"):
-        TexturedPlane(Uniform(), 0.0)
-    with pytest.raises(vcc.InputError, match="opacity"):
-        TexturedPlane(Uniform(), 1.0, opacity=2.0)
-    with pytest.raises(vcc.InputError, match="width"):
-        TexturedPlane(Uniform(), 1.0, width=-1.0)
-    with pytest.raises(vcc.InputError, match="spacing"):
-        scene.light_field((1, 1), (2, 2), spacing=0.0, slope_per_pixel=SLOPE)
-    with pytest.raises(vcc.InputError, match="uint8"):
-        scene.light_field((1, 1), (2, 2), **GEOMETRY, dtype="int32")
-    with pytest.raises(vcc.InputError, match="at least one"):
-        scene.light_field((0, 1), (2, 2), **GEOMETRY)
-    with pytest.raises(vcc.InputError, match="returned shape"):
-        TexturedPlane(lambda x, y: np.zeros((3, 7)), 1.0).at(np.zeros(5), np.zeros(5))
-    with pytest.raises(vcc.InputError, match="width of a picture"):
-        Picture(np.ones((2, 2)), width=0.0)
+def plane(**options) -> TexturedPlane:
+    return TexturedPlane(**{"texture": Uniform(), "distance": 1.0, **options})
+
+
+def scene_sampled(views, **options):
+    return PlanesScene([plane()]).light_field(views, (2, 2), **{**GEOMETRY, **options})
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: PlanesScene([]), "at least one plane"),
+        (lambda: plane(distance=0.0), "distance of a plane must be greater than 0 m, not 0.0"),
+        (lambda: plane(opacity=2.0), "opacity of a plane must be from 0 to 1, not 2.0"),
+        (lambda: plane(width=-1.0), "width of a plane must be greater than 0 m, not -1.0"),
+        (lambda: plane(height=0.0), "height of a plane must be greater than 0 m, not 0.0"),
+        (lambda: plane(yaw=math.inf), "yaw of a plane must be a finite number of radians, not inf"),
+        (lambda: scene_sampled((1, 1), spacing=0.0), "spacing"),
+        (lambda: scene_sampled((1, 1), dtype="int32"), "uint8"),
+        (lambda: scene_sampled((0, 1)), "at least one"),
+        (lambda: plane(texture=lambda x, y: np.zeros((3, 7))).at(np.zeros(5), np.zeros(5)), "returned shape"),
+        (lambda: Picture(np.ones((2, 2)), width=0.0), "width of a picture must be greater than 0 m, not 0.0"),
+        (lambda: Picture(np.full((2, 2), -1), width=1.0), "picture on a plane must be 0 or more"),
+    ],
+)
+def test_what_cannot_be_is_refused(call, words) -> None:
+    with pytest.raises(vcc.InputError, match=words):
+        call()

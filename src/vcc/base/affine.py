@@ -209,7 +209,7 @@ class Affine:
         return isinstance(other, Affine) and np.array_equal(self.matrix, other.matrix)
 
     def __hash__(self) -> int:
-        return hash(self.matrix.tobytes())
+        return hash((self.matrix + 0.0).tobytes())  # -0.0 equals 0.0
 
     def __repr__(self) -> str:
         rows = np.array2string(self.matrix, precision=6, suppress_small=True, prefix="Affine(")

@@ -1,20 +1,28 @@
-"""Refusals that many places share: each names the thing, its value and the way out."""
+"""Refusals that many places share: each names the thing, its value and the way out.
+
+A refusal that says something special is worded where it is made; what is said in many places is said here.
+Numbers of any library count as numbers; truth values and text do not.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+import operator
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 
+Array = NDArray[np.float64]
 
-def whole_number(value: object) -> int | None:
-    """A whole number as an int; None for anything else, truth values and 2.0 included."""
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
-        return None
-    return int(value)
+LONGEST_SHOWN = 60
+"""Characters of what was given instead of an array, to be shown in an error."""
+
+# --- words ---
 
 
 def one_of(name: str, value: object, choices: Iterable[str]) -> str:
@@ -30,11 +38,46 @@ def one_of(name: str, value: object, choices: Iterable[str]) -> str:
     """
     words = list(choices)
     if value not in words:
-        listed = ", ".join(map(repr, words[:-1])) + f" or {words[-1]!r}"
-        raise InputError(
-            f"{name} is one of {listed}, not {value!r}" if len(words) > 3 else f"{name} is {listed}, not {value!r}"
-        )
+        listed = " or ".join([*filter(None, [", ".join(map(repr, words[:-1]))]), repr(words[-1])])
+        raise InputError(f"{name} is {'one of ' if len(words) > 3 else ''}{listed}, not {value!r}")
     return str(value)
+
+
+# --- whole numbers ---
+
+
+def whole_number(value: object) -> int | None:
+    """A whole number of any library as an int; None for anything else, truth values and 2.0 included."""
+    if isinstance(value, bool | np.bool_):
+        return None
+    try:
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        return None
+
+
+def whole_number_between(
+    name: str, value: object, least: int, most: int | None = None, *, of: str = "", way_out: str = ""
+) -> int:
+    """A whole number within a range, as an int.
+
+    Args:
+        name: what to call it in an error.
+        value: the number; truth values and floating-point numbers are none.
+        least: the smallest that it may be.
+        most: the largest; None has none.
+        of: what it counts, for the error, such as "rays a pixel".
+        way_out: what to do instead, for the error.
+
+    Raises:
+        InputError: anything else.
+    """
+    number = whole_number(value)
+    if number is None or number < least or (most is not None and number > most):
+        what = f"a whole number of {of}" if of else "a whole number"
+        limits = f", {least} or more" if most is None else f" from {least} to {most}"
+        raise InputError(f"{name} is {what}{limits}, not {_told(value)}{_and(way_out)}")
+    return number
 
 
 def seed(value: object, name: str = "seed") -> int:
@@ -53,21 +96,276 @@ def seed(value: object, name: str = "seed") -> int:
     return number
 
 
-def above_zero(name: str, value: Any, what: str = "") -> float:
+# --- numbers ---
+
+
+def above_zero(
+    name: str,
+    value: object,
+    what: str = "",
+    *,
+    unit: str = "",
+    most: float = math.inf,
+    infinite: bool = False,
+    way_out: str = "",
+) -> float:
     """A number greater than 0, as a float.
 
     Args:
         name: what to call it in an error.
         value: the number.
         what: it is, for the error, such as "a share of the picture's mean".
+        unit: of the number, for the error, such as "m".
+        most: the largest that it may be.
+        infinite: whether it may be infinite.
+        way_out: what to do instead, for the error.
 
     Raises:
         InputError: anything else, NaN included.
     """
+    number = _number(value)
+    if number > 0 and number <= most and (infinite or math.isfinite(number)):
+        return number
+    limit = "" if math.isinf(most) else f" and at most {_with(most, unit)}"
+    wanted = f"greater than {_with(0, unit)}{limit}"
+    raise InputError(f"{name} {f'is {what},' if what else 'must be'} {wanted}, not {_told(value)}{_and(way_out)}")
+
+
+def zero_or_more(name: str, value: object, *, unit: str = "", most: float = math.inf, way_out: str = "") -> float:
+    """A finite number of 0 or more, as a float; arguments as for `above_zero`.
+
+    Raises:
+        InputError: anything else, NaN included.
+    """
+    number = _number(value)
+    if 0 <= number <= most and math.isfinite(number):
+        return number
+    wanted = f"{_with(0, unit)} or more" if math.isinf(most) else f"from 0 to {_with(most, unit)}"
+    raise InputError(f"{name} must be {wanted}, not {_told(value)}{_and(way_out)}")
+
+
+def finite(name: str, value: object, of: str = "") -> float:
+    """A finite number, as a float.
+
+    Args:
+        name: what to call it in an error.
+        value: the number.
+        of: what it counts, for the error, such as "metres".
+
+    Raises:
+        InputError: anything else.
+    """
+    number = _number(value)
+    if not math.isfinite(number):
+        raise InputError(f"{name} must be a finite number{f' of {of}' if of else ''}, not {_told(value)}")
+    return number
+
+
+def not_zero(name: str, value: object, *, unit: str = "m", way_out: str = "") -> float:
+    """A number other than 0, which may be infinite, as a float: a focal length, a radius of curvature.
+
+    Args:
+        name: what to call it in an error.
+        value: the number.
+        unit: of the number, for the error.
+        way_out: what to do instead, for the error.
+
+    Raises:
+        InputError: 0, NaN or no number.
+    """
+    number = _number(value)
+    if number == 0 or math.isnan(number):
+        raise InputError(f"{name} is {_told(value)} {unit}: it must not be 0{_and(way_out)}")
+    return number
+
+
+def pair(name: str, value: Any, what: str) -> tuple[float, float]:
+    """Two finite numbers, as floats.
+
+    Args:
+        name: what to call them in an error.
+        value: the numbers.
+        what: they are, for the error, such as "(x, y) in metres".
+
+    Raises:
+        InputError: anything else.
+    """
     try:
-        fine = bool(value > 0)
-    except TypeError:
-        fine = False
-    if not fine:
-        raise InputError(f"{name} {f'is {what}, ' if what else 'must be '}greater than 0, not {value!r}")
-    return float(value)
+        one, other = map(_number, value)
+    except (TypeError, ValueError):
+        one = other = math.nan
+    if not (math.isfinite(one) and math.isfinite(other)):
+        raise InputError(f"{name} is {what}, not {_told(value)}")
+    return one, other
+
+
+# --- sizes of things ---
+
+
+def sizes(of: str, *, way_out: str = "", **given: float | None) -> None:
+    """Refuse sizes that are neither finite and greater than 0 m nor left out (None).
+
+    Args:
+        of: whose, for an error, such as 'lens "L1"'.
+        way_out: what to do instead, for the error.
+        given: the sizes by their names, metres.
+
+    Raises:
+        InputError: a size of 0 or less, or not finite.
+    """
+    for name, size in given.items():
+        if size is not None:
+            above_zero(f"{name} of {of}", size, unit="m", way_out=way_out)
+
+
+def opening(of: str, width: float | None, height: float | None, diameter: float | None = None) -> None:
+    """Refuse an opening of which parts do not fit: round by a diameter, or rectangular, or none at all.
+
+    Args:
+        of: whose, for an error.
+        width: metres.
+        height: metres; None makes it square.
+        diameter: metres.
+
+    Raises:
+        InputError: a size of 0 or less, a diameter together with another size, or a height without a width.
+    """
+    sizes(of, diameter=diameter, width=width, height=height)
+    if diameter is not None and (width is not None or height is not None):
+        raise InputError(f"{of} has a diameter and a width or height: give one, round or rectangular")
+    if height is not None and width is None:
+        raise InputError(f"{of} has a height and no width: give both, or a width alone for a square")
+
+
+# --- arrays ---
+
+
+def array(name: str, given: object, what: str, *shape: int | None, least: int = 1) -> Array:
+    """Finite numbers as an array of their own, float64, that cannot be written to.
+
+    Args:
+        name: what to call them in an error, such as "slopes of the array".
+        given: the numbers.
+        what: they must be, for the error, such as "numbers (rows, columns)".
+        shape: the lengths of the axes; None for any of ``least`` or more.
+        least: the shortest that such an axis may be.
+
+    Raises:
+        InputError: no array of numbers, another shape, or numbers that are not finite.
+    """
+    try:
+        values = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        shown = repr(given) if len(repr(given)) <= LONGEST_SHOWN else f"a {type(given).__name__} that holds others"
+        raise InputError(f"{name} must be {what}, not {shown}") from None
+    fits = values.ndim == len(shape) and all(
+        length >= least if wanted is None else length == wanted
+        for length, wanted in zip(values.shape, shape, strict=True)
+    )
+    if not fits:
+        raise InputError(f"{name} must be {what}, not of shape {values.shape}")
+    all_finite(name, values)
+    values.flags.writeable = False
+    return values
+
+
+def all_finite(name: str, values: Array) -> None:
+    """Refuse an array that holds NaN or infinity.
+
+    Args:
+        name: what to call it in an error.
+        values: of any shape.
+
+    Raises:
+        InputError: it does; the first place is named.
+    """
+    good = np.isfinite(values)
+    if not good.all():
+        raise InputError(f"{name} must be finite numbers; at index {_place(~good)} there is {values[~good][0]}")
+
+
+def none_negative(name: str, values: Array) -> None:
+    """Refuse an array of finite numbers that holds one below 0.
+
+    Args:
+        name: what to call it in an error.
+        values: of any shape.
+
+    Raises:
+        InputError: it does; the place of the lowest is named.
+    """
+    lowest = values.min(initial=0.0)
+    if lowest < 0:
+        raise InputError(f"{name} must be 0 or more; at index {_place(values == lowest)} there is {lowest:g}")
+
+
+# --- around what may be refused ---
+
+
+@contextmanager
+def within(place: str) -> Iterator[None]:
+    """Refusals within this name a place, unless they do already: a file, an element.
+
+    Args:
+        place: such as ``'camera.toml: element 2'``.
+
+    Raises:
+        InputError: what is raised within, with the place before it.
+    """
+    try:
+        yield
+    except InputError as error:
+        said = str(error)
+        raise InputError(said if place in said else f"{place}: {said}") from None
+
+
+@contextmanager
+def package(doing: str, name: str, extra: str, way_out: str = "") -> Iterator[None]:
+    """Imports of optional packages stand within this, which says how to install them.
+
+    Args:
+        doing: what needs it, such as "reading meshes".
+        name: of the package, as it is installed.
+        extra: of this package that brings it.
+        way_out: what to do without, for the error.
+
+    Raises:
+        InputError: it is not installed, or does not load.
+    """
+    try:
+        yield
+    except ImportError as error:
+        fault = "" if isinstance(error, ModuleNotFoundError) else f" ({error})"
+        raise InputError(
+            f'{doing} needs the package {name}{fault}: pip install "virtual-computational-camera[{extra}]"'
+            f"{_and(way_out)}"
+        ) from error
+
+
+# --- words of refusals ---
+
+
+def _number(value: Any) -> float:
+    """A number as a float; NaN for truth values, text and whatever else is none."""
+    if isinstance(value, bool | np.bool_ | str | bytes):
+        return math.nan
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def _told(value: Any) -> str:
+    return repr(value.item() if isinstance(value, np.generic) else value)
+
+
+def _with(number: float, unit: str) -> str:
+    return f"{number:g} {unit}".rstrip()
+
+
+def _and(way_out: str) -> str:
+    return f"; {way_out}" if way_out else ""
+
+
+def _place(found: NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(int(n) for n in np.argwhere(found)[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any
 
@@ -36,6 +37,21 @@ def parameters_in_words(thing: Any, leave_out: tuple[str, ...] = ()) -> str:
         else:
             parts.append(f"{name} {_value(value, parameter.metadata.get('unit'))}")
     return ", ".join(parts)
+
+
+def kind_in_words(kind: type, gap: str = " ") -> str:
+    """The name of a class in small letters: ``"lens array"`` for LensArray.
+
+    Args:
+        kind: the class.
+        gap: what stands between its words.
+    """
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", gap, kind.__name__).lower()
+
+
+def with_parameters(name: str, parameters: str) -> str:
+    """A name, and parameters in brackets if there are any: ``"circle (diameter 3 mm)"``."""
+    return f"{name} ({parameters})" if parameters else name
 
 
 def is_default(value: Any, parameter: Field[Any]) -> bool:
@@ -72,9 +88,7 @@ def _value(value: Any, unit: str | None) -> str:
     if described is not None:
         return str(described())
     if is_dataclass(value) and not isinstance(value, type):
-        kind = type(value).__name__
-        words = parameters_in_words(value)
-        return f"{kind} ({words})" if words else kind
+        return with_parameters(type(value).__name__, parameters_in_words(value))
     # A function has a name; what has neither that nor words of its own may print itself at any length.
     return str(getattr(value, "__name__", None) or (value if isinstance(value, str) else type(value).__name__))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Hashable
+from numbers import Number
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,9 @@ class Value:
     def __hash__(self) -> int:
         return hash(content(self))
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_content"}  # it may hold identities
+
 
 def content(thing: Any) -> Hashable:
     """What two things of equal content have in common: a key that is equal when they are.
@@ -33,7 +37,8 @@ def content(thing: Any) -> Hashable:
             hashable nor any of these counts by its identity.
     """
     if isinstance(thing, np.ndarray):
-        digest = hashlib.sha256(np.ascontiguousarray(thing).view(np.uint8).reshape(-1).data).digest()
+        plain = np.ascontiguousarray(thing + 0 if thing.dtype.kind == "f" else thing)  # -0.0 equals 0.0
+        digest = hashlib.sha256(plain.view(np.uint8).reshape(-1).data).digest()
         return ("array", str(thing.dtype), thing.shape, digest)
     if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
         kept = vars(thing).get("_content")
@@ -51,4 +56,4 @@ def content(thing: Any) -> Hashable:
         hash(thing)
     except TypeError:
         return ("identity", id(thing))
-    return (type(thing), thing)  # 1, 1.0 and True differ
+    return thing if isinstance(thing, Number) else (type(thing), thing)  # 1 and 1.0 are equal

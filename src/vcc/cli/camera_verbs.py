@@ -10,7 +10,7 @@ from vcc.camera import Camera
 from vcc.fields.samples import Samples
 from vcc.image import Image
 from vcc.plan.how import How
-from vcc.run.recording import Recording
+from vcc.recording import Recording
 
 SAMPLES_WORTH_A_BAR = 3e8
 """Below this, a picture takes less than a second, and asking for progress would only slow it down."""

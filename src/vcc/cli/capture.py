@@ -1,9 +1,9 @@
 """``vcc capture``: the picture that a camera records."""
 
+from vcc.camera_file import load_camera
 from vcc.cli.camera_verbs import captured
 from vcc.cli.console import check_output, progress, show
 from vcc.cli.options import CameraFile, Factor, LightFieldFile, Making, Output, Reading
-from vcc.files.camera_file import load_camera
 from vcc.files.pictures import WRITE_ENDINGS
 
 

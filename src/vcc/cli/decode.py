@@ -12,12 +12,12 @@ from cyclopts import Group, Parameter
 from vcc import __version__
 from vcc.base.errors import InputError
 from vcc.camera import Camera
+from vcc.camera_file import load_camera
 from vcc.cli.console import free_output, progress, show
 from vcc.cli.decode_cosines import Cosines, through_a_mask
 from vcc.cli.decode_lenslets import Lenslets, through_lenslets
 from vcc.cli.options import Factor, FolderNames, OutputFile, Overwrite, told
 from vcc.cli.raw_recordings import Recorded
-from vcc.files.camera_file import load_camera
 from vcc.formats.writing import kind_of, save_light_field
 from vcc.light_field import LightField
 from vcc.optics import LensArray, Mask

@@ -15,7 +15,7 @@ from vcc.cli.raw_recordings import Recorded, read_raw
 from vcc.light_field import LightField
 from vcc.optics.electronics import Electronics
 from vcc.recover import decode_heterodyne
-from vcc.run.recording import demosaic
+from vcc.run.demosaic import demosaic
 
 
 @Parameter(name="*", group=Group("A camera with a mask of cosines", sort_key=3))

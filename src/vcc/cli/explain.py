@@ -1,9 +1,9 @@
 """``vcc explain``: how a picture would be made."""
 
+from vcc.camera_file import load_camera
 from vcc.cli.camera_verbs import explained
 from vcc.cli.console import show
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Reading
-from vcc.files.camera_file import load_camera
 
 
 def explain(

@@ -5,12 +5,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from vcc.camera_file import load_camera
 from vcc.cli.camera_verbs import exposed
 from vcc.cli.console import check_output, show
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time, Whole
-from vcc.files.camera_file import load_camera
 from vcc.files.pictures import RAW_ENDINGS, WRITE_ENDINGS
-from vcc.run.recording import electronics_of
+from vcc.run.expose import electronics_of
 
 
 def expose(

@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from vcc.base.errors import InputError
+from vcc.camera_file import load_camera
 from vcc.cli.console import DRAWINGS, check_output, save_figure
 from vcc.cli.options import CameraFile, Output, Reading, length, quantity
-from vcc.files.camera_file import load_camera
 from vcc.plot import plot_camera, plot_phase_space_stages
 
 

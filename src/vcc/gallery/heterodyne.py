@@ -24,10 +24,10 @@ from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
 from vcc.optics.electronics import Electronics
 from vcc.optics.sensor import Sensor
+from vcc.recording import expose_image
 from vcc.recover import decode_heterodyne, heterodyne_calibration, refocused
 from vcc.recover.heterodyne import PINHOLE_SHARE, HeterodyneGeometry
 from vcc.recover.heterodyne_band import band_limited, places_on_sensor, true_views
-from vcc.run.recording import expose_image
 from vcc.shapes.patterns import CosineSum, Open
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench

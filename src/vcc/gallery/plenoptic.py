@@ -23,8 +23,8 @@ from vcc.light_field import LightField
 from vcc.optics import Lens, LensArray, PhasePlate
 from vcc.optics.electronics import Electronics
 from vcc.optics.sensor import Sensor
+from vcc.recording import expose_image
 from vcc.recover import LensletGrid, decode_plenoptic, without_aberration
-from vcc.run.recording import expose_image
 from vcc.shapes.patterns import Circle
 from vcc.shapes.surfaces import Surface, Zernike
 from vcc.showcase import figures

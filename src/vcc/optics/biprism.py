@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.optics.deflections import FacetDeflection
 from vcc.optics.faces import Element, Faces
@@ -65,7 +66,7 @@ class Pyramid(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not (self.sides >= 3 and self.sides % 1 == 0):
+        if not (self.sides >= 3 and self.sides % 1 == 0):  # 3.0 will do
             raise InputError(
                 f"sides of {self.label} is a whole number, 3 or more, not {self.sides}; "
                 "two sides make a vcc.Biprism"
@@ -79,13 +80,8 @@ class Pyramid(Element):
 
 def _check(element: Biprism | Pyramid) -> None:
     for name in ("deflection", "rotation"):
-        if not math.isfinite(getattr(element, name)):
-            raise InputError(f"{name} of {element.label} must be a finite number, not {getattr(element, name)}")
-    if element.diameter is not None and not (element.diameter > 0 and math.isfinite(element.diameter)):
-        raise InputError(
-            f"diameter of {element.label} must be greater than 0 m, not {element.diameter}; "
-            "leave it out for one without a rim"
-        )
+        checks.finite(f"{name} of {element.label}", getattr(element, name))
+    checks.sizes(element.label, diameter=element.diameter, way_out="leave it out for one without a rim")
 
 
 def _facets(element: Biprism | Pyramid, number: int) -> Faces:

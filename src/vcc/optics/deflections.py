@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.shapes.lattice import Lattice
@@ -62,8 +63,8 @@ class CellDeflection(Deflection):
                 "cells have tables of powers (rows, columns) and of slopes (rows, columns, 2), "
                 f"not {powers.shape} and {slopes.shape}"
             )
-        if not (np.isfinite(powers).all() and np.isfinite(slopes).all()):
-            raise InputError("powers and slopes of cells must be finite numbers")
+        checks.all_finite("powers of cells", powers)
+        checks.all_finite("slopes of cells", slopes)
         object.__setattr__(self, "powers", powers)
         object.__setattr__(self, "slopes", slopes)
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.units import short
+from vcc.base.values import Value
 from vcc.optics.faces import Element, Faces
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.shapes.kernels import SUM_TOLERANCE, Kernel, Samples
@@ -47,12 +49,7 @@ class Diffuser(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("diameter", "width", "height"):
-            _check_size(self, name)
-        if self.diameter is not None and (self.width is not None or self.height is not None):
-            raise InputError(f"{self.label} has a diameter and a width or height: give one, round or rectangular")
-        if self.height is not None and self.width is None:
-            raise InputError(f"{self.label} has a height and no width: give both, or a width alone for a square")
+        checks.opening(self.label, self.width, self.height, self.diameter)
         object.__setattr__(self, "kernel", self._as_kernel())
         # What only says how to read an array is spent, so that equal diffusers have equal parameters.
         object.__setattr__(self, "slope_pitch", None)
@@ -93,7 +90,7 @@ class Diffuser(Element):
 
 
 @dataclass(frozen=True, eq=False)
-class CodedDiffuser(Element):
+class CodedDiffuser(Value, Element):
     """A diffuser whose kernel varies over its surface: D(δs, δt | u, v) (paper, eq. 6).
 
     D(δ | u, v) = Σₙ weightₙ(u, v) · Dₙ(δ / w(u, v)) / w(u, v)²: kernels mixed by weights, stretched by w.
@@ -126,8 +123,7 @@ class CodedDiffuser(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("width", "height"):
-            _check_size(self, name)
+        checks.sizes(self.label, width=self.width, height=self.height)
         kernels = (self.kernels,) if isinstance(self.kernels, Kernel) else tuple(self.kernels)
         for kernel in kernels:
             if not isinstance(kernel, Kernel):
@@ -158,12 +154,8 @@ class CodedDiffuser(Element):
                     f"{self.label} has one kernel and no widths: it is alike everywhere, and that is vcc.Diffuser"
                 )
             return None
-        weights = self._checked_map("weights", self.weights)
-        if weights.ndim != 3 or weights.shape[0] != kernels:
-            raise InputError(
-                f"weights of {self.label} have shape ({kernels}, rows, columns), one map a kernel, "
-                f"not {weights.shape}"
-            )
+        shape = f"({kernels}, rows, columns), one map a kernel"
+        weights = self._checked_map("weights", self.weights, shape, kernels)
         sums = weights.sum(axis=0)
         worst = tuple(int(n) for n in np.unravel_index(np.abs(sums - 1).argmax(), sums.shape))
         if self.normalise:
@@ -182,27 +174,15 @@ class CodedDiffuser(Element):
     def _checked_widths(self) -> Array | None:
         if self.widths is None:
             return None
-        widths = self._checked_map("widths", self.widths)
-        if widths.ndim != 2:
-            raise InputError(f"widths of {self.label} have shape (rows, columns), not {widths.shape}")
+        widths = self._checked_map("widths", self.widths, "(rows, columns)")
         if not widths.any():
             raise InputError(f"widths of {self.label} are 0 throughout: it would scatter nothing")
-        widths.flags.writeable = False
         return widths
 
-    def _checked_map(self, name: str, given: object) -> Array:
-        try:
-            values = np.array(given, dtype=np.float64)
-        except (ValueError, TypeError):
-            raise InputError(f"{name} of {self.label} are an array of numbers") from None
-        if values.size == 0:
-            raise InputError(f"{name} of {self.label} are empty: shape {values.shape}")
-        if not np.isfinite(values).all():
-            bad = tuple(int(n) for n in np.argwhere(~np.isfinite(values))[0])
-            raise InputError(f"{name} of {self.label} must be finite; at index {bad} there is {values[bad]}")
-        if values.min() < 0:
-            bad = tuple(int(n) for n in np.unravel_index(values.argmin(), values.shape))
-            raise InputError(f"{name} of {self.label} are 0 or more; at index {bad} there is {values[bad]:g}")
+    def _checked_map(self, name: str, given: object, shape: str, *first: int) -> Array:
+        label = f"{name} of {self.label}"
+        values = checks.array(label, given, f"numbers {shape}", *first, None, None)
+        checks.none_negative(label, values)
         return values
 
     def faces(self) -> Faces:
@@ -219,8 +199,6 @@ class CodedDiffuser(Element):
 
     def described(self) -> str:
         """The kernels, the cells of the maps and the sheet's size in words."""
-        from vcc.base.units import short
-
         assert isinstance(self.kernels, tuple)
         assert self.height is not None
         parts = [", ".join(kernel.described() for kernel in self.kernels)]
@@ -229,21 +207,3 @@ class CodedDiffuser(Element):
                 rows, columns = values.shape[-2:]
                 parts.append(f"{verb} over {rows}×{columns} cells")
         return "; ".join([*parts, f"width {short(self.width)}, height {short(self.height)}"])
-
-    def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and all(
-            np.array_equal(getattr(self, one.name), getattr(other, one.name))
-            if one.name in ("weights", "widths")
-            else getattr(self, one.name) == getattr(other, one.name)
-            for one in fields(self)
-        )
-
-    def __hash__(self) -> int:
-        maps = tuple(None if values is None else values.tobytes() for values in (self.weights, self.widths))
-        return hash((self.kernels, maps, self.width, self.height, self.z, self.decentre, self.name))
-
-
-def _check_size(element: Element, name: str) -> None:
-    size = getattr(element, name)
-    if size is not None and not (size > 0 and math.isfinite(size)):
-        raise InputError(f"{name} of {element.label} must be greater than 0 m, not {size}")

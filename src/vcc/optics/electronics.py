@@ -7,17 +7,16 @@ standard's)::
     charge ~ Poisson(η·μ_p + μ_I·t)                photo-electrons and dark current, at most the full well
     y = black level + K · (charge + read noise)    rounded to a whole number, 0 to 2^bits − 1
 
-`vcc.run.recording` draws recordings from it.
+`vcc.run.expose` draws recordings from it.
 """
 
 from __future__ import annotations
 
-import math
-import operator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 
 PLANCK: Final = 6.62607015e-34
@@ -75,31 +74,29 @@ class Electronics:
     pattern_seed: int = 0
 
     def __post_init__(self) -> None:
-        self._keep("quantum_efficiency", _per_channel(self.quantum_efficiency, "quantum_efficiency", "a share", 1))
-        self._keep("wavelength", _per_channel(self.wavelength, "wavelength", "a length in metres", 1e-3))
-        self._keep("full_well", checked_number(self.full_well, "full_well", "electrons", above=0))
+        self._keep("quantum_efficiency", _per_channel("quantum_efficiency", self.quantum_efficiency, 1))
+        self._keep("wavelength", _per_channel("wavelength", self.wavelength, 1e-3, "m"))
+        self._keep("full_well", checks.above_zero("full_well", self.full_well, unit="electrons"))
         if self.full_well > LARGEST_WELL:
             raise InputError(
                 f"full_well is {self.full_well:g} electrons: no pixel holds that many (up to {LARGEST_WELL:g})"
             )
-        self._keep("gain", checked_number(self.gain, "gain", "digital numbers per electron", above=0))
-        bits = _whole(self.bit_depth)
-        if bits is None or not 1 <= bits <= 16:
-            raise InputError(f"bit_depth is a whole number from 1 to 16, not {self.bit_depth!r}")
-        self._keep("bit_depth", bits)
-        self._keep("black_level", checked_number(self.black_level, "black_level", "digital numbers", least=0))
+        self._keep("gain", checks.above_zero("gain", self.gain, unit="digital numbers per electron"))
+        self._keep("bit_depth", checks.whole_number_between("bit_depth", self.bit_depth, 1, 16))
+        self._keep("black_level", checks.zero_or_more("black_level", self.black_level, unit="digital numbers"))
         if self.black_level >= self.largest_number:
             raise InputError(
-                f"black_level is {self.black_level:g}, and {bits} bits end at {self.largest_number}: "
+                f"black_level is {self.black_level:g}, and {self.bit_depth} bits end at {self.largest_number}: "
                 "no room is left for light. Lower it or take more bits"
             )
-        self._keep("read_noise", checked_number(self.read_noise, "read_noise", "electrons rms", least=0))
-        self._keep(
-            "dark_current", checked_number(self.dark_current, "dark_current", "electrons per second", least=0)
-        )
-        self._keep("prnu", checked_number(self.prnu, "prnu", "a share of the sensitivity", least=0))
-        self._keep("dsnu", checked_number(self.dsnu, "dsnu", "electrons", least=0))
-        self._keep("pattern_seed", checked_seed(self.pattern_seed, "pattern_seed"))
+        for name, unit in (
+            ("read_noise", "electrons rms"),
+            ("dark_current", "electrons per second"),
+            ("prnu", "of the sensitivity"),
+            ("dsnu", "electrons"),
+        ):
+            self._keep(name, checks.zero_or_more(name, getattr(self, name), unit=unit))
+        self._keep("pattern_seed", checks.seed(self.pattern_seed, "pattern_seed"))
         if self.color_filter is not None:
             self._keep("color_filter", _tile(self.color_filter))
         counts = self._channel_counts()
@@ -118,7 +115,7 @@ class Electronics:
             if isinstance(value := getattr(self, name), tuple)
         }
         if self.color_filter is not None:
-            counts["color_filter"] = 1 + max(max(row) for row in self.tile)
+            counts["color_filter"] = self.filter_channels
         return counts
 
     @property
@@ -133,6 +130,21 @@ class Electronics:
             return ((0,),)
         rows = _rows(self.color_filter)
         return tuple(tuple(_channel(sign) for sign in row) for row in rows)
+
+    @property
+    def filter_channels(self) -> int:
+        """How many channels the tile has; 1 without a colour filter."""
+        return 1 + max(max(row) for row in self.tile)
+
+    @property
+    def filters(self) -> list[tuple[tuple[slice, slice], int]]:
+        """The pixels behind each filter of the tile, as slices of rows and columns, and its channel."""
+        rows, columns = len(self.tile), len(self.tile[0])
+        return [
+            ((slice(row, None, rows), slice(column, None, columns)), channel)
+            for row, line in enumerate(self.tile)
+            for column, channel in enumerate(line)
+        ]
 
     @property
     def is_bayer(self) -> bool:
@@ -197,69 +209,14 @@ class Electronics:
         )
 
 
-def checked_seed(seed: object, name: str = "seed") -> int:
-    """A seed of random numbers as an int.
-
-    Args:
-        seed: a whole number, 0 or more; truth values and floating-point numbers are none.
-        name: what to call it in an error.
-
-    Raises:
-        InputError: anything else.
-    """
-    number = _whole(seed)
-    if number is None or number < 0:
-        raise InputError(f"{name} is {seed!r}: it is a whole number, 0 or more, such as 1")
-    return number
-
-
-def _whole(value: Any) -> int | None:
-    """A whole number of any library; None for anything else, truth values included."""
-    if isinstance(value, bool) or type(value).__name__ == "bool":
-        return None
-    try:
-        return operator.index(value)
-    except TypeError:
-        return None
-
-
-def checked_number(
-    value: Any, name: str, kind: str, *, above: float = -math.inf, least: float = -math.inf, most: float = math.inf
-) -> float:
-    """A finite number within its range, as a float.
-
-    Args:
-        value: what was given.
-        name: what to call it in an error.
-        kind: what it counts, for the error.
-        above: it must be larger than this.
-        least: the smallest that it may be.
-        most: the largest that it may be.
-
-    Raises:
-        InputError: outside its range, not finite, or no number.
-    """
-    number = math.nan
-    if not isinstance(value, bool | str | bytes):
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            number = math.nan
-    if math.isfinite(number) and number > above and least <= number <= most:
-        return number
-    wanted = f"above {above:g}" if math.isfinite(above) else f"{least:g} or more"
-    limit = f" and at most {most:g}" if math.isfinite(most) else ""
-    raise InputError(f"{name} is {value!r}: it is a number ({kind}), {wanted}{limit}")
-
-
-def _per_channel(given: Any, name: str, kind: str, most: float) -> float | tuple[float, ...]:
+def _per_channel(name: str, given: Any, most: float, unit: str = "") -> float | tuple[float, ...]:
     """One number for all channels, or a tuple with one each; all above 0."""
     if not isinstance(given, tuple | list):
-        return checked_number(given, name, kind, above=0, most=most)
+        return checks.above_zero(name, given, unit=unit, most=most)
     if not given:
         raise InputError(f"{name} is empty: give one number, or one per channel")
     return tuple(
-        checked_number(value, f"{name} of channel {channel}", kind, above=0, most=most)
+        checks.above_zero(f"{name} of channel {channel}", value, unit=unit, most=most)
         for channel, value in enumerate(given)
     )
 

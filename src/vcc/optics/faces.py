@@ -8,8 +8,6 @@ thin element does may depend on where a ray meets it, not on the ray's slope (a 
 from __future__ import annotations
 
 import abc
-import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,7 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.describe import kind_in_words, parameters_in_words
 from vcc.base.errors import InputError
 from vcc.optics.deflections import Deflection, as_deflection
 from vcc.optics.scatter import Scatter
@@ -121,11 +121,9 @@ class Element(abc.ABC):
     name: str = ""
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.z):
-            raise InputError(f"z of {self.label} must be a finite number of metres, not {self.z}")
-        if len(self.decentre) != 2 or not all(math.isfinite(offset) for offset in self.decentre):
-            raise InputError(f"decentre of {self.label} is (x, y) in metres, not {self.decentre}")
-        object.__setattr__(self, "decentre", (float(self.decentre[0]), float(self.decentre[1])))
+        checks.finite(f"z of {self.label}", self.z, "metres")
+        middle = checks.pair(f"decentre of {self.label}", self.decentre, "(x, y) in metres")
+        object.__setattr__(self, "decentre", middle)
 
     @abc.abstractmethod
     def faces(self) -> Faces:
@@ -142,11 +140,8 @@ class Element(abc.ABC):
         A thick element lists `Faces` and, between them, the `Affine` steps by which rays get from one to the
         next; the first starts at z, the last ends at z + `length`.
         """
-        try:
+        with checks.within(self.label):
             faces = self.faces()
-        except InputError as error:
-            said = str(error)
-            raise InputError(said if self.label in said else f"{self.label}: {said}") from None
         if not isinstance(faces, Faces):
             raise InputError(f"faces() of {self.label} must return vcc.Faces, not {type(faces).__name__}")
         return (faces,)
@@ -154,7 +149,7 @@ class Element(abc.ABC):
     @property
     def kind(self) -> str:
         """The kind of element in words, small letters."""
-        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", type(self).__name__).lower()
+        return kind_in_words(type(self))
 
     @property
     def label(self) -> str:
@@ -163,8 +158,6 @@ class Element(abc.ABC):
 
     def described(self) -> str:
         """The element's parameters in words, for `explain`."""
-        from vcc.base.describe import parameters_in_words
-
         return parameters_in_words(self, leave_out=("z", "name", "source"))
 
 

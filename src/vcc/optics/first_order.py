@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import short
@@ -80,16 +81,14 @@ class FirstOrder(Element):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "matrix", self._checked(self.matrix, "matrix"))
-        if not (self.length >= 0 and math.isfinite(self.length)):
-            raise InputError(
-                f"length of {self.label} must be 0 m or more, not {self.length}: light travels towards +z"
-            )
-        for name in ("stop_diameter", "entrance_diameter", "exit_diameter"):
-            diameter = getattr(self, name)
-            if diameter is not None and not (diameter > 0 and math.isfinite(diameter)):
-                raise InputError(
-                    f"{name} of {self.label} must be greater than 0 m, not {diameter}; leave it out for none"
-                )
+        checks.zero_or_more(f"length of {self.label}", self.length, unit="m", way_out="light travels towards +z")
+        checks.sizes(
+            self.label,
+            stop_diameter=self.stop_diameter,
+            entrance_diameter=self.entrance_diameter,
+            exit_diameter=self.exit_diameter,
+            way_out="leave it out for none",
+        )
         if self.stop_from_entrance is not None:
             rows = self._checked(self.stop_from_entrance, "stop_from_entrance")
             object.__setattr__(self, "stop_from_entrance", rows)
@@ -111,10 +110,8 @@ class FirstOrder(Element):
             raise InputError(
                 f"{name} of {self.label} is {shape}: give 2×2 (A, B, C, D), 4×4 on (u, v, s, t) or 5×5"
             )
-        try:
+        with checks.within(f"{name} of {self.label}"):
             step = as_ray_map(rows)
-        except InputError as error:
-            raise InputError(f"{name} of {self.label}: {error}") from None
         # Each axis of a symmetric system counts: its 4×4 determinant is the square of the 2×2 one.
         determinant = float(np.linalg.det(rows)) if len(rows) == 2 else step.determinant
         if abs(determinant - 1) > ETENDUE_TOLERANCE:
@@ -158,10 +155,8 @@ class FirstOrder(Element):
             raise InputError(
                 f"radii of {label} are (R1, R2) in metres, not {radii}: none may be 0, inf is a plane"
             )
-        if not (thickness >= 0 and math.isfinite(thickness)):
-            raise InputError(f"thickness of {label} must be 0 m or more, not {thickness}")
-        if not (refractive_index > 0 and math.isfinite(refractive_index)):
-            raise InputError(f"refractive_index of {label} must be greater than 0, not {refractive_index}")
+        checks.zero_or_more(f"thickness of {label}", thickness, unit="m")
+        checks.above_zero(f"refractive_index of {label}", refractive_index)
         first, last = (
             surface_power(1.0, refractive_index, radii[0]),
             surface_power(refractive_index, 1.0, radii[1]),

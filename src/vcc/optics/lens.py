@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
+from vcc.base import checks
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError
 from vcc.optics.faces import Element, Faces
 from vcc.shapes.patterns import Circle
 
@@ -30,13 +29,8 @@ class Lens(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.focal_length == 0 or math.isnan(self.focal_length):
-            raise InputError(f"focal_length of {self.label} is {self.focal_length} m: it must not be 0")
-        if self.diameter is not None and not (self.diameter > 0 and math.isfinite(self.diameter)):
-            raise InputError(
-                f"diameter of {self.label} must be greater than 0 m, not {self.diameter}; "
-                "leave it out for a lens without a rim"
-            )
+        checks.not_zero(f"focal_length of {self.label}", self.focal_length)
+        checks.sizes(self.label, diameter=self.diameter, way_out="leave it out for a lens without a rim")
 
     def faces(self) -> Faces:
         """A deflection towards the axis, and a round hole if there is a diameter."""

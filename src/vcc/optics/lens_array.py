@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
+from vcc.base.describe import parameters_in_words
 from vcc.base.errors import InputError
+from vcc.base.values import Value
 from vcc.optics.deflections import CellDeflection
 from vcc.optics.faces import Element, Faces
 from vcc.shapes.lattice import CellApertures, CellBlock, Lattice, interleaved
@@ -64,25 +67,16 @@ class LensArray(Element):
         if not self.focal_lengths:
             raise InputError(f"focal_length of {self.label} is an empty list: give one or more, in metres")
         for focal_length in self.focal_lengths:
-            if focal_length == 0 or math.isnan(focal_length):
-                raise InputError(f"focal_length of {self.label} is {focal_length} m: it must not be 0")
+            checks.not_zero(f"focal_length of {self.label}", focal_length)
         object.__setattr__(self, "offset", _lattice(self, self.offset).offset)
         self._check_fill_factor()
-        for name in ("width", "height"):
-            size = getattr(self, name)
-            if size is not None and not (size > 0 and math.isfinite(size)):
-                raise InputError(f"{name} of {self.label} must be greater than 0 m, not {size}")
-        if self.height is not None and self.width is None:
-            raise InputError(f"{self.label} has a height and no width: give both, or a width alone for a square")
+        checks.opening(self.label, self.width, self.height)
 
     def _check_fill_factor(self) -> None:
         if self.fill_factor is None:
             return
-        if not 0 < self.fill_factor <= 1:
-            raise InputError(
-                f"fill_factor of {self.label} is greater than 0 and at most 1, not {self.fill_factor}; "
-                "leave it out for openings as large as can be"
-            )
+        way_out = "leave it out for openings as large as can be"
+        checks.above_zero(f"fill_factor of {self.label}", self.fill_factor, most=1, way_out=way_out)
         # A limit worked out by hand may differ from ours in its last digits.
         if self.circular and self.fill_factor > LARGEST_DISC[self.layout] * (1 + 1e-9):
             raise InputError(
@@ -151,7 +145,7 @@ class LensArray(Element):
 
 
 @dataclass(frozen=True, eq=False)
-class PrismArray(Element):
+class PrismArray(Value, Element):
     """So many rows and columns of prisms side by side, each of its own deflection, opaque around them.
 
     With a focal length, each cell is a lens too: the lens-prism array with which Georgiev and Intwala (2006) take
@@ -178,30 +172,12 @@ class PrismArray(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        try:
-            slopes = np.array(self.slopes, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(
-                f"slopes of {self.label} are numbers (rows, columns, 2), (δs, δt) of each cell"
-            ) from None
-        if slopes.ndim != 3 or slopes.shape[2] != 2 or slopes.size == 0:
-            raise InputError(
-                f"slopes of {self.label} have the shape (rows, columns, 2), (δs, δt) of each cell, "
-                f"not {slopes.shape}"
-            )
-        if not np.isfinite(slopes).all():
-            row, column = np.argwhere(~np.isfinite(slopes))[0][:2]
-            raise InputError(
-                f"slopes of {self.label} must be finite numbers; those of cell ({row}, {column}) are "
-                f"({slopes[row, column, 0]}, {slopes[row, column, 1]})"
-            )
-        slopes.setflags(write=False)
+        needed = "numbers (rows, columns, 2), (δs, δt) of each cell"
+        slopes = checks.array(f"slopes of {self.label}", self.slopes, needed, None, None, 2)
         object.__setattr__(self, "slopes", slopes)
-        if self.focal_length is not None and (self.focal_length == 0 or math.isnan(self.focal_length)):
-            raise InputError(
-                f"focal_length of {self.label} is {self.focal_length} m: it must not be 0; "
-                "leave it out for prisms alone"
-            )
+        if self.focal_length is not None:
+            way_out = "leave it out for prisms alone"
+            checks.not_zero(f"focal_length of {self.label}", self.focal_length, way_out=way_out)
         _lattice(self, (0.0, 0.0))
 
     @property
@@ -232,24 +208,12 @@ class PrismArray(Element):
 
     def described(self) -> str:
         """The number of cells and the parameters in words."""
-        from vcc.base.describe import parameters_in_words
-
         steepest = float(np.abs(self.slopes).max())
         words = parameters_in_words(self, leave_out=("z", "name", "slopes"))
         return f"{self.shape[0]}×{self.shape[1]} prisms of up to {steepest:g}, {words}"
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, PrismArray) and all(
-            np.array_equal(getattr(self, each.name), getattr(other, each.name)) for each in fields(self)
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.slopes.tobytes(), self.pitch, self.layout, self.focal_length, self.rotation, self.z))
-
 
 def _lattice(array: LensArray | PrismArray, offset: tuple[float, float]) -> Lattice:
     """The cells of an array; errors name it."""
-    try:
+    with checks.within(array.label):
         return Lattice(array.layout, array.pitch, array.rotation, offset)
-    except InputError as error:
-        raise InputError(f"{array.label}: {error}") from None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.optics.faces import Element, Faces
 from vcc.shapes.patterns import Bounded, Cells, Pattern, as_pattern
@@ -39,10 +39,7 @@ class Mask(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("width", "height"):
-            size = getattr(self, name)
-            if size is not None and not (size > 0 and math.isfinite(size)):
-                raise InputError(f"{name} of {self.label} must be greater than 0 m, not {size}")
+        checks.sizes(self.label, width=self.width, height=self.height)
         object.__setattr__(self, "pattern", self._as_pattern())
         if isinstance(self.pattern, Cells) and not self.pattern.values.any():
             raise InputError(f"{self.label} is opaque everywhere: its transmission is 0 throughout")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.describe import parameters_in_words
 from vcc.base.errors import InputError
@@ -17,7 +18,7 @@ from vcc.base.units import short
 from vcc.optics.deflections import Deflection, SlopeFunction, checked_slopes
 from vcc.optics.faces import Element, Faces
 from vcc.shapes.patterns import Bounded, Circle, Open, Pattern
-from vcc.shapes.surfaces import Surface
+from vcc.shapes.surface import Surface
 
 Array = NDArray[np.float64]
 
@@ -82,14 +83,7 @@ class PhasePlate(Element):
                 f"surface of {self.label} is a vcc.surfaces.Surface, such as Cubic(250.0), or a function of "
                 f"(x, y) that returns slopes (Δs, Δt), not {given}"
             )
-        for name in ("diameter", "width", "height"):
-            size = getattr(self, name)
-            if size is not None and not (size > 0 and math.isfinite(size)):
-                raise InputError(f"{name} of {self.label} must be greater than 0 m, not {size}")
-        if self.diameter is not None and (self.width is not None or self.height is not None):
-            raise InputError(f"{self.label} is round or rectangular: give its diameter, or its width and height")
-        if self.height is not None and self.width is None:
-            raise InputError(f"{self.label} has a height and no width: give both")
+        checks.opening(self.label, self.width, self.height, self.diameter)
         self._check_that_the_sheet_fills_the_opening()
 
     def _check_that_the_sheet_fills_the_opening(self) -> None:

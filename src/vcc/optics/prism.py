@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
+from vcc.base import checks
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError
 from vcc.optics.faces import Element, Faces
 
 
@@ -28,9 +27,8 @@ class Prism(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(self.deflection) != 2 or not all(math.isfinite(slope) for slope in self.deflection):
-            raise InputError(f"deflection of {self.label} is two slopes (δs, δt), not {self.deflection}")
-        object.__setattr__(self, "deflection", (float(self.deflection[0]), float(self.deflection[1])))
+        slopes = checks.pair(f"deflection of {self.label}", self.deflection, "two slopes (δs, δt)")
+        object.__setattr__(self, "deflection", slopes)
 
     def faces(self) -> Faces:
         """A constant deflection."""

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.values import Value
 from vcc.shapes.kernels import SUM_TOLERANCE, Kernel
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class SheetMap:
+class SheetMap(Value):
     """Numbers that vary over a sheet, given in cells side by side: bilinear between the cells' middles.
 
     From the middles of the outermost cells outwards, values stay as they are there.
@@ -36,19 +37,10 @@ class SheetMap:
     height: float
 
     def __post_init__(self) -> None:
-        values = np.array(self.values, dtype=np.float64)
-        if values.ndim not in (2, 3) or values.size == 0:
-            raise InputError(
-                f"a map over a sheet has shape (rows, columns) or (n, rows, columns), not {values.shape}"
-            )
-        if not np.isfinite(values).all():
-            bad = tuple(int(n) for n in np.argwhere(~np.isfinite(values))[0])
-            raise InputError(f"a map over a sheet needs finite numbers; at index {bad} it has {values[bad]}")
-        for name in ("width", "height"):
-            size = getattr(self, name)
-            if not (size > 0 and math.isfinite(size)):
-                raise InputError(f"{name} of a map over a sheet must be greater than 0 m, not {size}")
-        values.flags.writeable = False
+        needed = "numbers (rows, columns) or (n, rows, columns)"
+        maps = (None,) * (np.ndim(self.values) == 3)
+        values = checks.array("a map over a sheet", self.values, needed, *maps, None, None)
+        checks.sizes("a map over a sheet", width=self.width, height=self.height)
         object.__setattr__(self, "values", values)
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
@@ -68,16 +60,6 @@ class SheetMap:
         below = self.values[..., bottom, left] * (1 - across) + self.values[..., bottom, right] * across
         mixed = above * (1 - down) + below * down
         return np.asarray(np.moveaxis(mixed, 0, -1) if self.values.ndim == 3 else mixed)
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, SheetMap)
-            and np.array_equal(self.values, other.values)
-            and (self.width, self.height) == (other.width, other.height)
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.values.shape, self.values.tobytes(), self.width, self.height))
 
     def __repr__(self) -> str:
         cells = "×".join(map(str, self.values.shape))
@@ -117,8 +99,7 @@ class Scatter:
             raise InputError("a scatterer has one kernel or more, not none")
         if len(kernels) > 1 and self.weights is None:
             raise InputError(f"a scatterer of {len(kernels)} kernels needs weights: how they mix, by position")
-        if not (self.largest_width >= 0 and math.isfinite(self.largest_width)):
-            raise InputError(f"largest_width is finite and 0 or more, not {self.largest_width}")
+        checks.zero_or_more("largest_width", self.largest_width)
         object.__setattr__(self, "kernels", kernels)
 
     @property
@@ -160,8 +141,6 @@ def _checked(name: str, given: ArrayLike, shape: tuple[int, ...]) -> Array:
     values = np.asarray(given, dtype=np.float64)
     if values.shape != shape:
         raise InputError(f"{name} of a scatterer returned shape {values.shape} where {shape} was asked for")
-    if not np.isfinite(values).all():
-        raise InputError(f"{name} of a scatterer returned a number that is not finite")
-    if values.min(initial=0.0) < 0:
-        raise InputError(f"{name} of a scatterer is 0 or more, not {values.min():g}")
+    checks.all_finite(f"{name} of a scatterer", values)
+    checks.none_negative(f"{name} of a scatterer", values)
     return values

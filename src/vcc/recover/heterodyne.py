@@ -22,9 +22,9 @@ from vcc.camera import Camera
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Mask
+from vcc.recording import Recording
 from vcc.recover.heterodyne_geometry import PINHOLE_SHARE, HeterodyneGeometry, HeterodyneSetup
 from vcc.recover.recorded import grey, has_mosaic, numbers_of
-from vcc.run.recording import Recording
 
 __all__ = ["PINHOLE_SHARE", "HeterodyneGeometry", "decode_heterodyne", "heterodyne_calibration"]
 

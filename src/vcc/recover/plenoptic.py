@@ -24,12 +24,13 @@ from vcc.camera import Camera
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics.electronics import Electronics
+from vcc.recording import Recording
 from vcc.recover.lenslet_grid import LensletGrid
 from vcc.recover.lenslet_optics import LensletOptics
 from vcc.recover.lenslet_views import LensletViews
 from vcc.recover.recorded import grey, numbers_of
 from vcc.recover.white_image import DARK_SHARE, brightness_of, evened_out, find_lenslets, numbers_like
-from vcc.run.recording import Demosaicing, Recording, demosaic
+from vcc.run.demosaic import Demosaicing, demosaic
 from vcc.shapes.lattice import ROW_HEIGHT
 
 __all__ = ["LensletGrid", "decode_plenoptic", "find_lenslets"]

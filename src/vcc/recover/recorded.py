@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base.errors import InputError
 from vcc.fields.sampled import to_numpy
 from vcc.image import Image
-from vcc.run.recording import Recording
+from vcc.recording import Recording
 
 Array = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.image import Image
+from vcc.recording import Recording
 from vcc.recover.lenslet_grid import LensletGrid, fitted, grid_of
 from vcc.recover.recorded import grey, has_mosaic, numbers_of
-from vcc.run.recording import Recording
 from vcc.shapes.lattice import Lattice
 
 Array = NDArray[np.float64]

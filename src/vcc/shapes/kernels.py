@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import abc
 import math
-import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
+from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
+from vcc.base.values import Value
+from vcc.shapes.kernel_weights import FULL_STEP, axes_of, cells_on_lattice, deposited, refined, separable
 
 Array = NDArray[np.float64]
 
@@ -28,8 +30,6 @@ CUT = 4.0
 """A Gaussian ends at this many standard deviations along each axis."""
 FINEST_LATTICE = 512
 """A kernel that covers more steps than this is worked out on a coarser lattice, then interpolated."""
-FULL_STEP = 1e-9
-"""Parts of a lattice step that are rounding."""
 
 
 class Kernel(abc.ABC):
@@ -83,9 +83,7 @@ class Kernel(abc.ABC):
             InputError: a matrix that is not 2×2 finite numbers, or a kernel over more than `LARGEST_WEIGHTS`
                 steps.
         """
-        matrix = np.asarray(steps_from_slopes, dtype=np.float64)
-        if matrix.shape != (2, 2) or not np.isfinite(matrix).all():
-            raise InputError(f"steps_from_slopes is a 2×2 matrix of finite numbers, not {steps_from_slopes!r}")
+        matrix = checks.array("steps_from_slopes", steps_from_slopes, "a 2×2 matrix of numbers", 2, 2)
         reach = np.array(self.reach)
         half_width, half_height = (
             int(np.ceil(min(steps, 1e9) - FULL_STEP)) if steps > 0 else 0 for steps in np.abs(matrix) @ reach
@@ -101,9 +99,9 @@ class Kernel(abc.ABC):
             return closed
         if size > FINEST_LATTICE:
             factor = -(-size // FINEST_LATTICE)
-            return _refined(self.weights(matrix / factor), factor)
+            return refined(self.weights(matrix / factor), factor)
         slopes, shares = self.quadrature(min(max(8 * size, 512), 2048))
-        return _deposited(slopes @ matrix.T, shares, half_width, half_height)
+        return deposited(slopes @ matrix.T, shares, half_width, half_height)
 
     def _closed_weights(self, matrix: Array, half_width: int, half_height: int) -> Array | None:
         """The weights in closed form; None where there is none for this matrix."""
@@ -111,11 +109,8 @@ class Kernel(abc.ABC):
 
     def described(self) -> str:
         """The kernel in words."""
-        from vcc.base.describe import parameters_in_words
-
-        parameters = parameters_in_words(self)
-        name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", type(self).__name__).lower().removesuffix(" kernel")
-        return f"{name} ({parameters})" if parameters else name
+        name = kind_in_words(type(self)).removesuffix(" kernel")
+        return with_parameters(name, parameters_in_words(self))
 
 
 @dataclass(frozen=True)
@@ -185,7 +180,7 @@ class Gaussian(Kernel):
         return np.stack([s.ravel(), t.ravel()], axis=-1), np.outer(share, share).ravel()
 
     def _closed_weights(self, matrix: Array, half_width: int, half_height: int) -> Array | None:
-        return _separable(self._mean_distance, self.reach, matrix, half_width, half_height)
+        return separable(self._mean_distance, self.reach, matrix, half_width, half_height)
 
     def _mean_distance(self, axis: int, x: Array) -> Array:
         """E|δ − x| along an axis, for |x| up to the cut: ∫ |δ − x| φ(δ/σ)/σZ dδ, integrated by parts."""
@@ -212,10 +207,8 @@ class TopHat(Kernel):
     shape: str = "disc"
 
     def __post_init__(self) -> None:
-        if not (self.width > 0 and math.isfinite(self.width)):
-            raise InputError(f"width of a top hat is a slope greater than 0, not {self.width}")
-        if self.shape not in ("disc", "square"):
-            raise InputError(f"shape of a top hat is 'disc' or 'square', not {self.shape!r}")
+        checks.above_zero("width of a top hat", self.width, "a slope")
+        checks.one_of("shape of a top hat", self.shape, ("disc", "square"))
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -250,7 +243,7 @@ class TopHat(Kernel):
     def _closed_weights(self, matrix: Array, half_width: int, half_height: int) -> Array | None:
         if self.shape == "disc":
             return None
-        return _separable(self._mean_distance, self.reach, matrix, half_width, half_height)
+        return separable(self._mean_distance, self.reach, matrix, half_width, half_height)
 
     def _mean_distance(self, axis: int, x: Array) -> Array:
         """E|δ − x| along an axis of the square, for |x| up to its edge."""
@@ -288,16 +281,11 @@ class Radial(Kernel):
             raise InputError(
                 f"radii of a radial kernel rise from 0, each greater than the one before, not {radii}"
             )
-        profile = _checked_densities(profile, "the profile of a radial kernel")
+        what = "the profile of a radial kernel"
+        _check_densities(what, profile)
         total = float(_disc_integrals(radii, profile).sum())
-        if self.normalise:
-            profile = profile / total
-            object.__setattr__(self, "normalise", False)
-        elif abs(total - 1) > SUM_TOLERANCE:
-            raise InputError(
-                f"the profile of a radial kernel integrates to ∫ D(r) 2πr dr = {total:.9g}, and must to 1: divide "
-                "it, or pass normalise=True"
-            )
+        profile = _normalised(what, profile, total, self.normalise, "integrates to ∫ D(r) 2πr dr =")
+        object.__setattr__(self, "normalise", False)
         object.__setattr__(self, "radii", tuple(radii.tolist()))
         object.__setattr__(self, "profile", tuple(profile.tolist()))
 
@@ -365,7 +353,7 @@ class Radial(Kernel):
 
 
 @dataclass(frozen=True, eq=False)
-class Samples(Kernel):
+class Samples(Value, Kernel):
     """A kernel from an array, measured or computed: even within each cell of the array.
 
     Args:
@@ -384,22 +372,13 @@ class Samples(Kernel):
     normalise: bool = False
 
     def __post_init__(self) -> None:
-        values = np.array(self.values, dtype=np.float64)
-        if values.ndim != 2 or values.size == 0:
-            raise InputError(f"a kernel's array has (rows of δt, columns of δs), not shape {values.shape}")
-        if self.slope_pitch is None or not (self.slope_pitch > 0 and math.isfinite(self.slope_pitch)):
-            raise InputError(f"slope_pitch of a kernel's array must be greater than 0, not {self.slope_pitch}")
-        values = _checked_densities(values, "a kernel's array")
-        total = float(values.sum())
-        if self.normalise:
-            values = values / total
-            object.__setattr__(self, "normalise", False)
-        elif abs(total - 1) > SUM_TOLERANCE:
-            raise InputError(
-                f"a kernel's array sums to {total:.9g}, and must to 1, or light would be made or lost: divide it "
-                "by its sum, or pass normalise=True"
-            )
+        what = "a kernel's array"
+        values = checks.array(what, self.values, "numbers (rows of δt, columns of δs)", None, None)
+        checks.above_zero("slope_pitch of a kernel's array", self.slope_pitch)
+        _check_densities(what, values)
+        values = _normalised(what, values, float(values.sum()), self.normalise, "sums to")
         values.flags.writeable = False
+        object.__setattr__(self, "normalise", False)
         object.__setattr__(self, "values", values)
 
     @property
@@ -455,7 +434,7 @@ class Samples(Kernel):
         return np.stack([s.ravel(), t.ravel()], axis=-1), np.repeat(share, parts**2)
 
     def _closed_weights(self, matrix: Array, half_width: int, half_height: int) -> Array | None:
-        axes = _axes_of(matrix, self.reach)
+        axes = axes_of(matrix, self.reach)
         if axes is None:
             return None
         shares = self.values / self.values.sum()
@@ -464,20 +443,10 @@ class Samples(Kernel):
         x_step, y_step = (float(matrix[n, axis]) * self.slope_pitch for n, axis in enumerate(axes))
         rows, columns = shares.shape
         down, across = (
-            _cells_on_lattice(rows, y_step, half_height),
-            _cells_on_lattice(columns, x_step, half_width),
+            cells_on_lattice(rows, y_step, half_height),
+            cells_on_lattice(columns, x_step, half_width),
         )
         return np.asarray(down @ shares @ across.T)
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, Samples)
-            and np.array_equal(self.values, other.values)
-            and self.slope_pitch == other.slope_pitch
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.values.shape, self.values.tobytes(), self.slope_pitch))
 
     def described(self) -> str:
         """The number of cells and their pitch in words."""
@@ -492,19 +461,22 @@ class Samples(Kernel):
 # --- densities ---
 
 
-def _checked_densities(values: Array, what: str) -> Array:
-    """The values, none of them negative, not a number or infinite, and not all of them zero."""
-    if not np.isfinite(values).all():
-        bad = tuple(int(n) for n in np.argwhere(~np.isfinite(values))[0])
-        raise InputError(f"{what} needs finite numbers; at index {bad} it has {values[bad]}")
-    if values.min() < 0:
-        bad = tuple(int(n) for n in np.unravel_index(values.argmin(), values.shape))
-        raise InputError(
-            f"{what} is not negative anywhere; at index {bad} it has {values[bad]:g}: light adds only"
-        )
+def _check_densities(what: str, values: Array) -> None:
+    """Refuse what is negative, not a number or infinite somewhere, or zero everywhere."""
+    checks.all_finite(what, values)
+    checks.none_negative(what, values)
     if not values.any():
         raise InputError(f"{what} is 0 throughout: no light would leave")
-    return values
+
+
+def _normalised(what: str, values: Array, total: float, normalise: bool, sums_to: str) -> Array:
+    """Values whose sum or integral is 1: divided by it where that is asked for, else refused if it is not."""
+    if not normalise and abs(total - 1) > SUM_TOLERANCE:
+        raise InputError(
+            f"{what} {sums_to} {total:.9g}, and must to 1, or light would be made or lost: divide it by that, or "
+            "pass normalise=True"
+        )
+    return values / total if normalise else values
 
 
 def _normal(z: ArrayLike) -> Array:
@@ -571,109 +543,3 @@ def _picked(shares: Array, place: Array) -> tuple[NDArray[np.int64], Array]:
     cell = np.clip(np.searchsorted(running, place, side="right"), lit[0], lit[-1])
     into = (place - (running[cell] - shares[cell])) / shares[cell]
     return cell, np.clip(into, 0.0, 1.0)
-
-
-# --- weights on a lattice ---
-
-
-def _axes_of(matrix: Array, reach: tuple[float, float]) -> tuple[int, int] | None:
-    """Which axis of slope (0: s, 1: t) moves along x and which along y; None where one moves along both."""
-    moved = np.abs(matrix) * np.array(reach)
-    for axes in ((0, 1), (1, 0)):
-        if moved[0, 1 - axes[0]] <= FULL_STEP and moved[1, 1 - axes[1]] <= FULL_STEP:
-            return axes
-    return None
-
-
-def _separable(
-    mean_distance: Callable[[int, Array], Array],
-    reach: tuple[float, float],
-    matrix: Array,
-    half_width: int,
-    half_height: int,
-) -> Array | None:
-    """The weights of a kernel that is even and a product of its axes, where each axis keeps to one of the lattice.
-
-    Since |δ − x|'' = 2·Dirac(δ − x), the mean of a tent is a second difference of means of distances:
-    E tent(n − x) = ½ (E|x − n − 1| − 2 E|x − n| + E|x − n + 1|).
-
-    Args:
-        mean_distance: E|δ − x| along an axis of slope (0: s, 1: t) for |x| within the reach.
-        reach: of the kernel, (|δs|, |δt|).
-        matrix: lattice steps per slope.
-        half_width: of the lattice, steps.
-        half_height: of the lattice, steps.
-    """
-    axes = _axes_of(matrix, reach)
-    if axes is None:
-        return None
-    lines = []
-    for n, (axis, half) in enumerate(zip(axes, (half_width, half_height), strict=True)):
-        scale, place = abs(float(matrix[n, axis])), np.arange(-half - 1.0, half + 2.0)
-        distance = np.abs(place)
-        if scale * reach[axis] > FULL_STEP:
-            inside = distance < scale * reach[axis]
-            distance[inside] = scale * mean_distance(axis, place[inside] / scale)
-        lines.append(np.maximum(np.diff(distance, 2) / 2, 0.0))  # rounding must not make light negative
-    return np.outer(lines[1], lines[0])
-
-
-def _cells_on_lattice(cells: int, step: float, half: int) -> Array:
-    """Means of the tents of a lattice over cells side by side around 0: shape (2·half + 1, cells).
-
-    Args:
-        cells: how many.
-        step: width of a cell in lattice steps; negative where cells are counted against the lattice.
-        half: lattice places run from −half to half.
-    """
-    place = np.arange(-half, half + 1.0)[:, None]
-    edges = np.clip((np.arange(cells + 1) - cells / 2) * step, -half, half)
-
-    def tent_integral(x: Array) -> Array:
-        x = np.clip(x, -1, 1)
-        return x - x * np.abs(x) / 2
-
-    if abs(step) < 1e-6:  # differences of the integral would be rounding: cells are points
-        return np.asarray(np.maximum(1 - np.abs((edges[1:] + edges[:-1]) / 2 - place), 0.0))
-    return np.asarray(np.diff(tent_integral(edges - place), axis=1) / np.diff(edges))
-
-
-def _deposited(places: Array, shares: Array, half_width: int, half_height: int) -> Array:
-    """Points laid on a lattice, each shared between the four lattice points around it.
-
-    Args:
-        places: (x, y) in lattice steps from the middle, shape (n, 2).
-        shares: of the points, shape (n,).
-        half_width: of the lattice, steps.
-        half_height: of the lattice, steps.
-    """
-    rows, columns = 2 * half_height + 1, 2 * half_width + 1
-    x = np.clip(places[:, 0] + half_width, 0, columns - 1)
-    y = np.clip(places[:, 1] + half_height, 0, rows - 1)
-    left = np.minimum(x.astype(np.int64), max(columns - 2, 0))
-    top = np.minimum(y.astype(np.int64), max(rows - 2, 0))
-    across, down = x - left, y - top
-    right, below = min(1, columns - 1), min(1, rows - 1) * columns
-    corner = top * columns + left
-    weights: Array = np.zeros(rows * columns)
-    for offset, part in (
-        (0, (1 - across) * (1 - down)),
-        (right, across * (1 - down)),
-        (below, (1 - across) * down),
-        (below + right, across * down),
-    ):
-        weights += np.bincount(corner + offset, shares * part, rows * columns)
-    return weights.reshape(rows, columns)
-
-
-def _refined(coarse: Array, factor: int) -> Array:
-    """Weights on a lattice ``factor`` times as fine, interpolated linearly: their sum and mean stay."""
-
-    def finer(places: int) -> Array:
-        half = places // 2
-        fine = np.arange(-(half + 1) * factor + 1, (half + 1) * factor)
-        distance = np.abs(fine[:, None] / factor - np.arange(-half, half + 1))
-        return np.asarray(np.maximum(1 - distance, 0) / factor)
-
-    rows, columns = coarse.shape
-    return np.asarray(finer(rows) @ coarse @ finer(columns).T)

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError
-from vcc.shapes.patterns import RASTER_LIMIT, RASTER_PER_CELL, Cells, Pattern
+from vcc.base.describe import parameters_in_words
+from vcc.shapes.patterns import RASTER_LIMIT, RASTER_PER_CELL, Pattern, Raster, mean_over
 
 Array = NDArray[np.float64]
 
@@ -43,15 +44,10 @@ class Lattice:
     offset: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        if self.layout not in LAYOUTS:
-            raise InputError(f"layout is {' or '.join(map(repr, LAYOUTS))}, not {self.layout!r}")
-        if not (self.pitch > 0 and math.isfinite(self.pitch)):
-            raise InputError(f"pitch must be greater than 0 m, not {self.pitch}")
-        if not math.isfinite(self.rotation):
-            raise InputError(f"rotation must be a finite number of radians, not {self.rotation}")
-        if len(self.offset) != 2 or not all(math.isfinite(place) for place in self.offset):
-            raise InputError(f"offset is (x, y) in metres, not {self.offset}")
-        object.__setattr__(self, "offset", (float(self.offset[0]), float(self.offset[1])))
+        checks.one_of("layout", self.layout, LAYOUTS)
+        checks.above_zero("pitch", self.pitch, unit="m")
+        checks.finite("rotation", self.rotation, "radians")
+        object.__setattr__(self, "offset", checks.pair("offset", self.offset, "(x, y) in metres"))
 
     @property
     def row_height(self) -> float:
@@ -96,8 +92,6 @@ class Lattice:
 
     def described(self) -> str:
         """The cells in words, such as ``"hexagonal cells (pitch 0.125 mm)"``."""
-        from vcc.base.describe import parameters_in_words
-
         return f"{self.layout} cells ({parameters_in_words(self, leave_out=('layout',))})"
 
     def cell_of(self, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -192,8 +186,7 @@ class CellApertures(Pattern):
     circular: bool = False
 
     def __post_init__(self) -> None:
-        if not 0 < self.scale <= 1:
-            raise InputError(f"scale of openings is greater than 0 and at most 1, not {self.scale}")
+        checks.above_zero("scale of openings", self.scale, most=1)
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """One in the openings, zero between them."""
@@ -282,17 +275,20 @@ class CellApertures(Pattern):
         return np.clip(2 * half - math.sqrt(3) * level, 0.0, half)
 
     def _sampled_mean(self, x: Array, y: Array, width: float, height: float) -> Array:
-        opening = 2 * self._half_width
-        low = x.min() - width / 2, y.min() - height / 2
-        extent = x.max() + width / 2 - low[0], y.max() + height / 2 - low[1]
-        sizes = min(width, opening), min(height, opening)
-        if min(sizes) <= 0 or max(extent[n] / sizes[n] for n in (0, 1)) * RASTER_PER_CELL > RASTER_LIMIT:
+        across, down = self._raster(x, width), self._raster(y, height)
+        if across is None or down is None:
             return super().mean(x, y, width, height)
-        columns, rows = (math.ceil(extent[n] / sizes[n] * RASTER_PER_CELL) for n in (0, 1))
-        grid_x = low[0] + (np.arange(columns) + 0.5) * (extent[0] / columns)
-        grid_y = low[1] + (np.arange(rows) + 0.5) * (extent[1] / rows)
-        middle = low[0] + extent[0] / 2, low[1] + extent[1] / 2
-        return Cells(self(grid_x[None, :], grid_y[:, None]), *extent, middle=middle).mean(x, y, width, height)
+        return mean_over(across, down, lambda a, b, _: self(a, b), x, y, width, height)
+
+    def _raster(self, centre: Array, length: float) -> Raster | None:
+        """16 points across an opening or a rectangle, whichever is smaller; None where those are too many."""
+        low = float(centre.min()) - length / 2
+        extent, finest = float(centre.max()) + length / 2 - low, min(length, 2 * self._half_width)
+        if finest <= 0 or extent / finest * RASTER_PER_CELL > RASTER_LIMIT:
+            return None
+        points = math.ceil(extent / finest * RASTER_PER_CELL)
+        places = np.asarray(low + (np.arange(points) + 0.5) * (extent / points), dtype=np.float64)
+        return Raster(places, low, low + extent)
 
 
 @dataclass(frozen=True)

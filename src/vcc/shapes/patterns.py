@@ -10,16 +10,19 @@ from __future__ import annotations
 
 import abc
 import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
+from vcc.base.units import text
+from vcc.base.values import Value
 
 Array = NDArray[np.float64]
 
@@ -42,11 +45,7 @@ class Pattern(abc.ABC):
 
     def described(self) -> str:
         """The pattern in words, such as ``"circle (diameter 3 mm)"``."""
-        from vcc.base.describe import parameters_in_words
-
-        name = re.sub(r"(?<!^)(?=[A-Z])", " ", type(self).__name__).lower()
-        parameters = parameters_in_words(self)
-        return f"{name} ({parameters})" if parameters else name
+        return with_parameters(kind_in_words(type(self)), parameters_in_words(self))
 
     @property
     def size(self) -> tuple[float, float]:
@@ -99,32 +98,63 @@ def mean_by_raster(
         The means; None where even the fewest points across each rectangle are too many.
     """
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    places: list[Array] = []
-    points: list[tuple[float, float]] = []
-    steps: list[float] = []
-    for centre, length, bound in ((x, width, size[0]), (y, height, size[1])):
-        low = max(float(centre.min()) - length / 2, -bound / 2)
-        high = max(min(float(centre.max()) + length / 2, bound / 2), low)
-        across = RASTER_PER_CELL
-        # By the pattern's own size where it has one, so that pieces of a light field see the same raster.
-        extent = bound if math.isfinite(bound) else high - low
-        while across > fewest and length > 0 and extent / length * across > RASTER_LIMIT:
-            across //= 2
-        step = length / across
-        if step <= 0 or (high - low) / step > LONGEST_RASTER:
-            return None
-        first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
-        places.append(np.asarray((np.arange(first, last) + 0.5) * step, dtype=np.float64))
-        points.append((first * step, last * step))
-        steps.append(step)
-    rows, columns = places[1].size, places[0].size
-    if rows * columns > RASTER_LIMIT**2:
+    across, down = (
+        _raster(centre, length, bound, fewest)
+        for centre, length, bound in ((x, width, size[0]), (y, height, size[1]))
+    )
+    if across is None or down is None or across.places.size * down.places.size > RASTER_LIMIT**2:
         return None
-    found = np.asarray(values(places[0][None, :], places[1][:, None], (steps[0], steps[1])), dtype=np.float64)
-    (left, right), (top, bottom) = points
-    middle = (left + right) / 2, (top + bottom) / 2
-    raster = Cells(np.broadcast_to(found, (rows, columns)), right - left, bottom - top, middle)
-    return raster.mean(x, y, width, height)
+    return mean_over(across, down, values, x, y, width, height)
+
+
+class Raster(NamedTuple):
+    """Points along an axis, in the middles of equal steps from low to high, metres."""
+
+    places: Array
+    low: float
+    high: float
+
+    @property
+    def length(self) -> float:
+        """Of all steps, metres."""
+        return self.high - self.low
+
+    @property
+    def step(self) -> float:
+        """Metres."""
+        return self.length / self.places.size
+
+
+def _raster(centre: Array, length: float, bound: float, fewest: int) -> Raster | None:
+    """The points of `mean_by_raster` along an axis; None where even the fewest are too many."""
+    low = max(float(centre.min()) - length / 2, -bound / 2)
+    high = max(min(float(centre.max()) + length / 2, bound / 2), low)
+    across = RASTER_PER_CELL
+    # By the pattern's own size where it has one, so that pieces of a light field see the same raster.
+    extent = bound if math.isfinite(bound) else high - low
+    while across > fewest and length > 0 and extent / length * across > RASTER_LIMIT:
+        across //= 2
+    step = length / across
+    if step <= 0 or (high - low) / step > LONGEST_RASTER:
+        return None
+    first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
+    return Raster(np.asarray((np.arange(first, last) + 0.5) * step), first * step, last * step)
+
+
+def mean_over(
+    across: Raster,
+    down: Raster,
+    values: Callable[[Array, Array, tuple[float, float]], ArrayLike],
+    x: Array,
+    y: Array,
+    width: float,
+    height: float,
+) -> Array:
+    """Means over rectangles of what the points of a raster show; the rest as for `mean_by_raster`."""
+    found = np.asarray(values(across.places[None, :], down.places[:, None], (across.step, down.step)), float)
+    cells = np.broadcast_to(found, (down.places.size, across.places.size))
+    middle = (across.low + across.high) / 2, (down.low + down.high) / 2
+    return Cells(cells, across.length, down.length, middle).mean(x, y, width, height)
 
 
 def _mean_from_integral(
@@ -161,7 +191,7 @@ class Circle(Pattern):
     diameter: float = field(metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        _positive(self, "diameter", self.diameter)
+        checks.above_zero("diameter of circle", self.diameter, unit="m")
 
     @property
     def size(self) -> tuple[float, float]:
@@ -216,9 +246,8 @@ class Polygon(Pattern):
     rotation: float = field(default=0.0, metadata={"unit": "angle"})
 
     def __post_init__(self) -> None:
-        _positive(self, "diameter", self.diameter)
-        if self.sides < 3:
-            raise InputError(f"a polygon has 3 sides or more, not {self.sides}")
+        checks.above_zero("diameter of polygon", self.diameter, unit="m")
+        checks.whole_number_between("sides of polygon", self.sides, 3)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -237,7 +266,7 @@ class Polygon(Pattern):
 
 
 @dataclass(frozen=True, eq=False)
-class Cells(Pattern):
+class Cells(Value, Pattern):
     """A transmission array, values and a frame: uniform rectangular cells side by side, opaque outside.
 
     Args:
@@ -261,18 +290,17 @@ class Cells(Pattern):
             raise InputError(f"a transmission array has (rows, columns), not shape {values.shape}")
         if values.size == 0:
             raise InputError(f"a transmission array of shape {values.shape} is empty")
-        if not np.isfinite(values).all():
-            raise InputError("a transmission array needs finite numbers")
+        checks.all_finite("a transmission array", values)
         if values.min() < 0 or values.max() > 1:
             raise InputError(
                 f"transmission lies between 0 and 1; this array goes from {values.min():g} to {values.max():g}: "
                 "divide it by its full scale (255 for 8-bit values)"
             )
         object.__setattr__(self, "values", values)
-        _positive(self, "width", self.width)
+        checks.above_zero("width of cells", self.width, unit="m")
         if self.height is None:
             object.__setattr__(self, "height", self.width * values.shape[0] / values.shape[1])
-        _positive(self, "height", self.size[1])
+        checks.above_zero("height of cells", self.height, unit="m")
 
     @property
     def size(self) -> tuple[float, float]:
@@ -305,7 +333,7 @@ class Cells(Pattern):
         """Mean transmission over rectangles, exact (differences of the array's integral)."""
         width, height = max(width, self.width * 1e-5), max(height, self.size[1] * 1e-5)
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        if _is_grid(x, y):  # then two small products do it
+        if is_grid(x, y):  # then two small products do it
             overlap_x = self._overlaps(x.reshape(-1), width, 1)
             overlap_y = self._overlaps(y.reshape(-1), height, 0)
             content = overlap_y @ self.values @ overlap_x.T
@@ -347,20 +375,8 @@ class Cells(Pattern):
         assert self.height is not None
         return np.asarray(content * (self.width / columns) * (self.height / rows))
 
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, Cells)
-            and np.array_equal(self.values, other.values)
-            and (self.width, self.height, self.middle) == (other.width, other.height, other.middle)
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.values.tobytes(), self.width, self.height, self.middle))
-
     def described(self) -> str:
         """The number of cells and the size of the array in words."""
-        from vcc.base.units import text
-
         rows, columns = self.values.shape
         return f"{rows}×{columns} cells ({text(self.width)} wide)"
 
@@ -388,9 +404,8 @@ class CosineSum(Pattern):
 
     def __post_init__(self) -> None:
         for period in self.periods:
-            _positive(self, "period", period, finite=False)
-        if self.harmonics < 1:
-            raise InputError(f"a sum of cosines has 1 harmonic or more, not {self.harmonics}")
+            checks.above_zero("period of cosine sum", period, unit="m", infinite=True)
+        checks.whole_number_between("harmonics of cosine sum", self.harmonics, 1)
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The product of the two axes' sums."""
@@ -503,14 +518,15 @@ class Bounded(Pattern):
         Exact where no rectangle crosses the border of the sheet, or the pattern is even across it.
         """
         x, y = np.asarray(x, float), np.asarray(y, float)
-        share_x = _overlap_share(x, max(width, self.width * 1e-5), self.width)
-        share_y = _overlap_share(y, max(height, self.height * 1e-5), self.height)
+        share_x = overlap_share(x, max(width, self.width * 1e-5), self.width)
+        share_y = overlap_share(y, max(height, self.height * 1e-5), self.height)
         return self.pattern.mean(x, y, width, height) * share_x * share_y
 
 
-def _overlap_share(centre: Array, length: float, sheet: float) -> Array:
+def overlap_share(centre: Array, length: Array | float, sheet: float) -> Array:
+    """The share of intervals of some length around places that lies within ±sheet/2."""
     covered = np.minimum(centre + length / 2, sheet / 2) - np.maximum(centre - length / 2, -sheet / 2)
-    return np.clip(covered / length, 0.0, 1.0)
+    return np.asarray(np.clip(covered / length, 0.0, 1.0))
 
 
 def mura(prime: int) -> NDArray[np.float64]:
@@ -535,11 +551,6 @@ def mura(prime: int) -> NDArray[np.float64]:
     return np.asarray(cells)
 
 
-def _is_grid(x: Array, y: Array) -> bool:
-    """Whether x varies along the last axis only and y along the one before only."""
+def is_grid(x: Array, y: Array) -> bool:
+    """Whether places are rows y, (rows, 1), times columns x, (1, columns)."""
     return x.ndim == y.ndim == 2 and x.shape[0] == 1 and y.shape[1] == 1
-
-
-def _positive(thing: object, name: str, value: float, finite: bool = True) -> None:
-    if not value > 0 or (finite and not math.isfinite(value)):
-        raise InputError(f"{name} of {type(thing).__name__.lower()} must be greater than 0 m, not {value}")

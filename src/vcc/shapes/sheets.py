@@ -25,6 +25,7 @@ from vcc.shapes.patterns import (
     Open,
     Pattern,
     Polygon,
+    is_grid,
     mean_by_raster,
 )
 
@@ -123,7 +124,7 @@ class Tiles(Pattern):
         height = max(height, float(np.ptp(self.rows)) * 1e-5)
         left, right = (self._place(self.columns, x + side * width / 2) for side in (-1, 1))
         top, bottom = (self._place(self.rows, y + side * height / 2) for side in (-1, 1))
-        if x.ndim == y.ndim == 2 and x.shape[0] == 1 and y.shape[1] == 1:  # a grid: along one axis after the other
+        if is_grid(x, y):  # along one axis after the other
             across = _between(self._integral, right, axis=1) - _between(self._integral, left, axis=1)
             content = _between(across, bottom, axis=0) - _between(across, top, axis=0)
         else:

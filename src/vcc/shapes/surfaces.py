@@ -1,79 +1,23 @@
-"""Surfaces of phase plates: the optical path that a thin plate adds, as a function of position.
-
-A thin plate of height h(x, y) and refractive index n in air adds the optical path OPL = (n − 1)·h. Rays are
-normal to wavefronts, so that the plate adds the path's gradient to their slopes, (Δs, Δt) = (∂OPL/∂x, ∂OPL/∂y):
-light bends towards the thicker glass (Born and Wolf, Principles of Optics, section 3.1, for small slopes). Only
-differences of path matter; a constant does nothing. Positions (x, y) are in metres from the surface's own
-middle, x right and y down, and slopes have no unit.
-"""
+"""Surfaces in closed form, and the other surfaces by name; see `vcc.shapes.surface` for what they are."""
 
 from __future__ import annotations
 
-import abc
 import math
-import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from numbers import Real
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vcc.base import checks
 from vcc.base.affine import Affine
-from vcc.base.describe import parameters_in_words
-from vcc.base.errors import InputError
-from vcc.base.units import short
-
-Array = NDArray[np.float64]
-
-RASTER = 257
-"""Points a side at which slopes are looked at for their largest, where no closed form is known."""
-POINTS_PER_CORRELATION_LENGTH = 4
-"""Of a rough surface. Its spectrum exp(−π²f²l²) has fallen to 1e-17 at the highest frequency that they hold."""
-LARGEST_GRID = 4096
-"""Points a side of a rough surface: 128 MiB of float64, and seconds to make."""
-
-
-class Surface(abc.ABC):
-    """The optical path that a thin plate adds, by position. Final classes are frozen dataclasses of SI numbers.
-
-    Yours needs `path` and `slopes`; the rest follows.
-    """
-
-    @abc.abstractmethod
-    def path(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """OPL in metres at positions x, y in metres (arrays that broadcast against each other)."""
-
-    @abc.abstractmethod
-    def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """(Δs, Δt) = (∂OPL/∂x, ∂OPL/∂y), which rays gain at positions x, y in metres (broadcast)."""
-
-    @property
-    def affine(self) -> Affine | None:
-        """The deflection as a 5×5 map of rays where the slopes are linear in x and y, else None."""
-        return None
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """(width, height) in metres outside which the surface is not known; infinite where there is no bound."""
-        return math.inf, math.inf
-
-    def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
-        """Bounds of (|Δs|, |Δt|) over the rectangle of these half sizes around the middle, metres.
-
-        Here: the largest on a raster of 257×257 points, edges included, and 5 % more.
-        """
-        x = np.linspace(-half_width, half_width, RASTER)
-        y = np.linspace(-half_height, half_height, RASTER)
-        s, t = self.slopes(x[None, :], y[:, None])
-        return 1.05 * float(np.abs(s).max()), 1.05 * float(np.abs(t).max())
-
-    def described(self) -> str:
-        """The surface in words, such as ``"quadratic (focal length 50 mm)"``."""
-        parameters = parameters_in_words(self)
-        return f"{_in_words(self)} ({parameters})" if parameters else _in_words(self)
+from vcc.shapes.height_maps import HeightMap as HeightMap
+from vcc.shapes.height_maps import PathMap as PathMap
+from vcc.shapes.height_maps import Rough as Rough
+from vcc.shapes.height_maps import Sheet as Sheet
+from vcc.shapes.surface import Array, places
+from vcc.shapes.surface import Surface as Surface
+from vcc.shapes.zernike import Zernike as Zernike
+from vcc.shapes.zernike import noll as noll
 
 
 @dataclass(frozen=True)
@@ -90,17 +34,16 @@ class Quadratic(Surface):
     focal_length: float = field(metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        if self.focal_length == 0 or math.isnan(self.focal_length):
-            raise InputError(f"focal_length of a quadratic surface is {self.focal_length} m: it must not be 0")
+        checks.not_zero("focal_length of a quadratic surface", self.focal_length)
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """−r²/2f, metres."""
-        x, y = _places(x, y)
+        x, y = places(x, y)
         return -(x * x + y * y) / (2 * self.focal_length)
 
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """(−x/f, −y/f)."""
-        x, y = _places(x, y)
+        x, y = places(x, y)
         return -x / self.focal_length, -y / self.focal_length
 
     @property
@@ -128,18 +71,17 @@ class Tilt(Surface):
     deflection: tuple[float, float]
 
     def __post_init__(self) -> None:
-        if len(self.deflection) != 2 or not all(math.isfinite(slope) for slope in self.deflection):
-            raise InputError(f"deflection of a tilt is two slopes (δs, δt), not {self.deflection}")
-        object.__setattr__(self, "deflection", (float(self.deflection[0]), float(self.deflection[1])))
+        slopes = checks.pair("deflection of a tilt", self.deflection, "two slopes (δs, δt)")
+        object.__setattr__(self, "deflection", slopes)
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """δs·x + δt·y, metres."""
-        x, y = _places(x, y)
+        x, y = places(x, y)
         return self.deflection[0] * x + self.deflection[1] * y
 
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """(δs, δt) everywhere."""
-        x, y = _places(x, y)
+        x, y = places(x, y)
         return np.full(x.shape, self.deflection[0]), np.full(x.shape, self.deflection[1])
 
     @property
@@ -169,8 +111,7 @@ class Cubic(Surface):
     strength: float
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.strength):
-            raise InputError(f"strength of a cubic surface is a finite number of 1/m², not {self.strength}")
+        checks.finite("strength of a cubic surface", self.strength, "1/m²")
 
     @classmethod
     def from_alpha(cls, alpha: float, half_width: float, wavelength: float) -> Cubic:
@@ -184,18 +125,18 @@ class Cubic(Surface):
         Raises:
             InputError: a half width or wavelength of 0 or less.
         """
-        _positive("half_width of a cubic surface", half_width)
-        _positive("wavelength of a cubic surface", wavelength)
+        checks.above_zero("half_width of a cubic surface", half_width, unit="m")
+        checks.above_zero("wavelength of a cubic surface", wavelength, unit="m")
         return cls(alpha * wavelength / (2 * math.pi * half_width**3))
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """strength·(x³ + y³), metres."""
-        x, y = _places(x, y)
+        x, y = places(x, y)
         return self.strength * (x**3 + y**3)
 
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """(3·strength·x², 3·strength·y²)."""
-        x, y = _places(x, y)
+        x, y = places(x, y)
         return 3 * self.strength * x**2, 3 * self.strength * y**2
 
     @property
@@ -230,16 +171,15 @@ class Axicon(Surface):
     slope: float
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.slope):
-            raise InputError(f"slope of an axicon is a finite number, not {self.slope}")
+        checks.finite("slope of an axicon", self.slope)
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """−slope·r, metres."""
-        return -self.slope * np.hypot(*_places(x, y))
+        return -self.slope * np.hypot(*places(x, y))
 
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """−slope·(x, y)/r."""
-        x, y = _places(x, y)
+        x, y = places(x, y)
         r = np.hypot(x, y)
         r = np.where(r == 0, 1.0, r)  # x and y are 0 there, and so are the slopes
         return -self.slope * (x / r), -self.slope * (y / r)
@@ -252,510 +192,3 @@ class Axicon(Surface):
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
         """The slope, along both axes."""
         return abs(self.slope), abs(self.slope)
-
-
-@dataclass(frozen=True)
-class Zernike(Surface):
-    """Aberrations of a lens as a sum of Zernike polynomials in Noll's order: OPL = Σⱼ aⱼ·Zⱼ(ρ, θ).
-
-    The polynomials are orthonormal over the disc (Noll, Zernike polynomials and atmospheric turbulence, Journal
-    of the Optical Society of America 66, 1976, eq. 1 and table I): over it, the root mean square of a path is
-    √(Σ aⱼ²) with piston (j = 1) left out. ρ = r/R, and θ runs from x towards y, which is downwards here.
-
-    === =================== =========================
-    j   name                Zⱼ
-    === =================== =========================
-    1   piston              1
-    2   tilt along x        2ρ cos θ
-    3   tilt along y        2ρ sin θ
-    4   defocus             √3 (2ρ² − 1)
-    5   oblique astigmatism √6 ρ² sin 2θ
-    6   astigmatism         √6 ρ² cos 2θ
-    7   coma along y        √8 (3ρ³ − 2ρ) sin θ
-    8   coma along x        √8 (3ρ³ − 2ρ) cos θ
-    11  spherical           √5 (6ρ⁴ − 6ρ² + 1)
-    === =================== =========================
-
-    Beyond the disc the same polynomials go on, and grow fast.
-
-    Args:
-        coefficients: a₁, a₂, a₃, …, metres of optical path, as many as wanted; see `from_terms` for few.
-        diameter: 2R of the disc, metres.
-
-    Raises:
-        InputError: no coefficients, one that is not finite, or a diameter of 0 or less.
-    """
-
-    coefficients: tuple[float, ...] = field(metadata={"unit": "length"})
-    diameter: float = field(metadata={"unit": "length"})
-
-    def __post_init__(self) -> None:
-        try:
-            coefficients = tuple(float(value) for value in self.coefficients)
-        except (TypeError, ValueError):
-            raise InputError(
-                f"coefficients of a Zernike surface are numbers of metres of Noll's terms 1, 2, 3, …, "
-                f"not {self.coefficients!r}"
-            ) from None
-        if not coefficients or not all(math.isfinite(value) for value in coefficients):
-            raise InputError(
-                f"coefficients of a Zernike surface are one or more finite numbers of metres, not {coefficients}"
-            )
-        object.__setattr__(self, "coefficients", coefficients)
-        _positive("diameter of a Zernike surface", self.diameter)
-
-    @classmethod
-    def from_terms(cls, terms: Mapping[int, float], diameter: float) -> Zernike:
-        """A surface from a few terms, such as ``Zernike.from_terms({4: 200 * nm, 11: 80 * nm}, 20 * mm)``.
-
-        Args:
-            terms: coefficients in metres of optical path by Noll's number j, 1 or more; all others are 0.
-            diameter: of the disc, metres.
-
-        Raises:
-            InputError: no terms, a number below 1, and as for the class.
-        """
-        if not terms or not all(_is_integer(j) and j >= 1 for j in terms):
-            raise InputError(f"terms of a Zernike surface are numbered 1, 2, 3, … after Noll, not {list(terms)}")
-        return cls(tuple(terms.get(j, 0.0) for j in range(1, max(terms) + 1)), diameter)
-
-    @cached_property
-    def _terms(self) -> list[tuple[float, int, int, bool]]:
-        """(coefficient and norm, k = (n − m)/2, m, whether it goes with the sine) of terms other than 0."""
-        found = []
-        for j, coefficient in enumerate(self.coefficients, start=1):
-            n, m = noll(j)
-            norm = math.sqrt(n + 1 if m == 0 else 2 * (n + 1))
-            if coefficient != 0:
-                found.append((coefficient * norm, (n - m) // 2, m, j % 2 == 1))
-        return found
-
-    def path(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """The sum of the terms, metres."""
-        from scipy.special import eval_jacobi
-
-        # With w = (x + iy)/R, a term is its norm × Re or Im of wᵐ × a Jacobi polynomial P_k^(0, m) of 2ρ² − 1:
-        # no angle, no division by ρ, and evaluated by recurrence.
-        x, y = _places(x, y)
-        w = (x + 1j * y) / (self.diameter / 2)
-        argument = 2 * (w.real**2 + w.imag**2) - 1
-        total = np.zeros(w.shape)
-        for weight, k, m, sine in self._terms:
-            angular = w**m
-            total += weight * (angular.imag if sine and m else angular.real) * eval_jacobi(k, 0, m, argument)
-        return total
-
-    def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """The sum of the terms' gradients, in closed form."""
-        from scipy.special import eval_jacobi
-
-        x, y = _places(x, y)
-        radius = self.diameter / 2
-        w = (x + 1j * y) / radius
-        argument = 2 * (w.real**2 + w.imag**2) - 1
-        s, t = np.zeros(w.shape), np.zeros(w.shape)
-        for weight, k, m, sine in self._terms:
-            sine = sine and m > 0
-            angular = w**m
-            harmonic = angular.imag if sine else angular.real
-            if m:  # d(wᵐ)/dx = m·wᵐ⁻¹ and d(wᵐ)/dy = i·m·wᵐ⁻¹
-                radial = weight * m * eval_jacobi(k, 0, m, argument)
-                slope = w ** (m - 1)
-                s += radial * (slope.imag if sine else slope.real)
-                t += radial * (slope.real if sine else -slope.imag)
-            if k:  # dP_k^(0, m)(z)/dz = (k + m + 1)/2 · P_(k−1)^(1, m+1)(z), with dz = 4(x dx + y dy)/R²
-                steepness = weight * harmonic * 2 * (k + m + 1) * eval_jacobi(k - 1, 1, m + 1, argument)
-                s += steepness * w.real
-                t += steepness * w.imag
-        return s / radius, t / radius
-
-    @property
-    def affine(self) -> Affine | None:
-        """A prism, a lens and a cylinder lens, where no term beyond astigmatism (j = 6) is other than 0."""
-        if any(self.coefficients[6:]):
-            return None
-        radius = self.diameter / 2
-        _, tilt_x, tilt_y, defocus, oblique, upright = (*self.coefficients, 0.0, 0.0, 0.0, 0.0, 0.0)[:6]
-        matrix = np.eye(5)
-        matrix[2, 0] = (4 * math.sqrt(3) * defocus + 2 * math.sqrt(6) * upright) / radius**2
-        matrix[3, 1] = (4 * math.sqrt(3) * defocus - 2 * math.sqrt(6) * upright) / radius**2
-        matrix[2, 1] = matrix[3, 0] = 2 * math.sqrt(6) * oblique / radius**2
-        matrix[2:4, 4] = 2 * tilt_x / radius, 2 * tilt_y / radius
-        return Affine(matrix)
-
-    def described(self) -> str:
-        """The terms that are not 0, by Noll's numbers."""
-        terms = [f"Z{j} {short(value)}" for j, value in enumerate(self.coefficients, start=1) if value != 0]
-        return f"Zernike ({', '.join([*terms, f'diameter {short(self.diameter)}'])})"
-
-
-def noll(j: int) -> tuple[int, int]:
-    """(n, m) of Noll's term j = 1, 2, 3, …: radial order and angular frequency, m ≥ 0.
-
-    Even j go with cos mθ, odd j with sin mθ (Noll 1976, eq. 1).
-    """
-    n = (math.isqrt(8 * j - 7) - 1) // 2
-    place = j - n * (n + 1) // 2  # 1 … n + 1 within the row of order n
-    return n, 2 * (place // 2) if n % 2 == 0 else 2 * ((place - 1) // 2) + 1
-
-
-class Sheet(Surface):
-    """A surface known on a grid of points of a sheet, a spline between them, and nothing (flat) beyond.
-
-    The interpolant is the bicubic spline through the points, so that slopes and their derivatives are
-    continuous. It is made when first asked for.
-    """
-
-    width: float
-    height: float | None
-
-    @abc.abstractmethod
-    def _samples(self) -> tuple[Array, Array, Array]:
-        """(y, x, OPL) in metres: rows, columns, and the path at each, (rows, columns)."""
-
-    @property
-    @abc.abstractmethod
-    def size(self) -> tuple[float, float]:
-        """(width, height) of the sheet, metres."""
-
-    @cached_property
-    def _spline(self) -> Any:
-        from scipy.interpolate import RectBivariateSpline
-
-        y, x, path = self._samples()
-        half_width, half_height = self.size[0] / 2, self.size[1] / 2
-        # Points may lie outside the sheet, or end half a cell inside it; the spline covers both.
-        bounds = [
-            min(-half_height, y[0]),
-            max(half_height, y[-1]),
-            min(-half_width, x[0]),
-            max(half_width, x[-1]),
-        ]
-        return RectBivariateSpline(y, x, path, bbox=bounds, kx=3, ky=3, s=0)
-
-    @cached_property
-    def _gradient(self) -> tuple[Any, Any]:
-        """Splines of (∂OPL/∂x, ∂OPL/∂y)."""
-        return self._spline.partial_derivative(0, 1), self._spline.partial_derivative(1, 0)
-
-    @property
-    def affine(self) -> Affine | None:
-        """Nothing where the sheet is flat."""
-        return Affine.identity() if self._flat else None
-
-    @cached_property
-    def _flat(self) -> bool:
-        return not np.ptp(self._samples()[2])
-
-    def path(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """The spline on the sheet, metres; 0 beyond it."""
-        return self._on_sheet(self._spline, x, y)
-
-    def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """The spline's gradient on the sheet; 0 beyond it."""
-        along_x, along_y = self._gradient
-        return self._on_sheet(along_x, x, y), self._on_sheet(along_y, x, y)
-
-    def _on_sheet(self, spline: Any, x: ArrayLike, y: ArrayLike) -> Array:
-        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        # A millionth more, so that a place on the edge is on the sheet whatever rounding did to it
-        inside = (np.abs(x) <= self.size[0] * 0.500001) & (np.abs(y) <= self.size[1] * 0.500001)
-        if _is_lattice(x, y):  # then the spline is a product along both axes: 50 times as fast as place by place
-            return np.where(inside, spline(y[:, 0], x[0], grid=True), 0.0)
-        x, y = np.broadcast_arrays(x, y)
-        values = np.zeros(x.shape)
-        values[inside] = spline(y[inside], x[inside], grid=False)
-        return values
-
-    def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
-        """The largest coefficients of the slopes' splines in the rectangle, which no spline can exceed.
-
-        (The convex hull property of B-splines; de Boor, A Practical Guide to Splines.)
-        """
-        along_x, along_y = self._gradient
-        return _coefficient_bound(along_x, half_width, half_height), _coefficient_bound(
-            along_y, half_width, half_height
-        )
-
-
-def _coefficient_bound(spline: Any, half_width: float, half_height: float) -> float:
-    knots_y, knots_x, coefficients = spline.tck
-    degree_y, degree_x = spline.degrees
-    near_y = (knots_y[degree_y + 1 :] >= -half_height) & (knots_y[: -degree_y - 1] <= half_height)
-    near_x = (knots_x[degree_x + 1 :] >= -half_width) & (knots_x[: -degree_x - 1] <= half_width)
-    table = coefficients[: len(near_y) * len(near_x)].reshape(len(near_y), len(near_x))
-    return float(np.abs(table[np.ix_(near_y, near_x)]).max())
-
-
-@dataclass(frozen=True, eq=False)
-class HeightMap(Sheet):
-    """Glass of measured or designed height h: OPL = (n − 1)·h, sampled on a grid.
-
-    The sheet is ``width`` wide and bounds a plate made of it; values stand at the middles of its cells.
-
-    Args:
-        heights: thickness of the glass, metres, (rows, columns), row 0 at the top; 4×4 or more.
-        width: of the whole sheet, metres.
-        height: of the whole sheet, metres; None makes the cells square.
-        refractive_index: n of the glass, more than 1.
-
-    Raises:
-        InputError: not a table of 4×4 or more finite numbers, a size of zero or less, or no glass (n ≤ 1).
-    """
-
-    heights: NDArray[np.float64]
-    width: float = field(metadata={"unit": "length"})
-    height: float | None = field(default=None, metadata={"unit": "length"})
-    refractive_index: float = 1.5
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "heights", _table(self.heights, "heights of a height map"))
-        _check_sheet("a height map", self.width, self.height)
-        _check_glass("a height map", self.refractive_index)
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """(width, height) of the sheet, metres."""
-        return _size_of_cells(self.heights, self.width, self.height)
-
-    def _samples(self) -> tuple[Array, Array, Array]:
-        return *_middles(self.heights, self.size), (self.refractive_index - 1) * self.heights
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, HeightMap)
-            and np.array_equal(self.heights, other.heights)
-            and (self.size, self.refractive_index) == (other.size, other.refractive_index)
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.heights.tobytes(), self.size, self.refractive_index))
-
-    def described(self) -> str:
-        """The number of points, the size of the sheet and the glass in words."""
-        return f"{_table_in_words(self, self.heights)}, refractive index {self.refractive_index:g})"
-
-    def __repr__(self) -> str:
-        rows, columns = self.heights.shape
-        return (
-            f"HeightMap({rows}×{columns}, width={self.width!r}, height={self.height!r}, "
-            f"refractive_index={self.refractive_index!r})"
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class PathMap(Sheet):
-    """Optical path lengths sampled on a grid, from another program or a wavefront measurement.
-
-    The sheet is ``width`` wide and bounds a plate made of it; values stand at the middles of its cells.
-
-    Args:
-        paths: optical path lengths, metres, (rows, columns), row 0 at the top; 4×4 or more.
-        width: of the whole sheet, metres.
-        height: of the whole sheet, metres; None makes the cells square.
-
-    Raises:
-        InputError: not a table of 4×4 or more finite numbers, or a size of zero or less.
-    """
-
-    paths: NDArray[np.float64]
-    width: float = field(metadata={"unit": "length"})
-    height: float | None = field(default=None, metadata={"unit": "length"})
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "paths", _table(self.paths, "paths of a path map"))
-        _check_sheet("a path map", self.width, self.height)
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """(width, height) of the sheet, metres."""
-        return _size_of_cells(self.paths, self.width, self.height)
-
-    def _samples(self) -> tuple[Array, Array, Array]:
-        return *_middles(self.paths, self.size), self.paths
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, PathMap) and np.array_equal(self.paths, other.paths) and self.size == other.size
-
-    def __hash__(self) -> int:
-        return hash((self.paths.tobytes(), self.size))
-
-    def described(self) -> str:
-        """The number of points and the size of the sheet in words."""
-        return _table_in_words(self, self.paths) + ")"
-
-    def __repr__(self) -> str:
-        rows, columns = self.paths.shape
-        return f"PathMap({rows}×{columns}, width={self.width!r}, height={self.height!r})"
-
-
-@dataclass(frozen=True)
-class Rough(Sheet):
-    """A random surface of ground glass: Gaussian heights of correlation C(r) = σ²·exp(−r²/l²).
-
-    Its slopes are Gaussian too, with the variance (n − 1)²·2σ²/l² along each axis, which is −(n − 1)²·∂²C/∂x² at 0
-    (Papoulis, Probability, Random Variables and Stochastic Processes, on derivatives of stationary processes).
-    It is made when first asked for: white noise from NumPy's generator, filtered by exp(−2r²/l²), which has that
-    correlation. The same parameters and seed give the same surface.
-
-    Args:
-        height_rms: σ, root mean square of the heights, metres.
-        correlation_length: l, where the correlation has fallen to 1/e, metres.
-        width: of the sheet, metres; it bounds a plate made of it.
-        height: of the sheet, metres; None makes it square.
-        refractive_index: n of the glass, more than 1.
-        seed: of the random numbers, an integer of 0 or more.
-
-    Raises:
-        InputError: lengths of zero or less (σ may be 0), no glass (n ≤ 1), a seed that is no such integer, or a
-            sheet so much larger than the correlation length that its grid would be too large.
-    """
-
-    height_rms: float = field(metadata={"unit": "length"})
-    correlation_length: float = field(metadata={"unit": "length"})
-    width: float = field(metadata={"unit": "length"})
-    height: float | None = field(default=None, metadata={"unit": "length"})
-    refractive_index: float = 1.5
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not (self.height_rms >= 0 and math.isfinite(self.height_rms)):
-            raise InputError(f"height_rms of a rough surface must be 0 m or more, not {self.height_rms}")
-        _positive("correlation_length of a rough surface", self.correlation_length)
-        _check_sheet("a rough surface", self.width, self.height)
-        _check_glass("a rough surface", self.refractive_index)
-        if not _is_integer(self.seed) or self.seed < 0:
-            raise InputError(f"seed of a rough surface is an integer of 0 or more, not {self.seed!r}")
-        object.__setattr__(self, "seed", int(self.seed))
-        rows, columns = self.grid
-        if max(rows, columns) > LARGEST_GRID:
-            room = (LARGEST_GRID - 1 - 2 * _MARGIN) * self._step
-            raise InputError(
-                f"a rough surface of correlation length {short(self.correlation_length)} on a sheet of "
-                f"{short(self.size[0])} × {short(self.size[1])} takes a grid of {columns}×{rows} points, more "
-                f"than {LARGEST_GRID} a side: make the sheet at most {short(room, digits=4)} wide and high, or "
-                "use a Diffuser, which scatters without a grid"
-            )
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """(width, height) of the sheet, metres."""
-        return self.width, self.width if self.height is None else self.height
-
-    @property
-    def grid(self) -> tuple[int, int]:
-        """(rows, columns) of points at which the surface is made, the outermost a few beyond each edge."""
-        # A millionth of a step less: a sheet of a whole number of steps is not one step longer by rounding
-        rows, columns = (math.ceil(length / self._step - 1e-6) + 1 + 2 * _MARGIN for length in self.size[::-1])
-        return rows, columns
-
-    @property
-    def _step(self) -> float:
-        return self.correlation_length / POINTS_PER_CORRELATION_LENGTH
-
-    @property
-    def slope_rms(self) -> float:
-        """Root mean square of Δs, and of Δt, over all such surfaces: (n − 1)·√2·σ/l."""
-        return (self.refractive_index - 1) * math.sqrt(2) * self.height_rms / self.correlation_length
-
-    @property
-    def affine(self) -> Affine | None:
-        """Nothing where the glass is smooth."""
-        return Affine.identity() if self.height_rms == 0 else None
-
-    def _samples(self) -> tuple[Array, Array, Array]:
-        from scipy.ndimage import convolve1d
-
-        # exp(−2·3²) = 1.5e-8: what lies further out than 3 l does not show in float32
-        reach = 3 * POINTS_PER_CORRELATION_LENGTH
-        kernel = np.exp(-2 * (np.arange(-reach, reach + 1) / POINTS_PER_CORRELATION_LENGTH) ** 2)
-        kernel /= np.sqrt(np.sum(kernel**2))  # so that noise of variance 1 stays so
-        rows, columns = self.grid
-        heights = np.random.default_rng(self.seed).standard_normal((rows + 2 * reach, columns + 2 * reach))
-        # Only points with the whole kernel inside the noise are kept: no edge, no wrapping around.
-        heights = convolve1d(heights, kernel, axis=0)[reach:-reach]
-        heights = convolve1d(heights, kernel, axis=1)[:, reach:-reach]
-        y, x = (
-            np.asarray((np.arange(points) - (points - 1) / 2) * self._step, dtype=np.float64)
-            for points in (rows, columns)
-        )
-        return y, x, np.asarray((self.refractive_index - 1) * self.height_rms * heights)
-
-
-_MARGIN = 3
-"""Points of a rough surface beyond each edge of its sheet, where the spline's ends do no harm."""
-
-
-def _is_lattice(x: Array, y: Array) -> bool:
-    """Whether places are rows y, (rows, 1), times columns x, (1, columns), in order."""
-    if not (x.ndim == y.ndim == 2 and x.shape[0] == 1 and y.shape[1] == 1):
-        return False
-    return bool((np.diff(x[0]) > 0).all() and (np.diff(y[:, 0]) > 0).all())
-
-
-def _places(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-    x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
-    return x, y
-
-
-def _in_words(surface: Surface) -> str:
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", type(surface).__name__).lower()
-
-
-def _table_in_words(surface: Surface, values: Array) -> str:
-    rows, columns = values.shape
-    width, height = surface.size
-    return f"{_in_words(surface)} ({rows}×{columns} points, {short(width)} × {short(height)}"
-
-
-def _positive(what: str, value: float) -> None:
-    if not (value > 0 and math.isfinite(value)):
-        raise InputError(f"{what} must be greater than 0 m, not {value}")
-
-
-def _is_integer(value: object) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
-
-
-def _table(given: Any, what: str) -> Array:
-    try:
-        values = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} are a table of numbers of metres, (rows, columns)") from None
-    if values.ndim != 2 or min(values.shape) < 4:
-        raise InputError(
-            f"{what} are a table of 4×4 or more (a cubic spline needs 4), not of shape {values.shape}"
-        )
-    if not np.isfinite(values).all():
-        row, column = np.argwhere(~np.isfinite(values))[0]
-        raise InputError(f"{what} must be finite numbers; row {row}, column {column} is {values[row, column]}")
-    values.flags.writeable = False
-    return values
-
-
-def _check_sheet(what: str, width: float, height: float | None) -> None:
-    _positive(f"width of {what}", width)
-    if height is not None:
-        _positive(f"height of {what}", height)
-
-
-def _check_glass(what: str, refractive_index: Any) -> None:
-    if not (isinstance(refractive_index, Real) and 1 < refractive_index < math.inf):  # type: ignore[operator]
-        raise InputError(
-            f"refractive_index of {what} is {refractive_index}: a surface with no glass bends "
-            "nothing; glass has more than 1, such as 1.5"
-        )
-
-
-def _size_of_cells(values: Array, width: float, height: float | None) -> tuple[float, float]:
-    rows, columns = values.shape
-    return width, width * rows / columns if height is None else height
-
-
-def _middles(values: Array, size: tuple[float, float]) -> tuple[Array, Array]:
-    """Places (y of rows, x of columns) of the middles of cells, metres."""
-    rows, columns = values.shape
-    return (
-        ((np.arange(rows) + 0.5) / rows - 0.5) * size[1],
-        ((np.arange(columns) + 0.5) / columns - 0.5) * size[0],
-    )

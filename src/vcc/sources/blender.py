@@ -18,6 +18,7 @@ import json
 import math
 from typing import Final, Literal, get_args
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.sources.views import CameraArray
@@ -65,11 +66,10 @@ def blender_script(
                 "file that states the geometry of its views (parameters.cfg) has one number for both. "
                 "Of an aperture (height, width), each side is the spacing times the views along it"
             )
-    for name, given, known in (("picture_format", picture_format, PictureFormat), ("engine", engine, Engine)):
-        if given not in get_args(known):
-            raise InputError(f'{name} is one of {", ".join(get_args(known))}, not "{given}"')
-    if samples is not None and (not isinstance(samples, int) or samples < 1):
-        raise InputError(f"samples are a whole number of 1 or more per pixel, not {samples}")
+    checks.one_of("picture_format", picture_format, get_args(PictureFormat))
+    checks.one_of("engine", engine, get_args(Engine))
+    if samples is not None:
+        checks.whole_number_between("samples", samples, 1, of="rays a pixel")
     if not folder.strip():
         raise InputError("the folder for the views has no name")
     rows, columns = cameras.views

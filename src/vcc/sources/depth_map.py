@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.base import late
+from vcc.base import checks, late
 from vcc.base.errors import InputError
 from vcc.sources.views import CameraArray, ViewCamera
 
@@ -83,8 +83,8 @@ class DepthMapScene:
                 f"the depth map has the shape {distance.shape}, and the picture {picture.shape[:2]}: "
                 "they are of the same pixels"
             )
-        if not (np.isfinite(picture).all() and picture.min() >= 0):
-            raise InputError("radiance is a finite number of 0 or more in every pixel")
+        checks.all_finite("radiance", picture)
+        checks.none_negative("radiance", picture)
         if not (distance > 0).all():
             where = tuple(int(n) for n in np.argwhere(~(distance > 0))[0])
             raise InputError(
@@ -93,14 +93,10 @@ class DepthMapScene:
             )
         slopes = slope_per_pixel if isinstance(slope_per_pixel, tuple) else (slope_per_pixel, slope_per_pixel)
         for name, value in (("slope_per_pixel", min(slopes)), ("reach", reach), ("edge", edge)):
-            if not (value > 0 and math.isfinite(value)):
-                raise InputError(f"{name} must be greater than 0, not {value}")
-        if not isinstance(supersampling, int) or not 1 <= supersampling <= 16:
-            raise InputError(f"supersampling is a whole number from 1 to 16, not {supersampling}")
-        self.slopes, self.reach, self.edge, self.supersampling = slopes, float(reach), float(edge), supersampling
-        if not focus_distance > 0:
-            raise InputError(f"focus_distance must be greater than 0, not {focus_distance}")
-        self.focus_distance = float(focus_distance)
+            checks.above_zero(name, value)
+        self.slopes, self.reach, self.edge = slopes, float(reach), float(edge)
+        self.supersampling = checks.whole_number_between("supersampling", supersampling, 1, 16)
+        self.focus_distance = checks.above_zero("focus_distance", focus_distance, unit="m", infinite=True)
         self._picture, self._vergence = picture, 1 / distance
         farthest = float(np.abs(self._vergence - 1 / self.focus_distance).max())
         margins = [self.reach * farthest / slope for slope in slopes]

@@ -11,21 +11,18 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.sources.meshes import Part, loaded, parts_of
 from vcc.sources.views import CameraArray, ViewCamera
-
-MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply")
-"""The endings of the files that `OpenGLRenderer` reads."""
 
 _NEAREST_SHARE = 1e-4
 """The depth buffer reaches from this share of the farthest distance on."""
-_COSINE_OF_CREASE = math.cos(math.radians(30))
 
 Vector = tuple[float, float, float]
 
@@ -50,8 +47,7 @@ class Viewpoint:
     unit: float = field(default=1.0, metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        if not (self.unit > 0 and math.isfinite(self.unit)):
-            raise InputError(f"the unit of a scene is a length in metres above 0, not {self.unit}")
+        checks.above_zero("the unit of a scene", self.unit, "a length in metres")
         back = np.subtract(self.eye, self.target)
         if not np.linalg.norm(back) > 0:
             raise InputError(f"a viewpoint looks from eye to target, and both are {self.eye}")
@@ -95,24 +91,16 @@ class Lighting:
 
     def __post_init__(self) -> None:
         for name in ("ambient", "sun", "fill"):
-            light = getattr(self, name)
-            if len(light) != 3 or not all(part >= 0 and math.isfinite(part) for part in light):
-                raise InputError(f"{name} is light as (red, green, blue), each 0 or more, not {light}")
+            _light(name, getattr(self, name))
         if not 0 < math.hypot(*self.sun_from) < math.inf:
             raise InputError(f"sun_from is a direction of three numbers, not {self.sun_from}")
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """Triangles that share a material, in the array's coordinates."""
-
-    corners: NDArray[np.float32]
-    """(3 · triangles, 12): position, normal, texture place (0 to 1, v upwards), linear colour with opacity."""
-    texture: NDArray[np.float16] | None
-    """(rows, columns, 4), linear, bottom row first."""
-    cutoff: float
-    """Opacity below which nothing is drawn."""
-    two_sided: bool
+def _light(name: str, given: Vector) -> Vector:
+    """Radiance as floats, none of them below 0."""
+    if len(given) != 3 or not all(part >= 0 and math.isfinite(part) for part in given):
+        raise InputError(f"{name} is light as (red, green, blue), each 0 or more, not {given}")
+    return float(given[0]), float(given[1]), float(given[2])
 
 
 class OpenGLRenderer:
@@ -151,16 +139,13 @@ class OpenGLRenderer:
         multisampling: int = 4,
     ) -> None:
         for name, count in (("supersampling", supersampling), ("multisampling", multisampling)):
-            if not isinstance(count, int) or not 1 <= count <= 16:
-                raise InputError(f"{name} is a whole number from 1 to 16, not {count}")
-        if len(background) != 3 or not all(part >= 0 and math.isfinite(part) for part in background):
-            raise InputError(f"background is (red, green, blue), each 0 or more, not {background}")
+            checks.whole_number_between(name, count, 1, 16)
         self.viewpoint = viewpoint or Viewpoint()
         self.lighting = lighting or Lighting()
-        self.background = tuple(float(part) for part in background)
+        self.background = _light("background", background)
         self.supersampling, self.multisampling = supersampling, multisampling
-        self._names, scenes = _loaded(meshes)
-        self._parts = _parts(scenes, self.viewpoint.array_from_scene())
+        self._names, scenes = loaded(meshes)
+        self._parts = parts_of(scenes, self.viewpoint.array_from_scene())
         far = np.concatenate([-part.corners[:, 2] for part in self._parts])
         if not far.max() > 0:
             raise InputError(
@@ -193,7 +178,7 @@ class OpenGLRenderer:
         Raises:
             InputError: see the class; or views so far apart or so narrow that nothing fits.
         """
-        _, scenes = _loaded(meshes)
+        _, scenes = loaded(meshes)
         low = np.min([scene.bounds[0] for scene in scenes], axis=0)
         high = np.max([scene.bounds[1] for scene in scenes], axis=0)
         middle = (low + high) / 2
@@ -311,7 +296,7 @@ void main() {
 class _Drawing:
     """An OpenGL context with the parts in its memory."""
 
-    def __init__(self, parts: Sequence[_Part], lighting: Lighting, multisampling: int) -> None:
+    def __init__(self, parts: Sequence[Part], lighting: Lighting, multisampling: int) -> None:
         self.context = _context()
         most = self.context.max_samples
         if multisampling > most:
@@ -336,7 +321,7 @@ class _Drawing:
         if name in self.program:  # a compiler leaves out what it finds unused
             self.program[name].value = value
 
-    def _loaded(self, part: _Part) -> tuple[Any, Any]:
+    def _loaded(self, part: Part) -> tuple[Any, Any]:
         buffer = self.context.buffer(part.corners.tobytes())
         layout = (buffer, "3f 3f 2f 4f", "position", "normal", "place", "colour")
         array = self.context.vertex_array(self.program, [layout])
@@ -413,12 +398,8 @@ class _Drawing:
 
 
 def _context() -> Any:
-    try:
+    with checks.package("drawing meshes", "moderngl", "opengl"):
         import moderngl
-    except ImportError:
-        raise InputError(
-            'drawing meshes needs the package moderngl: pip install "virtual-computational-camera[opengl]"'
-        ) from None
     try:
         create: Any = moderngl.create_context  # whose stubs leave out its options
         return create(standalone=True, backend="egl", require=330)
@@ -427,182 +408,3 @@ def _context() -> Any:
             f"OpenGL cannot be opened without a screen, through EGL ({error}). Install EGL and Mesa's drivers, "
             'which also draw without a graphics card: "apt install libegl1 libgl1-mesa-dri" on Debian and Ubuntu'
         ) from None
-
-
-def _loaded(meshes: Any) -> tuple[list[str], list[Any]]:
-    """Names, and trimesh scenes with where they came from (file ending or "")."""
-    try:
-        import trimesh
-    except ImportError:
-        raise InputError(
-            "reading meshes needs the packages trimesh and pillow: "
-            'pip install "virtual-computational-camera[opengl]"'
-        ) from None
-    given = list(meshes) if isinstance(meshes, list | tuple) else [meshes]
-    if not given:
-        raise InputError("there are no meshes to draw: give at least one file")
-    names, scenes = [], []
-    for each in given:
-        if isinstance(each, trimesh.Scene):
-            scene = each
-        elif isinstance(each, trimesh.Trimesh):
-            scene = trimesh.Scene(each)
-        elif isinstance(each, str | Path):
-            scene = _read(Path(each))
-        else:
-            raise InputError(f"a mesh is a file or an object of trimesh, not {type(each).__name__}")
-        if not any(isinstance(part, trimesh.Trimesh) and len(part.faces) for part in scene.geometry.values()):
-            raise InputError(f"{each} holds no triangles: point clouds and lines are not drawn")
-        scenes.append(scene)
-        names.append(Path(each).name if isinstance(each, str | Path) else type(each).__name__)
-    return names, scenes
-
-
-def _read(path: Path) -> Any:
-    import trimesh
-
-    if path.suffix.lower() not in MESH_ENDINGS:
-        raise InputError(f'{path} has the ending "{path.suffix}"; meshes are read from {", ".join(MESH_ENDINGS)}')
-    if not path.is_file():
-        raise InputError(f"there is no mesh file {path}")
-    if path.suffix.lower() == ".obj":
-        _check_materials(path)
-    try:
-        scene = trimesh.load_scene(path)
-    except Exception as error:  # each of its readers has its own types for a damaged file
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path} cannot be read as a mesh: it is damaged or incomplete ({reason})") from error
-    scene.metadata["ending"] = path.suffix.lower()
-    return scene
-
-
-def _check_materials(path: Path) -> None:
-    """Refuse an OBJ whose material file or pictures are missing: it would be drawn grey without a word."""
-    for library in _named_in(path, "mtllib"):
-        if not library.is_file():
-            raise InputError(f"{path} names the material file {library.name}, which is not beside it")
-        for picture in _named_in(library, "map_Kd"):
-            if not picture.is_file():
-                raise InputError(f"{library} names the picture {picture.name}, and there is no {picture}")
-
-
-def _named_in(path: Path, word: str) -> list[Path]:
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    rests = [
-        line.split(maxsplit=1)[1].strip() for line in lines if line.split()[:1] == [word] and len(line.split()) > 1
-    ]
-    # options of a map ("-s 1 1 1 wood.png") come before its name
-    return [
-        path.parent / (rest.split()[-1] if rest.startswith("-") else rest).replace("\\", "/") for rest in rests
-    ]
-
-
-def _parts(scenes: Sequence[Any], array_from_scene: NDArray[np.float64]) -> list[_Part]:
-    import trimesh
-
-    parts = []
-    for scene in scenes:
-        linear_colours = scene.metadata.get("ending") in (".glb", ".gltf")
-        for node in scene.graph.nodes_geometry:
-            placed, name = scene.graph[node]
-            mesh = scene.geometry[name]
-            if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-                parts.append(_part(mesh, array_from_scene @ placed, linear_colours))
-    return parts
-
-
-def _part(mesh: Any, to_array: NDArray[np.float64], linear_colours: bool) -> _Part:
-    faces = np.asarray(mesh.faces)
-    positions = np.asarray(mesh.vertices) @ to_array[:3, :3].T + to_array[:3, 3]
-    if "vertex_normals" in mesh._cache:  # the file states them
-        normals = np.asarray(mesh.vertex_normals) @ np.linalg.inv(to_array[:3, :3])
-        normals = (normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))[faces]
-    else:
-        normals = _normals_of_corners(positions, faces)
-    if np.linalg.det(to_array[:3, :3]) > 0:  # the array's axes are left-handed: the usual case is below 0
-        faces, normals = faces[:, ::-1], normals[:, ::-1]
-    corner, normals = faces.ravel(), normals.reshape(-1, 3)
-    places = np.zeros((len(positions), 2))
-    colours, texture, cutoff, two_sided = np.ones((len(positions), 4)), None, 0.5, True
-    visual = mesh.visual
-    if visual.kind == "texture":
-        if visual.uv is not None:
-            places = np.asarray(visual.uv, dtype=np.float64)
-        colours[:], texture, cutoff, two_sided = _material(visual.material, linear_colours)
-    elif visual.kind == "face":
-        by_face = _linear(np.asarray(visual.face_colors), linear_colours)
-        return _Part(
-            _interleaved(positions[corner], normals, places[corner], np.repeat(by_face, 3, axis=0)),
-            None,
-            cutoff,
-            two_sided,
-        )
-    else:
-        colours = _linear(np.asarray(visual.vertex_colors), linear_colours)
-    return _Part(
-        _interleaved(positions[corner], normals, places[corner], colours[corner]),
-        texture,
-        cutoff,
-        two_sided,
-    )
-
-
-def _normals_of_corners(positions: NDArray[np.float64], faces: NDArray[Any]) -> NDArray[np.float64]:
-    """Normals (triangles, 3, 3) of a surface that states none: smooth, but sharp at creases of 30° and more.
-
-    A corner has the mean normal, by area, of those triangles at its place that are within 30° of its own.
-    """
-    first, second, third = (positions[faces[:, n]] for n in range(3))
-    by_area = np.cross(second - first, third - first)
-    unit = by_area / np.maximum(np.linalg.norm(by_area, axis=1, keepdims=True), 1e-30)
-    # Vertices are doubled along seams of textures: what counts is the place.
-    place = np.unique(positions, axis=0, return_inverse=True)[1].ravel()[faces].ravel()
-    order = np.argsort(place, kind="stable")
-    counts = np.bincount(place)
-    starts = np.cumsum(counts) - counts
-    total = np.zeros((len(place), 3))
-    for turn in range(int(counts.max())):
-        there = order[counts[place[order]] > turn]  # each corner meets the turn-th corner at its place
-        other = order[starts[place[there]] + turn]
-        close = np.einsum("ij,ij->i", unit[there // 3], unit[other // 3]) > _COSINE_OF_CREASE
-        total[there[close]] += by_area[other[close] // 3]
-    total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-30)
-    return total.reshape(-1, 3, 3)
-
-
-def _interleaved(*columns: NDArray[np.float64]) -> NDArray[np.float32]:
-    return np.ascontiguousarray(np.concatenate(columns, axis=1), dtype=np.float32)
-
-
-def _linear(colours: NDArray[Any], already: bool) -> NDArray[np.float64]:
-    """Linear colour and opacity, 0 to 1, of 8-bit ones."""
-    from vcc.files.transfer import to_linear
-
-    shares = colours.astype(np.float64) / 255
-    if not already:
-        shares[..., :3] = to_linear(shares[..., :3])
-    return shares
-
-
-def _material(
-    material: Any, linear_colours: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float16] | None, float, bool]:
-    """(colour and opacity, texture, least opacity, seen from both sides) of trimesh's materials."""
-    pbr = hasattr(material, "baseColorTexture")
-    image = material.baseColorTexture if pbr else getattr(material, "image", None)
-    colour = np.ones(4)
-    if pbr and material.baseColorFactor is not None:
-        colour = _linear(np.asarray(material.baseColorFactor), True)  # linear by glTF's definition
-    elif not pbr and image is None:
-        colour = _linear(np.asarray(material.main_color), linear_colours)
-    cutoff, two_sided = 0.5, True
-    if pbr:
-        two_sided = not linear_colours or bool(material.doubleSided)
-        if (material.alphaMode or "OPAQUE") == "OPAQUE":
-            cutoff = 0.0
-        elif material.alphaMode == "MASK" and material.alphaCutoff is not None:
-            cutoff = float(material.alphaCutoff)
-    if image is None:
-        return colour, None, cutoff, two_sided
-    samples = _linear(np.asarray(image.convert("RGBA")), False)
-    return colour, samples[::-1].astype(np.float16), cutoff, two_sided

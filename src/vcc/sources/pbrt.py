@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.sources.views import ViewCamera
 
@@ -244,15 +245,13 @@ class PbrtRenderer:
                 f"there is no program {found or 'pbrt'}: build PBRT version 4, and put it on the PATH or name it "
                 "by the environment variable PBRT"
             )
-        if samples is not None and samples < 1:
-            raise InputError(f"samples are paths per pixel, 1 or more, not {samples}")
-        if not (metres_per_unit > 0 and math.isfinite(metres_per_unit)):
-            raise InputError(f"metres_per_unit must be greater than 0, not {metres_per_unit}")
+        if samples is not None:
+            checks.whole_number_between("samples", samples, 1, of="paths a pixel")
         self._program = found
         self._scene = PbrtScene.read(scene)
         self._samples = samples
         self._seed = int(seed)
-        self._metres_per_unit = float(metres_per_unit)
+        self._metres_per_unit = checks.above_zero("metres_per_unit", metres_per_unit)
 
     def description(self) -> dict[str, Any]:
         """All that a picture depends on except the camera; files and the program by their SHA-256."""

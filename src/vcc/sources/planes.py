@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -18,9 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from vcc.base import late
+from vcc.base import checks, late
 from vcc.base.errors import InputError
 from vcc.light_field import LightField
+from vcc.plan.how import cores
+from vcc.shapes.patterns import overlap_share
 from vcc.sources.textures import Array, Texture, mean_radiance_and_opacity, radiance_and_opacity
 from vcc.sources.views import CameraArray, ViewCamera
 
@@ -67,16 +68,13 @@ class TexturedPlane:
     pitch: float = field(default=0.0, metadata={"unit": "angle"})
 
     def __post_init__(self) -> None:
-        if not (self.distance > 0 and math.isfinite(self.distance)):
-            raise InputError(f"the distance of a plane must be greater than 0 m, not {self.distance}")
-        for name, size in (("width", self.width), ("height", self.height)):
-            if size is not None and not size > 0:
-                raise InputError(f"the {name} of a plane must be greater than 0 m, not {size}")
-        if not 0 <= self.opacity <= 1:
-            raise InputError(f"the opacity of a plane lies between 0 and 1, not {self.opacity}")
-        for name in ("yaw", "pitch"):
-            if not math.isfinite(getattr(self, name)):
-                raise InputError(f"the {name} of a plane is an angle in radians, not {getattr(self, name)}")
+        checks.above_zero("the distance of a plane", self.distance, unit="m")
+        checks.above_zero("the width of a plane", self.width, unit="m", infinite=True)
+        if self.height is not None:
+            checks.above_zero("the height of a plane", self.height, unit="m", infinite=True)
+        checks.zero_or_more("the opacity of a plane", self.opacity, most=1)
+        checks.finite("the yaw of a plane", self.yaw, "radians")
+        checks.finite("the pitch of a plane", self.pitch, "radians")
 
     @property
     def tilted(self) -> bool:
@@ -202,8 +200,7 @@ def _share_inside(place: Array, size: float, cell: Array | float) -> Array:
     """The share of cells around places that lies within ±size/2, along one axis."""
     if math.isinf(size) or (np.ndim(cell) == 0 and cell == 0):
         return (np.abs(place) <= size / 2).astype(np.float64)
-    covered = np.minimum(place + cell / 2, size / 2) - np.maximum(place - cell / 2, -size / 2)
-    return np.asarray(np.clip(covered / cell, 0.0, 1.0))
+    return overlap_share(place, cell, size)
 
 
 class PlanesScene:
@@ -296,7 +293,7 @@ class PlanesScene:
         # As far to both sides: an array begins in a corner, and what is kept for it holds for all others.
         if kept is None or not kept[0].holds(camera.pixels, slope, margins):
             grid = _GridAround((1, 1), camera.pixels, 1.0, slope, math.inf, margins)
-            with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+            with ThreadPoolExecutor(cores()) as pool:
                 kept = self._kept = (grid, _rasters(self.planes, grid, pool))
         grid, rasters = kept
         down, across = (_starts_at(shifts[:, n : n + 1], grid.margins[n]) for n in (0, 1))
@@ -339,7 +336,7 @@ class PlanesScene:
             slope_per_pixel: pixel pitch over focal length of the views.
             focus_distance: where the views converge, metres.
             dtype: ``"uint8"``, ``"uint16"`` or ``"float32"``.
-            threads: how many; None takes the processors there are.
+            threads: how many work at once; None takes as many as this process may use cores.
             progress: called with (done, total) in rows of views.
 
         Returns:
@@ -362,7 +359,7 @@ class PlanesScene:
             _fill_view_by_view(self, values, cameras, threads, progress)
             return cameras.light_field(values)
         disparities = [spacing * (1 / z - 1 / focus_distance) / slope_per_pixel for z in self.distances]
-        with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        with ThreadPoolExecutor(threads or cores()) as pool:
             grid = _Grid(views, pixels, spacing, slope_per_pixel, focus_distance)
             rasters = _rasters(self.planes, grid, pool)
             _fill(values, self.planes, grid, rasters, pool, progress)
@@ -484,7 +481,7 @@ def _fill_view_by_view(
         values[row, column] = np.rint(np.clip(picture, 0, 1) * top) if whole else picture
 
     rows, columns = cameras.views
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(threads or cores()) as pool:
         for row in range(rows):
             for task in [pool.submit(view, row, column) for column in range(columns)]:
                 task.result()

@@ -7,17 +7,16 @@ from collections.abc import Callable
 from dataclasses import asdict
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from vcc import __version__
 from vcc.base.errors import InputError, ResultWarning
 from vcc.light_field import LightField
 from vcc.sources.views import CameraArray, ViewCamera
-
-if TYPE_CHECKING:
-    from vcc.store import StoredLightField
+from vcc.store import StoredLightField, create_store
 
 DTYPES = ("float16", "float32", "uint8", "uint16")
 """What the samples of a synthesized light field may be kept as."""
@@ -101,9 +100,6 @@ def _in_memory(
 def _in_store(
     renderer: Renderer, cameras: CameraArray, path: Path, kind: np.dtype[Any], progress: Progress | None
 ) -> StoredLightField:
-    from vcc import __version__
-    from vcc.store import create_store
-
     rendered = renderer.description()
     description = {"renderer": rendered, "cameras": asdict(cameras), "dtype": kind.name}
     provenance = {"made_by": f"vcc {__version__}, vcc.sources.synthesize", "renderer": rendered}

@@ -19,7 +19,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.files.pictures import read_picture
+from vcc.files.transfer import decode
 
 Array = NDArray[Any]
 Texture = Callable[[Array, Array], Array]
@@ -170,10 +173,9 @@ class Picture:
             values = np.repeat(values[..., None], 3, axis=-1)
         if values.ndim != 3 or values.shape[2] not in (3, 4) or 0 in values.shape:
             raise InputError(f"a picture has (rows, columns) and 1, 3 or 4 channels, not shape {values.shape}")
-        if not np.isfinite(values).all() or values.min() < 0:
-            raise InputError("a picture on a plane needs finite radiance of 0 or more")
-        if not (self.width > 0 and math.isfinite(self.width)):
-            raise InputError(f"the width of a picture must be greater than 0 m, not {self.width}")
+        checks.all_finite("a picture on a plane", values)
+        checks.none_negative("a picture on a plane", values)
+        checks.above_zero("the width of a picture", self.width, unit="m")
         if values.shape[2] == 3:
             values = np.concatenate([values, np.ones_like(values[..., :1])], axis=-1)
         object.__setattr__(self, "values", values)
@@ -194,10 +196,7 @@ class Picture:
             InputError: a file that cannot be read, an opacity in another kind of file, or a transfer that there is
                 not.
         """
-        from vcc.files.transfer import decode
-
-        if transfer not in ("srgb", "linear"):
-            raise InputError(f'transfer is "srgb" or "linear", not "{transfer}"')
+        checks.one_of("transfer", transfer, ("srgb", "linear"))
         samples, opacity = _read_with_opacity(Path(path))
         full = float(np.iinfo(samples.dtype).max) if samples.dtype.kind == "u" else 1.0
         values = decode(samples).astype(np.float64) if transfer == "srgb" else samples.astype(np.float64) / full
@@ -275,8 +274,6 @@ def _averaged(values: Array, axis: int, count: int) -> Array:
 
 def _read_with_opacity(path: Path) -> tuple[Array, Array | None]:
     """Samples as stored, (rows, columns[, 3]), and opacity, 0 to 1, if there is any that is not 1."""
-    from vcc.files.pictures import read_picture
-
     if path.suffix.lower() == ".png" and path.is_file():
         import imagecodecs
 

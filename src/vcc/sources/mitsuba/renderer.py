@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
 from vcc.sources.views import ViewCamera
 
@@ -49,13 +50,8 @@ def mitsuba_library() -> Any:
     Raises:
         InputError: it is not installed, or does not load.
     """
-    try:
+    with checks.package("rendering by Mitsuba", "mitsuba", "mitsuba"):
         import mitsuba
-    except ImportError as error:
-        raise InputError(
-            f"rendering by Mitsuba needs the package mitsuba ({error}): "
-            'pip install "virtual-computational-camera[mitsuba]"'
-        ) from None
     return mitsuba
 
 
@@ -174,13 +170,10 @@ class MitsubaRenderer:
         sensor: int = 0,
         parameters: Mapping[str, str] | None = None,
     ) -> None:
-        if samples < 1:
-            raise InputError(f"samples are paths per pixel, 1 or more, not {samples}")
-        if not (metres_per_unit > 0 and math.isfinite(metres_per_unit)):
-            raise InputError(f"metres_per_unit must be greater than 0, not {metres_per_unit}")
+        checks.whole_number_between("samples", samples, 1, of="paths a pixel")
+        self._metres_per_unit = checks.above_zero("metres_per_unit", metres_per_unit)
         self.variant = _chosen(variant)
         self._seed = int(seed)
-        self._metres_per_unit = float(metres_per_unit)
         self._contents = _contents(scene, dict(parameters or {}))
         with _variant(self.variant) as mitsuba:
             self._scene = _loaded(mitsuba, scene, dict(parameters or {}))
@@ -294,9 +287,7 @@ def _settled(mitsuba: Any, sampler: Any, samples: int) -> int:
 
 
 def _pose(to_world: ArrayLike) -> NDArray[np.float64]:
-    matrix = np.asarray(to_world, dtype=np.float64)
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        raise InputError(f"to_world is a 4×4 matrix of finite numbers, not an array of shape {matrix.shape}")
+    matrix = checks.array("to_world", to_world, "a 4×4 matrix of numbers", 4, 4)
     turn = matrix[:3, :3]
     # Single precision is all that Mitsuba keeps of a matrix.
     if not np.allclose(turn.T @ turn, np.eye(3), atol=1e-5) or not np.allclose(matrix[3], (0, 0, 0, 1)):

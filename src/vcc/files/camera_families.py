@@ -1,0 +1,201 @@
+"""What camera files hold: the classes that they write by name, and the fields of a class that they write.
+
+Reading and writing go by the fields of the dataclasses, their types and their units, so that a new element,
+pattern, kernel or surface needs no code here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import types
+import warnings
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Union, get_args, get_origin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc import optics
+from vcc.base.describe import kind_in_words
+from vcc.base.errors import InputError
+from vcc.optics import Element, FirstOrder
+from vcc.prescriptions import load_lens
+from vcc.shapes import height_maps, kernels, lattice, patterns, surfaces, zernike
+from vcc.shapes.kernels import Kernel
+from vcc.shapes.patterns import Pattern
+from vcc.shapes.sheets import Product
+from vcc.shapes.surface import Surface
+
+
+def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
+    """The classes of modules that can be made, by their names in a file: CosineSum is "cosine_sum"."""
+    things = [(thing, module) for module in modules for thing in vars(module).values() if inspect.isclass(thing)]
+    own = [kind for kind, module in things if kind.__module__.startswith(module.__name__)]
+    kinds = [kind for kind in own if issubclass(kind, base) and not inspect.isabstract(kind)]
+    return {kind_in_words(kind, "_"): kind for kind in kinds}
+
+
+ELEMENT_KINDS: dict[str, type[Element]] = dict(sorted(_named(Element, optics).items()))
+"""Which class each ``kind`` in a camera file stands for. Add your own to read and write them."""
+
+PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice) | {"product": Product}
+"""Which class each ``name`` of a pattern in a camera file stands for. Add your own."""
+del PATTERN_NAMES["function_pattern"]  # Python, which no file can hold
+
+KERNEL_NAMES: dict[str, type[Kernel]] = _named(Kernel, kernels)
+"""Which class each ``name`` of a diffuser's kernel in a camera file stands for. Add your own."""
+
+SURFACE_NAMES: dict[str, type[Surface]] = _named(Surface, surfaces, zernike, height_maps)
+"""Which class each ``name`` of a phase plate's surface in a camera file stands for. Add your own."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Mura:
+    """`vcc.patterns.mura` as a file writes it; its cells are an array."""
+
+    prime: int
+
+    def made(self) -> NDArray[np.float64]:
+        return patterns.mura(self.prime)
+
+
+@dataclasses.dataclass(frozen=True)
+class Family:
+    """Things that a file writes by name, like ``{ name = "circle", diameter = "5 mm" }``.
+
+    Args:
+        base: the class of all of them.
+        names: which class each name stands for.
+        example: of one as a file writes it.
+        way_out: what to do with a thing that has no name.
+        arrays: names that stand for an array, where a field takes arrays too.
+    """
+
+    base: type
+    names: dict[str, Any]
+    example: str
+    way_out: str
+    arrays: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    @property
+    def noun(self) -> str:
+        """What one of them is called: "pattern"."""
+        return self.base.__name__.lower()
+
+    @property
+    def module(self) -> str:
+        """Where users find them: "vcc.patterns"."""
+        return f"vcc.{self.noun}s"
+
+    @property
+    def table(self) -> str:
+        """Where users add names: "PATTERN_NAMES"."""
+        return f"{self.noun.upper()}_NAMES"
+
+
+FAMILIES = (
+    Family(
+        Pattern,
+        PATTERN_NAMES,
+        '{ name = "circle", diameter = "5 mm" }',
+        "Mask(pattern=function(x, y), width=…) with arrays x and y of cell centres",
+        {"mura": _Mura},
+    ),
+    Family(
+        Kernel,
+        KERNEL_NAMES,
+        '{ name = "gaussian", sigma = 0.01 }',
+        "vcc.kernels.Samples(kernel.density(s, t), slope_pitch=…, normalise=True) with arrays s and t of slopes",
+    ),
+    Family(
+        Surface,
+        SURFACE_NAMES,
+        '{ name = "cubic", strength = 250.0 }',
+        "vcc.surfaces.PathMap(paths, width=…) with the optical path in metres at cell centres",
+    ),
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class _LensFile:
+    """`vcc.load_lens` as a file writes it: a real lens in a file beside the camera file."""
+
+    lens_file: str
+    stop_diameter: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    f_number: float | None = None
+    wavelength: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    glasses: dict[str, float] | None = None
+    rims: bool = False
+    z: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
+    decentre: tuple[float, float] = dataclasses.field(default=(0.0, 0.0), metadata={"unit": "length"})
+    name: str = ""
+
+    def made(self, folder: Path) -> FirstOrder:
+        given = {
+            field.name: getattr(self, field.name)
+            for field in dataclasses.fields(self)[1:]
+            if getattr(self, field.name) is not None
+        }
+        lens = load_lens(folder / Path(self.lens_file).expanduser(), **given)
+        return dataclasses.replace(lens, source=self.lens_file)
+
+    @classmethod
+    def of(cls, lens: FirstOrder, folder: Path) -> _LensFile | None:
+        """The form that gives an equal lens; None if it came from no file, or that is gone or gives another."""
+        rims = lens.exit_diameter is not None
+        for stop in (None, lens.stop_diameter):
+            form = cls(lens.source, stop, rims=rims, z=lens.z, decentre=lens.decentre, name=lens.name)
+            try:
+                with warnings.catch_warnings():  # of a wide stop, which was said when it was read
+                    warnings.simplefilter("ignore")
+                    if lens.source and form.made(folder) == lens:
+                        return form
+            except (InputError, OSError):  # no such file, or a source that is no file's name at all
+                continue
+        return None
+
+
+FROM_FILES: dict[type[Element], Any] = {FirstOrder: _LensFile}
+"""Elements that another file than an array's can describe: the form to read when its first field is given."""
+
+
+# --- fields and names ---
+
+
+def parameters_of(kind: type) -> dict[str, dataclasses.Field[Any]]:
+    """The fields that a file holds: parameters, not remarks that do not count in a comparison."""
+    return {field.name: field for field in dataclasses.fields(kind) if field.init and field.compare}
+
+
+def needed(field: dataclasses.Field[Any]) -> bool:
+    """Whether a field has no default."""
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+
+
+def unit_of(field: dataclasses.Field[Any]) -> str | None:
+    """The dimension of a field; None for plain numbers, text and patterns."""
+    unit = field.metadata.get("unit")
+    return None if unit is None else str(unit)
+
+
+def alternatives(hint: Any) -> tuple[Any, ...]:
+    """The types of which a hint allows one."""
+    return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+
+
+def family_of(choices: tuple[Any, ...]) -> Family | None:
+    """The family that a field takes things of, by the types that it takes."""
+    classes = [choice for choice in choices if inspect.isclass(choice)]
+    return next((each for each in FAMILIES if any(issubclass(one, each.base) for one in classes)), None)
+
+
+def first_field(kind: type) -> str:
+    """The name of a dataclass's first field."""
+    return dataclasses.fields(kind)[0].name
+
+
+def listed(choices: Iterable[str]) -> str:
+    """Names in quotes, for messages."""
+    return ", ".join(f'"{choice}"' for choice in choices)

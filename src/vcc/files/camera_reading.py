@@ -1,0 +1,300 @@
+"""Camera files read: an optical train from TOML, and what is wrong with one that cannot be had."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import inspect
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.base import checks, units
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.files.camera_families import (
+    ELEMENT_KINDS,
+    FROM_FILES,
+    Family,
+    alternatives,
+    family_of,
+    first_field,
+    listed,
+    needed,
+    parameters_of,
+    unit_of,
+)
+from vcc.files.pictures import read_grey
+from vcc.optics.sensor import Sensor
+from vcc.optics.train import Train
+from vcc.shapes.patterns import Pattern
+
+_ARRAY_LIKE = set(get_args(ArrayLike))
+
+
+def read_train(path: str | PathLike[str]) -> Train:
+    """The optical train that a TOML file describes; see `vcc.camera_file.load_camera`."""
+    file = Path(path).expanduser()
+    tables = _read_toml(file)
+    _check_keys(tables, {"elements", "sensor"}, {"sensor"}, f"{file}", "table")
+    elements = tables.get("elements", [])
+    if not isinstance(elements, list) or not all(isinstance(entry, dict) for entry in elements):
+        raise InputError(f"{file}: each element starts with a line [[elements]] of its own")
+    if not isinstance(tables["sensor"], dict):
+        raise InputError(f"{file}: the sensor is a table that starts with a line [sensor]")
+    built = [_read_element(entry, number, file) for number, entry in enumerate(elements, start=1)]
+    sensor = _build(Sensor, tables["sensor"], f"{file}: sensor", file.parent)
+    with checks.within(f"{file}"):
+        return Train(built, sensor)
+
+
+def _read_toml(file: Path) -> dict[str, Any]:
+    try:
+        content = file.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise InputError(f"there is no camera file {file}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{file} is not a text file in UTF-8, as TOML is") from None
+    except OSError as error:
+        raise InputError(f"{file} could not be read: {error.strerror or error}") from None
+    try:
+        return tomllib.loads(content)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{file} is not valid TOML: {error}") from None
+
+
+def _read_element(entry: Mapping[str, Any], number: int, file: Path) -> Any:
+    place = f"{file}: element {number}"
+    if "kind" not in entry:
+        raise InputError(f"{place} has no kind: add kind = … with one of {listed(ELEMENT_KINDS)}")
+    kind = _known(entry["kind"], ELEMENT_KINDS, f"{place}: kind")
+    name = entry.get("name")
+    named = f' "{name}"' if isinstance(name, str) and name else ""
+    place = f"{place} ({entry['kind']}{named})"
+    given = {key: value for key, value in entry.items() if key != "kind"}
+    if kind not in FROM_FILES or not _comes_from_file(kind, given, place):
+        return _build(kind, given, place, file.parent)
+    form = FROM_FILES[kind]
+    built = _build(form, given, place, file.parent)
+    with checks.within(f"{place}: {first_field(form)}"):
+        return built.made(file.parent)
+
+
+def _comes_from_file(kind: type, given: Mapping[str, Any], place: str) -> bool:
+    """Whether a file describes the element, rather than its fields; it cannot be both or neither."""
+    form, fields = FROM_FILES[kind], parameters_of(kind)
+    key = first_field(form)
+    if key not in given:
+        for name in fields:
+            if needed(fields[name]) and name not in given:
+                raise InputError(f'{place} has no field "{name}", and no "{key}" that would give it')
+        return False
+    for name in given:
+        if name in fields and name not in parameters_of(form):
+            raise InputError(f"{place} has a {key} and a {name}: the file gives the {name}, leave one out")
+    return True
+
+
+def _known(name: object, choices: Mapping[str, Any], what: str) -> Any:
+    """The choice of that name, in which capitals, spaces, "-" and "_" do not matter."""
+    if not isinstance(name, str):
+        raise InputError(f"{what} is {name!r}: write it as text, one of {listed(choices)}")
+    plain = {_plain(choice): choice for choice in choices}
+    if _plain(name) in plain:
+        return choices[plain[_plain(name)]]
+    raise InputError(f'{what} "{name}" is not known{_nearest(name, choices)}')
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\s_-]", "", name).lower()
+
+
+def _nearest(name: str, choices: Iterable[str]) -> str:
+    close = difflib.get_close_matches(name.lower(), list(choices), n=1, cutoff=0.5)
+    if close:
+        return f': did you mean "{close[0]}"?'
+    return f"; known are {listed(choices)}"
+
+
+def _check_keys(
+    given: Mapping[str, Any], known: Iterable[str], required: Iterable[str], place: str, noun: str
+) -> None:
+    """Refuse what is not known, then what is missing."""
+    known = list(known)
+    for key in given:
+        if key not in known:
+            raise InputError(f'{place} has an unknown {noun} "{key}"{_nearest(key, known)}')
+    for key in required:
+        if key not in given:
+            raise InputError(f'{place} has no {noun} "{key}", which it needs')
+
+
+def _build(kind: type, given: Mapping[str, Any], place: str, folder: Path) -> Any:
+    """An object of a dataclass from the fields of a table."""
+    fields = parameters_of(kind)
+    _check_keys(given, fields, [name for name in fields if needed(fields[name])], place, "field")
+    hints = get_type_hints(kind)
+    values = {
+        name: _read_value(value, hints[name], unit_of(fields[name]), f"{place}: {name}", folder)
+        for name, value in given.items()
+    }
+    pattern = given.get("pattern")
+    if isinstance(pattern, str) and any(field.name == "source" for field in dataclasses.fields(kind)):
+        values["source"] = pattern
+    with checks.within(place):
+        return kind(**values)
+
+
+def _takes_arrays(choices: tuple[Any, ...]) -> bool:
+    return set(choices) >= _ARRAY_LIKE or any(np.ndarray in (choice, get_origin(choice)) for choice in choices)
+
+
+def _read_value(given: Any, hint: Any, unit: str | None, what: str, folder: Path) -> Any:
+    """A value of a file as the type that a field wants."""
+    choices = alternatives(hint)
+    family, arrays = family_of(choices), _takes_arrays(choices)
+    items = next((get_args(choice) for choice in choices if get_origin(choice) is tuple), None)
+    if (
+        family is not None
+        and not (isinstance(given, list) and items)
+        and not (arrays and not isinstance(given, dict))
+    ):
+        return _read_named(given, family, arrays, what, folder)
+    if arrays:
+        return read_array(given, unit, family is not None and family.base is Pattern, what, folder)
+    if items and (isinstance(given, list) or not {int, float, str} & set(choices)):
+        return _read_list(given, items, unit, what, folder)
+    for choice in choices:
+        if choice is Affine:
+            return _read_affine(given, what, folder)
+        if get_origin(choice) is dict:
+            entry = get_args(choice)[1]
+            table = _checked_table(given, what)
+            return {key: _read_value(one, entry, unit, f"{what}: {key}", folder) for key, one in table.items()}
+        if dataclasses.is_dataclass(choice) and inspect.isclass(choice):
+            return _build(choice, _checked_table(given, what), what, folder)
+    if unit is not None:
+        return units.parse(given, unit, what)
+    return _read_plain(given, choices, what)
+
+
+def _checked_table(given: Any, what: str) -> Mapping[str, Any]:
+    if not isinstance(given, dict):
+        raise InputError(
+            f"{what} is {given!r}: it is a table of fields, in braces or below a line of its own, such as "
+            f"[sensor.electronics]"
+        )
+    return given
+
+
+def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, folder: Path) -> tuple[Any, ...]:
+    """A list of so many entries, or of any number where the hints are ``(float, ...)``."""
+    if len(hints) == 2 and hints[1] is Ellipsis:
+        wanted, fits = "", isinstance(given, list)
+        family = family_of(alternatives(hints[0]))
+        hints = (hints[0],) * (len(given) if isinstance(given, list) else 2)
+    else:
+        wanted, fits = f" of {len(hints)}", isinstance(given, list) and len(given) == len(hints)
+        family = None
+    if not fits:
+        example = {None: "0", "length": '"1 mm"', "angle": '"1 deg"', "time": '"1 ms"'}[unit]
+        if str in alternatives(hints[0]):
+            example = '"…"'
+        example = example if family is None else family.example
+        raise InputError(f"{what} is {given!r}: it is a list{wanted}, like [{', '.join([example] * len(hints))}]")
+    return tuple(
+        _read_value(value, hint, unit, f"{what}, number {number} of {len(hints)},", folder)
+        for number, (value, hint) in enumerate(zip(given, hints, strict=True), start=1)
+    )
+
+
+def _read_plain(given: Any, choices: tuple[Any, ...], what: str) -> Any:
+    """Numbers, text and truth values, which TOML keeps apart."""
+    if type(given) in choices:
+        return given
+    if type(given) is int and float in choices:
+        return float(given)
+    names = {int: "a whole number", float: "a number", str: "text in quotes", bool: "true or false"}
+    wanted = " or ".join(names[choice] for choice in choices if choice in names)
+    raise InputError(f"{what} is {given!r}: it is {wanted or 'something that a camera file cannot hold'}")
+
+
+def _read_named(given: Any, family: Family, arrays: bool, what: str, folder: Path) -> Any:
+    """A thing by name; where a field takes arrays, also a name that stands for one."""
+    if not isinstance(given, dict):
+        raise InputError(f"{what} is {given!r}: write a {family.noun} by name, like {family.example}")
+    extra = family.arrays if arrays else {}
+    if "name" not in given:
+        raise InputError(f"{what} has no name: add name = … with one of {listed([*family.names, *extra])}")
+    parameters = {key: value for key, value in given.items() if key != "name"}
+    kind = _known(given["name"], {**family.names, **extra}, f"{what}: name")
+    built = _build(kind, parameters, f"{what} ({given['name']})", folder)
+    if kind not in extra.values():
+        return built
+    with checks.within(what):
+        return built.made()
+
+
+def _read_affine(given: Any, what: str, folder: Path) -> Affine:
+    with checks.within(what):
+        return Affine(read_array(given, None, False, what, folder))
+
+
+def read_array(given: Any, unit: str | None, transmission: bool, what: str, folder: Path) -> NDArray[np.float64]:
+    """Numbers from a file beside the camera file, or rows of them; where they have a unit, each with its own."""
+    if isinstance(given, str):
+        return _read_array_file(folder / Path(given).expanduser(), given, unit, transmission, what)
+    with_units = given if unit is None else _with_units(given, unit, what)
+    try:
+        values = np.array(with_units, dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.array(0.0)
+    if values.ndim == 0:
+        example = {None: "[[0, 1], [1, 0]]", "length": '[["1 um", "2 um"], ["2 um", "1 um"]]'}.get(
+            unit, '[["1 deg", "2 deg"]]'
+        )
+        raise InputError(
+            f"{what} is {given!r}: it is the name of a file, or rows of equally many numbers, like {example}"
+        )
+    return values
+
+
+def _with_units(given: Any, unit: str, what: str) -> Any:
+    if isinstance(given, list):
+        return [_with_units(each, unit, what) for each in given]
+    return units.parse(given, unit, what)
+
+
+def _read_array_file(
+    file: Path, name: str, unit: str | None, transmission: bool, what: str
+) -> NDArray[np.float64]:
+    """Numbers as float64: .npy and .csv as they are, in SI; pictures as a share of their full scale.
+
+    Where they are transmissions, whole numbers in a .npy are a share of their full scale too, as in a picture.
+    """
+    if not file.is_file():
+        raise InputError(f'{what}: there is no file "{name}" in {file.parent}')
+    ending = file.suffix.lower()
+    try:
+        if ending == ".csv":
+            return np.loadtxt(file, delimiter=",", dtype=np.float64, ndmin=2)
+        if ending == ".npy":
+            values = np.load(file, allow_pickle=False)
+            if values.dtype.kind not in "fiub":
+                raise ValueError(f"it holds {values.dtype}, not real numbers")
+            if values.dtype.kind == "f" or not transmission:
+                return np.asarray(values, dtype=np.float64)
+    except (ValueError, OSError, EOFError) as error:
+        raise InputError(f"{what}: {name} could not be read: {error}") from None
+    if unit is not None:
+        raise InputError(
+            f"{what} is {name}: only .npy and .csv hold numbers with a unit, in SI ({units.SI_NAMES[unit]}s)"
+        )
+    with checks.within(what):
+        return read_grey(file)

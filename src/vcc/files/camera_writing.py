@@ -1,0 +1,198 @@
+"""Camera files written: an optical train as TOML, so that reading gives back an equal one."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import re
+from os import PathLike
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import units
+from vcc.base.affine import Affine
+from vcc.base.describe import is_default
+from vcc.base.errors import InputError
+from vcc.files.atomic import atomic_path
+from vcc.files.camera_families import (
+    ELEMENT_KINDS,
+    FAMILIES,
+    FROM_FILES,
+    Family,
+    alternatives,
+    family_of,
+    listed,
+    needed,
+    parameters_of,
+    unit_of,
+)
+from vcc.files.camera_reading import read_array
+from vcc.optics import Element
+from vcc.optics.train import Train
+from vcc.shapes import patterns
+from vcc.shapes.patterns import Cells
+
+
+def write_train(train: Train, path: str | PathLike[str]) -> None:
+    """Write an optical train as TOML that reads as an equal one; see `vcc.camera_file.save_camera`."""
+    import tomli_w
+
+    file = Path(path).expanduser()
+    arrays: dict[str, NDArray[np.float64]] = {}
+    tables = {
+        "elements": [
+            _write_element(element, number, file, arrays) for number, element in enumerate(train.elements, start=1)
+        ],
+        "sensor": _Writer(file, "sensor", "sensor", arrays).table_of(train.sensor),
+    }
+    if not train.elements:
+        del tables["elements"]
+    for name, values in arrays.items():  # first, so that the camera file never names a missing one
+        with atomic_path(file.parent / name) as temporary, temporary.open("wb") as stream:
+            np.save(stream, values)
+    with atomic_path(file) as temporary:
+        temporary.write_text(tomli_w.dumps(tables), encoding="utf-8")
+
+
+def _write_element(
+    element: Element, number: int, file: Path, arrays: dict[str, NDArray[np.float64]]
+) -> dict[str, Any]:
+    for name, kind in ELEMENT_KINDS.items():
+        if type(element) is kind:
+            slug = re.sub(r"\W+", "_", element.name) or f"{name}_{number}"
+            writer = _Writer(file, element.label, slug, arrays)
+            form = FROM_FILES[kind].of(element, file.parent) if kind in FROM_FILES else None
+            return {"kind": name, **writer.table_of(form or element)}
+    raise InputError(
+        f"{element.label} cannot be written to {file.name}: a camera file knows "
+        f"{listed(ELEMENT_KINDS)}. Add its class to vcc.camera_file.ELEMENT_KINDS, "
+        "in the program that reads the file too"
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class _Writer:
+    """Turns one object into a table; arrays are put aside, to be written as files of their own."""
+
+    file: Path
+    label: str
+    slug: str
+    arrays: dict[str, NDArray[np.float64]]
+
+    def table_of(self, thing: Any) -> dict[str, Any]:
+        """The fields that differ from their defaults."""
+        table, hints = {}, get_type_hints(type(thing))
+        for name, field in parameters_of(type(thing)).items():
+            value = getattr(thing, name)
+            if value is None or (not needed(field) and is_default(value, field)):
+                continue
+            if isinstance(value, Cells) and _is_plain_array(value, thing):
+                table[name] = self.plain_array(value.values, getattr(thing, "source", ""))
+                continue
+            self.check_writable(value, family_of(alternatives(hints[name])))
+            table[name] = self.value(value, unit_of(field), name)
+        return table
+
+    def value(self, value: Any, unit: str | None, name: str) -> Any:
+        if isinstance(value, tuple | list):
+            return [self.value(part, unit, name) for part in value]
+        if isinstance(value, dict):
+            return {key: self.value(part, unit, name) for key, part in value.items()}
+        if isinstance(value, np.ndarray) and value.ndim:
+            return self.array(value, name)
+        if isinstance(value, Affine):
+            return value.matrix.tolist()
+        if isinstance(value, np.ndarray | np.generic):
+            value = value.item()
+        family = next((each for each in FAMILIES if isinstance(value, each.base)), None)
+        if family is not None:
+            return self.named(value, family)
+        if dataclasses.is_dataclass(value) and not isinstance(value, type | Element):
+            return self.table_of(value)
+        if unit is not None:
+            return units.text(value, unit, exact=True)
+        if isinstance(value, bool | int | float | str):
+            return value
+        raise InputError(
+            f"{name} of {self.label} is {_in_words(value)}, which a camera file cannot hold: it holds numbers, "
+            "text, lists, arrays, and dataclasses of these"
+        )
+
+    def array(self, values: NDArray[np.float64], field: str = "") -> str:
+        """The name of the file that will hold an array."""
+        # All arrays have values: that name would say nothing.
+        stem = f"{self.file.stem}_{self.slug}" + (f"_{field}" if field not in ("", "values") else "")
+        name, count = f"{stem}.npy", 1
+        while name in self.arrays:
+            count += 1
+            name = f"{stem}_{count}.npy"
+        self.arrays[name] = values
+        return name
+
+    def named(self, thing: Any, family: Family) -> dict[str, Any]:
+        """A thing of a family by its name."""
+        self.check_writable(thing, family)
+        name = next(name for name, kind in family.names.items() if type(thing) is kind)
+        return {"name": name, **self.table_of(thing)}
+
+    def check_writable(self, thing: Any, family: Family | None) -> None:
+        """Refuse what takes the place of a thing with a name and has none: Python functions, own classes."""
+        if (
+            family is None
+            or type(thing) in family.names.values()
+            or not (isinstance(thing, family.base) or callable(thing))
+        ):
+            return
+        known = ", ".join(kind.__name__ for kind in family.names.values())
+        function = getattr(thing, "function", thing)
+        if isinstance(function, family.base):
+            said = (
+                f"a {type(thing).__name__}, which is none that a camera file knows ({known}). Add the class to "
+                f"vcc.camera_file.{family.table}, in the program that reads the file too,"
+            )
+        else:
+            said = (
+                f"{getattr(function, '__name__', repr(function))}, a piece of Python that a camera file cannot "
+                f"hold. Use a {family.noun} of {family.module} ({known})"
+            )
+        raise InputError(f"the {family.noun} of {self.label} is {said} or sample it on a grid: {family.way_out}")
+
+    def plain_array(self, values: NDArray[np.float64], source: str) -> Any:
+        """The file that it came from if that is within reach, a MURA by name, else a new file."""
+        if source and self.holds(source, values):
+            return source
+        size = len(values)
+        if values.shape == (size, size) and _is_mura(values):
+            return {"name": "mura", "prime": size}
+        return self.array(values)
+
+    def holds(self, source: str, values: NDArray[np.float64]) -> bool:
+        try:
+            return np.array_equal(read_array(source, None, True, "", self.file.parent), values)
+        except InputError:
+            return False
+
+
+def _in_words(value: Any) -> str:
+    if inspect.isroutine(value):
+        return f"the function {value.__name__}"
+    return f"a {type(value).__name__}"
+
+
+def _is_plain_array(cells: Cells, owner: Any) -> bool:
+    """Whether an element makes just these cells of an array and its own width and height."""
+    width = getattr(owner, "width", None)
+    return width is not None and cells == Cells(cells.values, width, owner.height)
+
+
+def _is_mura(values: NDArray[np.float64]) -> bool:
+    if not math.isclose(values.mean(), 0.5, abs_tol=0.1):  # half of its cells are open
+        return False
+    try:
+        return np.array_equal(values, patterns.mura(len(values)))
+    except InputError:
+        return False

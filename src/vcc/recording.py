@@ -1,0 +1,171 @@
+"""Recordings: the digital numbers that a sensor gave, and what can be done with them."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, fields
+from os import PathLike
+from typing import Literal
+
+import numpy as np
+
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.units import short
+from vcc.files.pictures import SavedPicture, save_numbers
+from vcc.image import Image
+from vcc.optics.sensor import Sensor
+from vcc.run.demosaic import Demosaicing, demosaic
+from vcc.run.expose import Exposure, RawPicture, below_zero
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(RawPicture):
+    """The digital numbers that a sensor gave, as they are read out, and what is needed to understand them.
+
+    Made by `vcc.Camera.expose` and `expose_image`; or of numbers kept in a file, with the camera's sensor.
+
+    Args:
+        values: digital numbers, uint8 (up to 8 bits) or uint16. (rows, columns) behind a colour filter or of grey
+            light, else (rows, columns, channels): one sensor per channel, behind a prism that parts the colours.
+            As light lands on the sensor, upside down.
+        sensor: what recorded them, its electronics included.
+        exposure: exposure time, seconds.
+        radiance: what a light field's sample value of 1 stands for, W/(m²·sr).
+        seed: of the noise.
+        saturated: the share of the pixels, 0 to 1, that were at full well or at the largest number (in any
+            channel).
+        missing_rays: the share of the rays that the camera asked for and the light field did not hold, 0 to 1.
+
+    Raises:
+        InputError: a sensor without electronics, or values of another shape or type.
+    """
+
+    def image(self) -> Image:
+        """The irradiance that the numbers tell of: what `vcc.Camera.capture` gives, and noise.
+
+        The mean dark charge is taken off; PRNU and DSNU stay, as they would without a calibration. Where a pixel
+        is saturated the irradiance is a lower bound.
+
+        Returns:
+            float32 irradiance, shape of the values (behind a colour filter: each pixel in its own channel).
+        """
+        return Image(self.irradiance(), self.frame, missing_rays=self.missing_rays)
+
+    def demosaiced(self, method: Demosaicing | None = None) -> Image:
+        """The picture in all channels, of a recording through a colour filter, in the unit of `image`.
+
+        ==============  ============================================================================
+        ``"menon"``     Menon et al. (2007), edges followed by direction; Bayer tiles. The default there.
+        ``"malvar"``    Malvar et al. (2004), linear with gradients of the other channels; Bayer tiles
+        ``"bilinear"``  each channel by itself, the nearest samples weighted by distance (normalised
+                        convolution, Knutsson & Westin 1993); any tile. The default for other tiles.
+        ==============  ============================================================================
+
+        The first two are those of the package colour-demosaicing, an optional one; all work on linear irradiance,
+        in which grey light has the same value in every channel.
+
+        Returns:
+            float32 irradiance, shape (rows, columns, channels); upside down, as light lands on the sensor.
+
+        Raises:
+            InputError: nothing to demosaic, an unknown method or one that the tile does not allow, a sensor
+                smaller than its tile, or a package that is not installed.
+        """
+        electronics = self.electronics
+        if electronics.color_filter is None:
+            raise InputError(
+                "there is no colour filter to demosaic: every pixel recorded all that there is. Use image()"
+            )
+        values = demosaic(self.irradiance(), electronics, method)
+        return Image(values, self.frame, missing_rays=self.missing_rays)
+
+    def save(self, path: str | PathLike[str]) -> SavedPicture:
+        """Write the numbers untouched to a .tif, .png or .npy: linear, not scaled, upside down as recorded.
+
+        A TIFF also says, as JSON in its description, what the numbers mean (exposure, gain, black level, filter).
+
+        Raises:
+            InputError: another ending, channels that the format cannot hold, or a place that cannot be written.
+        """
+        electronics = self.electronics
+        meaning = {
+            "exposure_seconds": self.exposure,
+            "gain_dn_per_electron": electronics.gain,
+            "black_level_dn": electronics.black_level,
+            "bit_depth": electronics.bit_depth,
+            "full_well_electrons": electronics.full_well,
+            "color_filter": electronics.color_filter,
+            "radiance_of_1_in_w_per_m2_sr": self.radiance,
+            "seed": self.seed,
+        }
+        words = f"{electronics.bit_depth}-bit raw, {electronics.filter_in_words}, {self._in_words()}"
+        return save_numbers(self.values, path, meaning, words, self.saturated)
+
+    def _in_words(self) -> str:
+        return f"exposed {short(self.exposure, 'time', 4)}, {self.saturated:.2%} of the pixels saturated"
+
+    def __repr__(self) -> str:
+        electronics = self.electronics
+        size = "×".join(map(str, self.values.shape))
+        pitch = short(abs(self.frame.determinant) ** 0.5)
+        charge = (float(self.values.mean(dtype=np.float64)) - electronics.black_level) / electronics.gain
+        missing = f", {self.missing_rays:.1%} of the rays missing" if self.missing_rays > 0 else ""
+        ways = ".image()" if electronics.color_filter is None else ".image() · .demosaiced()"
+        return (
+            f"Recording({size}, pixel {pitch}, {electronics.filter_in_words}, {self._in_words()}, "
+            f"seed {self.seed}{missing})\n"
+            f"  numbers    {self.values.min()} to {self.values.max()}, of 0 to {electronics.largest_number}; "
+            f"black is {electronics.black_level:g}, an electron {electronics.gain:g}\n"
+            f"  electrons  {charge:.4g} on average, {charge / electronics.saturation:.1%} of saturation\n"
+            f"  next       {ways} · .electrons() · .save('raw.tif')"
+        )
+
+
+def expose_image(
+    image: Image,
+    sensor: Sensor,
+    exposure: float | Literal["auto"],
+    *,
+    seed: int = 0,
+    radiance: float = 1.0,
+    threads: int | None = None,
+) -> Recording:
+    """What a sensor records of a picture that falls on it; cheaper than `vcc.Camera.expose` for many exposures.
+
+    Args:
+        image: irradiance on that sensor, from `vcc.Camera.capture`: radiance × steradian.
+        sensor: with electronics.
+        exposure: exposure time, seconds, or ``"auto"``: the time after which the brightest 0.1 % of the pixels
+            are at 90 % or more of their full well or of the largest number, whichever comes first.
+        seed: of the noise, a whole number; recordings with different seeds are independent.
+        radiance: what a light field's sample value of 1 stands for, W/(m²·sr), in each channel's band.
+        threads: how many work at once; None takes as many as this process may use cores. The numbers are the same.
+
+    Raises:
+        InputError: a sensor without electronics or of another shape, an upright picture, channels that the
+            electronics cannot record, values that are not finite, an unusable exposure, seed or radiance; or
+            "auto" without light.
+
+    Warns:
+        ResultWarning: the picture goes below 0 by more than `vcc.run.expose.UNDERSHOOT` of its largest value. No
+            light can, so it is taken as dark there, as it is where sharp interpolation undershoots by less beside
+            a hard edge.
+    """
+    return recorded(image, Exposure(sensor, exposure, seed, radiance, threads))
+
+
+def recorded(image: Image, exposure: Exposure) -> Recording:
+    """What a sensor records of a picture that falls on it; see `expose_image`, and `vcc.Camera.expose`.
+
+    Args:
+        image: irradiance, not upright.
+        exposure: how the sensor records.
+    """
+    if not image.inverted:
+        raise InputError("a sensor records the picture as it lies on it: give the one that is not upright")
+    light = image.to_numpy()
+    raw = exposure.recorded(light, image.missing_rays)
+    caution = below_zero(light)
+    if caution is not None:
+        warnings.warn(caution, ResultWarning, stacklevel=3)
+    return Recording(**{each.name: getattr(raw, each.name) for each in fields(raw)})

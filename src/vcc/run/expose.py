@@ -1,0 +1,313 @@
+"""What a sensor records: irradiance to photons, electrons and digital numbers, and back.
+
+The model is that of EMVA 1288 (`vcc.optics.electronics`). Random numbers are drawn for blocks of rows, each with a
+stream of its own that follows from the seed alone: a recording is the same whatever the number of threads.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import checks
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.optics.electronics import Electronics
+from vcc.optics.sensor import Sensor
+from vcc.plan.how import cores
+
+AUTO_SHARE: Final = 0.001
+"""Exposure "auto": the share of the pixels that may be brighter …"""
+AUTO_LEVEL: Final = 0.9
+"""… than this share of the electrons at which a pixel saturates."""
+
+UNDERSHOOT: Final = 0.15
+"""Of the largest value: as far below 0 a picture may go beside an edge from dark to its brightest light, by what
+interpolation gives back of sharpness (13 % at a border of the light field itself)."""
+
+_BLOCK: Final = 2**18
+"""Numbers drawn at once: they stay in the cache of a core, and a large sensor has enough blocks for all."""
+_TEMPORAL, _PATTERN = 0, 1
+"""Streams of random numbers: noise that is new in each recording, and what belongs to the sensor."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RawPicture:
+    """The digital numbers that a sensor gave, and what is needed to understand them; see `vcc.Recording`."""
+
+    values: NDArray[Any]
+    sensor: Sensor
+    exposure: float
+    radiance: float = 1.0
+    seed: int = 0
+    saturated: float = 0.0
+    missing_rays: float = 0.0
+
+    def __post_init__(self) -> None:
+        electronics = electronics_of(self.sensor)
+        if self.values.dtype not in (np.uint8, np.uint16):
+            raise InputError(f"a recording holds numbers of type uint8 or uint16, not {self.values.dtype}")
+        if self.values.shape[:2] != self.sensor.shape or self.values.ndim not in (2, 3):
+            raise InputError(
+                f"the sensor has {self.sensor.shape} pixels (rows, columns), and the recording's numbers the "
+                f"shape {self.values.shape}"
+            )
+        if electronics.color_filter is not None and self.values.ndim != 2:
+            raise InputError(
+                f"behind a colour filter ({electronics.filter_in_words}) each pixel records one number, and the "
+                f"recording has the shape {self.values.shape}"
+            )
+        if electronics.color_filter is None:
+            electronics.check_channels(self.values.shape[2] if self.values.ndim == 3 else None)
+        checked_exposure(self.exposure)
+        _checked_radiance(self.radiance)
+
+    @property
+    def electronics(self) -> Electronics:
+        """What turned light into these numbers."""
+        return electronics_of(self.sensor)
+
+    @property
+    def frame(self) -> Affine:
+        """Maps (column, row, 1) to (x, y, 1) of the pixel's centre, metres."""
+        return self.sensor.frame
+
+    def electrons(self) -> NDArray[np.float32]:
+        """The charge that the numbers stand for: (DN − black level) / K, electrons, those of the dark current too.
+
+        Returns:
+            float32 in the shape of the values; below 0 where read noise went below the black level.
+        """
+        charge = self.values.astype(np.float32)
+        charge -= np.float32(self.electronics.black_level)
+        charge /= np.float32(self.electronics.gain)
+        return charge
+
+    def irradiance(self) -> NDArray[np.float32]:
+        """The irradiance that the numbers tell of, as `vcc.Recording.image` has it, in the shape of the values."""
+        light = self.electrons()
+        light -= np.float32(self.electronics.dark_current * self.exposure)
+        per_light = self._electrons_per_light()
+        if self.electronics.color_filter is None:
+            light /= np.asarray(per_light if light.ndim == 3 else per_light[0], dtype=np.float32)
+        else:
+            for place, channel in self.electronics.filters:
+                light[place] /= np.float32(per_light[channel])
+        return light
+
+    def _electrons_per_light(self) -> list[float]:
+        """Photo-electrons that an irradiance of 1 (radiance of 1 × steradian) frees, for each channel."""
+        channels = self.values.shape[2] if self.values.ndim == 3 else self.electronics.filter_channels
+        per_second = [_electrons_per_second(self.sensor, self.radiance, channel) for channel in range(channels)]
+        return [rate * self.exposure for rate in per_second]
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """How a sensor is to record; all that can be refused is refused when this is made, before any work.
+
+    Args:
+        sensor: with electronics.
+        time: seconds, or ``"auto"``: that after which the brightest 0.1 % of the pixels are at 90 % or more of
+            their full well or of the largest number, whichever comes first.
+        seed: of the noise, a whole number.
+        radiance: what a light field's sample value of 1 stands for, W/(m²·sr), in each channel's band.
+        threads: how many work at once; None takes as many as this process may use cores.
+
+    Raises:
+        InputError: a sensor without electronics, an unusable time, seed or radiance.
+    """
+
+    sensor: Sensor
+    time: float | Literal["auto"]
+    seed: int = 0
+    radiance: float = 1.0
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        electronics_of(self.sensor)
+        if not (isinstance(self.time, str) and self.time == "auto"):
+            object.__setattr__(self, "time", checked_exposure(self.time))
+        object.__setattr__(self, "seed", checks.seed(self.seed))
+        object.__setattr__(self, "radiance", _checked_radiance(self.radiance))
+
+    def check_channels(self, channels: int | None) -> None:
+        """Refuse light of a number of channels that the sensor cannot record; None is grey.
+
+        Raises:
+            InputError: the numbers of channels differ.
+        """
+        electronics_of(self.sensor).check_channels(channels)
+
+    def recorded(self, light: NDArray[np.float32], missing_rays: float = 0.0) -> RawPicture:
+        """What the sensor records of irradiance that falls on it.
+
+        Args:
+            light: radiance × steradian, (rows, columns) or (rows, columns, channels), upside down as it lands.
+                What is below 0 is dark.
+            missing_rays: the share of the rays that were asked for and not there, 0 to 1.
+
+        Raises:
+            InputError: another shape than the sensor's, channels that it cannot record, values that are not
+                finite; or "auto" without light.
+        """
+        electronics = electronics_of(self.sensor)
+        if light.shape[:2] != self.sensor.shape:
+            raise InputError(
+                f"the sensor has {self.sensor.shape} pixels (rows, columns), the picture {light.shape[:2]}"
+            )
+        self.check_channels(light.shape[2] if light.ndim == 3 else None)
+        rate = _photo_electrons_per_second(light, self.sensor, self.radiance)
+        time = _auto_exposure(rate, electronics) if isinstance(self.time, str) else self.time
+        values, saturated = numbers_of(rate, time, electronics, self.seed, self.threads)
+        return RawPicture(values, self.sensor, time, self.radiance, self.seed, saturated, missing_rays)
+
+
+def electronics_of(sensor: Sensor) -> Electronics:
+    """The electronics of a sensor that is to record.
+
+    Raises:
+        InputError: it has none.
+    """
+    if sensor.electronics is None:
+        raise InputError(
+            "the sensor has no electronics, and only irradiance can be had of it (capture). Say how it records: "
+            "Sensor(…, electronics=vcc.Electronics()), or a table [sensor.electronics] in a camera file"
+        )
+    return sensor.electronics
+
+
+def below_zero(light: NDArray[np.float32]) -> str | None:
+    """A caution about a picture that goes further below 0 than interpolation takes it; None where none is due."""
+    low, high = float(light.min()), float(light.max())
+    if not low < -UNDERSHOOT * max(high, 0.0):
+        return None
+    return (
+        f"the picture on the sensor goes down to {low:.3g} (up to {high:.3g}): light cannot be negative, "
+        "and it is taken as dark there"
+    )
+
+
+def checked_exposure(exposure: object) -> float:
+    """An exposure time in seconds.
+
+    Raises:
+        InputError: no number above 0.
+    """
+    way_out = 'give a time such as 10 * vcc.units.ms, or "auto"'
+    return checks.above_zero("exposure", exposure, unit="s", way_out=way_out)
+
+
+def _checked_radiance(radiance: object) -> float:
+    return checks.above_zero("radiance", radiance, "what a sample value of 1 stands for", unit="W/(m²·sr)")
+
+
+# --- light to electrons ---
+
+
+def _electrons_per_second(sensor: Sensor, radiance: float, channel: int) -> float:
+    """Photo-electrons per second of a pixel at an irradiance of 1 sr × radiance (EMVA 1288, eq. 1 and 2)."""
+    per_joule = electronics_of(sensor).electrons_per_joule(channel)
+    return radiance * sensor.sensitive_area * per_joule
+
+
+def _photo_electrons_per_second(
+    light: NDArray[np.float32], sensor: Sensor, radiance: float
+) -> NDArray[np.float64]:
+    """The mean rate at which light frees electrons in each pixel, behind its colour filter."""
+    if not (math.isfinite(light.min()) and math.isfinite(light.max())):
+        raise InputError("the picture on the sensor has values that are not finite: no exposure can record them")
+    electronics = electronics_of(sensor)
+    rate = np.empty(light.shape[:2] if electronics.color_filter is not None else light.shape)
+    if electronics.color_filter is not None:
+        for place, channel in electronics.filters:
+            factor = _electrons_per_second(sensor, radiance, channel)
+            np.multiply(light[(*place, channel)], factor, out=rate[place], dtype=np.float64)
+    elif light.ndim == 2:
+        np.multiply(light, _electrons_per_second(sensor, radiance, 0), out=rate, dtype=np.float64)
+    else:
+        factors = [_electrons_per_second(sensor, radiance, channel) for channel in range(light.shape[2])]
+        np.multiply(light, factors, out=rate, dtype=np.float64)
+    np.maximum(rate, 0.0, out=rate)
+    return rate
+
+
+def _auto_exposure(rate: NDArray[np.float64], electronics: Electronics) -> float:
+    bright = float(np.quantile(rate, 1 - AUTO_SHARE, method="lower"))
+    if bright <= 0:
+        bright = float(rate.max())  # a few points of light on black
+    if bright <= 0:
+        raise InputError('exposure="auto" needs light, and the picture is black: give a time in seconds')
+    return AUTO_LEVEL * electronics.saturation / (bright + electronics.dark_current)
+
+
+# --- electrons to numbers ---
+
+
+def numbers_of(
+    rate: NDArray[np.float64], exposure: float, electronics: Electronics, seed: int, threads: int | None = None
+) -> tuple[NDArray[Any], float]:
+    """Digital numbers for the mean rates of photo-electrons, and the share of pixels that are saturated.
+
+    Args:
+        rate: electrons per second, (rows, columns) or (rows, columns, channels).
+        exposure: seconds.
+        electronics: what numbers the electrons.
+        seed: of the noise.
+        threads: how many work at once; None takes as many as this process may use cores.
+    """
+    rows = rate.shape[0]
+    height = max(1, _BLOCK // max(1, rate[0].size))
+    values = np.empty(rate.shape, np.uint8 if electronics.bit_depth <= 8 else np.uint16)
+
+    def read_block(block: int) -> int:
+        lines = slice(block * height, min((block + 1) * height, rows))
+        noise, pattern = _generator(seed, _TEMPORAL, block), None
+        if electronics.prnu or electronics.dsnu:
+            pattern = _generator(electronics.pattern_seed, _PATTERN, block)
+        values[lines], saturated = _read_block(rate[lines], exposure, electronics, noise, pattern)
+        return saturated
+
+    with ThreadPoolExecutor(threads or cores()) as pool:
+        saturated = sum(pool.map(read_block, range(math.ceil(rows / height))))
+    return values, saturated / (rate.shape[0] * rate.shape[1])
+
+
+def _generator(seed: int, stream: int, block: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream, block)))
+
+
+def _read_block(
+    rate: NDArray[np.float64],
+    exposure: float,
+    electronics: Electronics,
+    noise: np.random.Generator,
+    pattern: np.random.Generator | None,
+) -> tuple[NDArray[np.float64], int]:
+    """Digital numbers of a block, and how many of its pixels are saturated."""
+    mean = rate * exposure
+    offsets = None
+    if pattern is not None:
+        sensitivity = pattern.standard_normal(rate.shape)
+        offsets = electronics.dsnu * pattern.standard_normal(rate.shape)
+        mean *= np.maximum(1 + electronics.prnu * sensitivity, 0.0)
+    mean += electronics.dark_current * exposure
+    # Of such a mean, the full well lies 10 standard deviations or more below: it fills for certain, and means
+    # that are too large for NumPy's Poisson numbers never reach it.
+    np.minimum(mean, 2 * electronics.full_well + 100, out=mean)
+    charge = noise.poisson(mean)
+    full = charge >= electronics.full_well
+    signal = np.minimum(charge, electronics.full_well).astype(np.float64)
+    if electronics.read_noise:
+        signal += electronics.read_noise * noise.standard_normal(rate.shape)
+    if offsets is not None:
+        signal += offsets
+    numbers = np.rint(electronics.black_level + electronics.gain * signal)
+    full |= numbers >= electronics.largest_number
+    pixels = full.any(axis=2) if full.ndim == 3 else full
+    return np.clip(numbers, 0, electronics.largest_number), int(np.count_nonzero(pixels))
