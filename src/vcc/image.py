@@ -7,6 +7,7 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
+from array_api_compat import array_namespace
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
@@ -71,8 +72,6 @@ class Image:
         if isinstance(values, np.ndarray):
             values = values[::-1, ::-1]
         else:
-            from array_api_compat import array_namespace
-
             values = array_namespace(values).flip(values, axis=(0, 1))
         return replace(self, values=values, frame=turned, inverted=False)
 

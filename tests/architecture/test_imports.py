@@ -56,6 +56,7 @@ FACES = {"affine", "errors", "kernels", "operators", "patterns", "surfaces", "un
 BY_NAME = {
     "": "names of `vcc` are loaded when they are first used",
     "base.late": "what the others load with",
+    "store.compression": "a codec is a class of Zarr's, which takes long to load",
     "sources.planes": "pictures of planes are mixed by compiled loops",
     "sources.depth_map": "meshes are made by compiled loops",
     "engines": "an engine is loaded when it is first used: Numba takes a second",
@@ -90,6 +91,7 @@ LATE = {
     "trimesh",
     "av",
     "jinja2",
+    "tomli_w",
     "cyclopts",
 }
 """Libraries that take long to load, or need not be there: these may be imported inside functions."""

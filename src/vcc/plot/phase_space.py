@@ -12,6 +12,7 @@ from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import InMemory
+from vcc.files.transfer import from_linear
 from vcc.optics import Faces
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
@@ -314,8 +315,6 @@ def _radiance(piece: InMemory, across: str) -> Array:
 
 def _for_display(values: Array) -> Any:
     """Linear light as screens want it, 0 to 1."""
-    from vcc.files.transfer import from_linear
-
     return np.clip(from_linear(np.clip(values, 0, 1)), 0, 1)
 
 

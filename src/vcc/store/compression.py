@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from vcc.base import late
 from vcc.base.errors import InputError
 
 PICTURES = "vcc.picture"
@@ -123,7 +123,7 @@ def chunk_rows(rows: int, row_bytes: int, wanted: int | None) -> int:
 
 def know_pictures() -> None:
     """Tell Zarr of the codec that keeps views as pictures, which loads Zarr: it is a class of its kind."""
-    importlib.import_module("vcc.store.picture_codec")
+    late.module("vcc.store.picture_codec")
 
 
 def layout(
