@@ -12,6 +12,7 @@ from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import InMemory
+from vcc.files.transfer import from_linear
 from vcc.optics import Faces
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
@@ -22,6 +23,7 @@ from vcc.plot.phase_space_rays import (
     NAMES,
     RAYS,
     PhaseSpacePicture,
+    radiance_of,
     sheet_of_rays,
     sheet_of_samples,
     slice_of,
@@ -305,17 +307,11 @@ def _slice(light_field: InMemory, row: int | None, pixel_row: int | None, across
 def _radiance(piece: InMemory, across: str) -> Array:
     """Radiance of a slice, (views, pixels) or (views, pixels, 3)."""
     values = to_numpy(piece.values)
-    values = values[0, :, 0] if across == "u" else values[:, 0, :, 0]
-    radiance: Array = values.astype(np.float64) / piece.grid.full_scale
-    if radiance.ndim == 3 and radiance.shape[2] != 3:
-        radiance = radiance.mean(axis=2)
-    return radiance
+    return radiance_of(values[0, :, 0] if across == "u" else values[:, 0, :, 0], piece)
 
 
 def _for_display(values: Array) -> Any:
     """Linear light as screens want it, 0 to 1."""
-    from vcc.files.transfer import from_linear
-
     return np.clip(from_linear(np.clip(values, 0, 1)), 0, 1)
 
 
