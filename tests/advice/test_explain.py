@@ -85,3 +85,15 @@ def test_it_says_what_the_samples_can_carry():
     behind = " ".join(camera(vcc.Lens(50 * mm), array).explain(light_field(), samples=2).split())
     assert 'are not given behind lens array "micro"' in behind
     assert 'a sample of a view at lens array "micro" is 500 um wide, of 1 mm' in behind
+
+
+def test_it_times_some_columns_of_views_whichever_they_are(monkeypatch):
+    """Behind a round stop the outer columns are left out, as they give least; diffusers are run by column."""
+    monkeypatch.setattr("vcc.advice.explain_footprints.TAPS_VALUES", 1000)
+    frost = vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.004))
+    code = vcc.Mask(np.eye(4), width=20 * mm, z=30 * mm)
+    explanation = camera(vcc.Lens(50 * mm, diameter=5 * mm), frost, code).explain(
+        light_field(), method="footprints"
+    )
+    assert "blurs each view, in samples" in explanation
+    assert explanation.expected_seconds > 0

@@ -12,6 +12,7 @@ from vcc.analysis import sampling_advice
 from vcc.base.units import mm, nm, um
 from vcc.shapes.kernels import Gaussian
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum
+from vcc.store import save_store
 
 F, SENSOR, PITCH, DIAMETER = 50 * mm, 52 * mm, 20 * um, 16 * mm
 FOCUS = 1 / (1 / F - 1 / SENSOR)
@@ -304,6 +305,13 @@ def test_it_is_told_in_words_and_drawn(tmp_path):
     figure.savefig(tmp_path / "advice.png")
     bars = sampling_advice(camera(vcc.LensArray(0.2 * mm, 1 * mm, z=51 * mm)), light_field()).plot()
     assert len(bars.axes) == 1
+
+
+def test_a_light_field_on_disk_gets_the_same_advice(tmp_path):
+    given = vcc.LightField.from_views(np.zeros((4, 5, 20, 22), np.uint8), SPACING, SLOPE, 1.3, (-3, 1))
+    stored = save_store(given, tmp_path / "views.zarr")
+    assert str(sampling_advice(camera(), stored)) == str(sampling_advice(camera(), given))
+    assert sampling_advice(camera(), stored[1:3, :, ::2]).views == (2, 5)
 
 
 @pytest.mark.parametrize(

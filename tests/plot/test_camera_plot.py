@@ -11,7 +11,7 @@ from matplotlib.text import Text
 from vcc import Camera, InputError, Lens, LightField, Mask, Prism, Sensor
 from vcc.base.units import mm, um
 from vcc.plot import focused_distance, plot_camera, style
-from vcc.plot.camera_plot import spread
+from vcc.plot.labels import spread
 from vcc.plot.tracing import fan, trace
 from vcc.shapes import patterns
 

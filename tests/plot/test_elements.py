@@ -12,7 +12,8 @@ from numpy.polynomial import Polynomial
 import vcc
 from vcc.base.units import mm, um
 from vcc.plot import focused_distance, plot_camera, style
-from vcc.plot.elements import MOST_CELLS, Pen, label_of, magnification
+from vcc.plot.elements import MOST_CELLS, Pen, magnification
+from vcc.plot.labels import label_of
 from vcc.shapes.surfaces import Cubic
 
 SENSOR = vcc.Sensor(52 * mm, (500, 500), 48 * um)

@@ -135,8 +135,6 @@ def seconds_from_store(run: Drive) -> float:
     """How long reading and running will take: some views of a row are read and run, then scaled up."""
     shape = run.samples.grid.shape
     used = run.core.used_views(shape)
-    if not used.any():
-        return 0.0
     row = int(np.argmax(used.sum(axis=1)))
     columns = np.flatnonzero(used[row])
     some = int(columns[0]), int(columns[min(len(columns), 8) - 1]) + 1

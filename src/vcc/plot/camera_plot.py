@@ -17,7 +17,8 @@ from vcc.fields.samples import InMemory
 from vcc.optics import CellDeflection, Element, FirstOrder, Lens
 from vcc.optics.train import Stage, Train
 from vcc.plot import style
-from vcc.plot.elements import Pen, draw_element, draw_sensor, half_size, label_of, length_in_words, magnification
+from vcc.plot.elements import Pen, draw_element, draw_sensor, half_size, magnification
+from vcc.plot.labels import draw_labels
 from vcc.plot.tracing import Paths, fan, openings, trace
 
 if TYPE_CHECKING:
@@ -35,8 +36,6 @@ SCENE_SHARE = 0.45
 """How much of the scene's side is drawn, as a share of the camera's length."""
 NEAR_BLUR = 0.25
 """The nearer point is taken so near that it blurs over this share of the entrance."""
-LABEL_GAP = 14
-"""Pixels between labels."""
 CELLS_MAGNIFIED = 5
 """Of an array, in the magnified piece beside the drawing."""
 RAYS_A_CELL = 5
@@ -181,7 +180,7 @@ def plot_camera(
     style.tidy(axes, "z [mm], light goes to the right", f"{across} [mm]")
     if array is not None and beside is not None:
         _draw_magnified(beside, axes, camera, array, points, light_field, axis)
-    _draw_labels(pen, camera, own_figure)
+    draw_labels(pen, camera, own_figure)
     return axes
 
 
@@ -418,84 +417,3 @@ def _join(axes: Axes, piece: tuple[float, float, float], inset: Axes) -> None:
         )
         line.set_in_layout(False)
         axes.figure.add_artist(line)
-
-
-# --- words ---
-
-
-def _draw_labels(pen: Pen, camera: Train, own_figure: bool) -> None:
-    """What each thing is, side by side above the drawing, each with a line to its place."""
-    from matplotlib.figure import Figure
-    from matplotlib.text import Text
-
-    sensor = camera.sensor
-    rows, columns = sensor.shape
-    pitch = length_in_words(sensor.pitches[1 - pen.axis])
-    things = [(element.z + element.length / 2, label_of(element, pen)) for element in camera.elements]
-    things.append((sensor.z, f"sensor\n{rows} × {columns}, {pitch}"))
-    frame = pen.axes.get_xaxis_transform()
-    labels = [
-        pen.axes.annotate(
-            words,
-            (z / mm, 1.0),
-            xycoords=frame,
-            xytext=(z / mm, 1.07),
-            textcoords=frame,
-            ha="center",
-            va="bottom",
-            fontsize=style.SMALL,
-            color=style.INK,
-            annotation_clip=False,
-            arrowprops={
-                "arrowstyle": "-",
-                "color": style.QUIET,
-                "linewidth": 0.8,
-                "relpos": (0.5, 0.0),
-                "shrinkA": 1,
-                "shrinkB": 0,
-            },
-        )
-        for z, words in _merged(things)
-    ]
-    # The layout of an own figure follows the labels, and they follow it.
-    for _ in range(2 if own_figure else 1):
-        if own_figure:
-            figure = pen.axes.figure
-            assert isinstance(figure, Figure)
-            figure.draw_without_rendering()
-        left, right = pen.axes.get_xlim()
-        millimetres = (right - left) / pen.axes.bbox.width  # per pixel
-        widths = [(Text.get_window_extent(label).width + LABEL_GAP) * millimetres for label in labels]
-        for label, place in zip(labels, spread([label.xy[0] for label in labels], widths), strict=True):
-            label.set_position((place, 1.07))
-
-
-def spread(wanted: Sequence[float], widths: Sequence[float]) -> list[float]:
-    """Middles of things side by side that do not overlap, as near to the wanted ones as can be.
-
-    Args:
-        wanted: the middles asked for, increasing.
-        widths: of the things, in the same unit.
-    """
-    # Without the room that all before it take, "no overlap" is "not decreasing", and the nearest
-    # such sequence has the means of groups that would decrease (pool adjacent violators).
-    room = np.concatenate([[0.0], np.cumsum((np.array(widths[:-1]) + np.array(widths[1:])) / 2)])
-    groups: list[list[float]] = []
-    for place in np.array(wanted) - room:
-        groups.append([place])
-        while len(groups) > 1 and np.mean(groups[-2]) > np.mean(groups[-1]):
-            last = groups.pop()
-            groups[-1].extend(last)
-    means = [float(np.mean(group)) for group in groups for _ in group]
-    return [float(mean + taken) for mean, taken in zip(means, room, strict=True)]
-
-
-def _merged(things: list[tuple[float, str]]) -> list[tuple[float, str]]:
-    """Things at one place share a label."""
-    merged: list[tuple[float, str]] = []
-    for z, words in things:
-        if merged and merged[-1][0] == z:
-            merged[-1] = (z, f"{merged[-1][1]}\n{words}")
-        else:
-            merged.append((z, words))
-    return merged

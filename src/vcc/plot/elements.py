@@ -7,7 +7,6 @@ slopes bend rays as the element does, a scatterer is frosted, and what lets no l
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,28 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.units import mm, short
+from vcc.base.units import mm
 from vcc.optics import (
-    Biprism,
     CellDeflection,
-    CodedDiffuser,
-    Diffuser,
     Element,
     Faces,
     FirstOrder,
     Lens,
-    LensArray,
-    PhasePlate,
     Prism,
-    PrismArray,
-    Pyramid,
     Scatter,
 )
 from vcc.optics.sensor import Sensor
 from vcc.plot import style
 from vcc.plot.tracing import Crossing, crossings, spread_along
 from vcc.shapes.patterns import Pattern
-from vcc.shapes.surfaces import Surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,8 +40,6 @@ CELLS_INSTEAD = 40
 """About so many."""
 POINTS = 801
 """At which the profile of a piece of glass is looked at."""
-LONGEST_WORDS = 26
-"""Letters of a surface's description on a label; of a longer one only the kind is told."""
 
 
 @dataclass(frozen=True)
@@ -100,14 +89,15 @@ def half_size(element: Element, axis: int) -> float:
     """
     halves = []
     for crossing in crossings(element):
-        half = _half_opening(crossing.faces, axis)
+        half = half_opening(crossing.faces, axis)
         growth = abs(float(crossing.from_entrance.matrix[axis, axis]))
         if math.isfinite(half):
             halves.append(max(half, half / growth if growth > 0.1 else half))
     return max(halves, default=math.inf)
 
 
-def _half_opening(faces: Faces, axis: int) -> float:
+def half_opening(faces: Faces, axis: int) -> float:
+    """Half the height of what lets light through, metres; infinite where all does."""
     return math.inf if faces.pattern is None else faces.pattern.size[axis] / 2
 
 
@@ -172,7 +162,7 @@ def _draw_block(pen: Pen, element: Element, planes: list[Crossing], beam: float)
     corners = np.array([start, end, end, start]), centre + half * np.array([-1, -1, 1, 1])
     pen.glass(*corners, bounded=bounded, alpha=0.5)
     for plane in planes:
-        opening = _half_opening(plane.faces, pen.axis)
+        opening = half_opening(plane.faces, pen.axis)
         if math.isfinite(opening):
             _draw_stop(pen, plane.z, centre, opening, half)
     for z, name, side in _principal_planes(element):
@@ -210,7 +200,7 @@ def _principal_planes(element: Element) -> list[tuple[float, str, int]]:
 def _draw_by_faces(pen: Pen, element: Element, faces: Faces) -> None:
     """Any thin element: glass that bends as it does, a frosted sheet where it scatters, black where it stops."""
     bends, scatters = faces.deflection is not None, faces.spread is not None
-    half = _half_opening(faces, pen.axis)
+    half = half_opening(faces, pen.axis)
     if bends:
         _draw_glass(pen, element, faces)
     if faces.spread is not None:
@@ -233,25 +223,25 @@ def _draw_by_faces(pen: Pen, element: Element, faces: Faces) -> None:
         _draw_stop(pen, element.z, element.decentre[pen.axis], half)
 
 
-def _range(pen: Pen, element: Element, half: float) -> tuple[float, float]:
+def drawn_range(pen: Pen, element: Element, half: float) -> tuple[float, float]:
     """From which to which height, from its middle, an element is drawn, metres."""
     centre = element.decentre[pen.axis]
     margin = 0.02 * pen.half
     return max(-half, pen.low - margin - centre), min(half, pen.high + margin - centre)
 
 
-def _along(axis: int, places: Array) -> tuple[Array, Array]:
+def along(axis: int, places: Array) -> tuple[Array, Array]:
     """(x, y) of places on the drawn line through an element's middle."""
     return (places, np.zeros_like(places)) if axis == 0 else (np.zeros_like(places), places)
 
 
 def _all_clear(pen: Pen, element: Element, faces: Faces) -> bool:
     assert faces.pattern is not None
-    low, high = _range(pen, element, _half_opening(faces, pen.axis))
+    low, high = drawn_range(pen, element, half_opening(faces, pen.axis))
     places = np.linspace(low, high, 2 * POINTS + 1)[1:-1] / magnification(
         element, faces, pen.axis, pen.low, pen.high
     )
-    return bool((faces.pattern(*_along(pen.axis, places)) == 1).all())
+    return bool((faces.pattern(*along(pen.axis, places)) == 1).all())
 
 
 def magnification(element: Element, faces: Faces, axis: int, bottom: float, top: float) -> int:
@@ -266,7 +256,7 @@ def magnification(element: Element, faces: Faces, axis: int, bottom: float, top:
     """
     if not isinstance(faces.bending, CellDeflection):
         return 1
-    half, centre = _half_opening(faces, axis), element.decentre[axis]
+    half, centre = half_opening(faces, axis), element.decentre[axis]
     low, high = max(-half, bottom - centre), min(half, top - centre)
     cells = (high - low) / faces.bending.lattice.pitch
     return 1 if cells <= MOST_CELLS else math.ceil(cells / CELLS_INSTEAD)
@@ -274,8 +264,8 @@ def magnification(element: Element, faces: Faces, axis: int, bottom: float, top:
 
 def _draw_glass(pen: Pen, element: Element, faces: Faces) -> None:
     """Glass flat at the element's place; towards the scene it has the profile of its optical path."""
-    half = _half_opening(faces, pen.axis)
-    low, high = _range(pen, element, half)
+    half = half_opening(faces, pen.axis)
+    low, high = drawn_range(pen, element, half)
     if high <= low:
         return
     if isinstance(faces.bending, CellDeflection):
@@ -298,7 +288,7 @@ def _draw_glass(pen: Pen, element: Element, faces: Faces) -> None:
 def _profile(faces: Faces, axis: int, places: Array) -> Array:
     """The optical path along the drawn line, from 0 on, metres: the integral of the slopes that rays gain."""
     # In the middles between places: at a place two facets may meet.
-    x, y = _along(axis, (places[1:] + places[:-1]) / 2)
+    x, y = along(axis, (places[1:] + places[:-1]) / 2)
     if faces.affine is not None:
         slopes = faces.affine(np.stack([x, y, 0 * x, 0 * x], axis=-1))[:, 2 + axis]
     else:
@@ -315,7 +305,7 @@ def _cell_profile(cells: CellDeflection, axis: int, low: float, high: float, sca
     lattice = cells.lattice
     count = (high - low) / (lattice.pitch * scale)
     places = np.linspace(low, high, int(min(max(24 * count, POINTS), 4000)))
-    x, y = _along(axis, places / scale)
+    x, y = along(axis, places / scale)
     row, column = lattice.cell_of(x, y)
     centre_x, centre_y = lattice.centre_of(row, column)
     rows, columns = cells.powers.shape
@@ -329,12 +319,12 @@ def _cell_profile(cells: CellDeflection, axis: int, low: float, high: float, sca
 
 def _draw_frosted(pen: Pen, element: Element, scatter: Scatter, half: float) -> None:
     """A sheet with a rough side towards the sensor; where it scatters more it is rougher and darker."""
-    low, high = _range(pen, element, half)
+    low, high = drawn_range(pen, element, half)
     if high <= low:
         return
     teeth = max(int(60 * (high - low) / (2 * pen.half)), 6)
     height = np.linspace(low, high, 2 * teeth + 1)
-    spread = spread_along(scatter, pen.axis, *_along(pen.axis, height))
+    spread = spread_along(scatter, pen.axis, *along(pen.axis, height))
     strength = spread / spread.max() if spread.max() > 0 else 0 * spread
     # The teeth are uneven, as ground glass is, and the same on every drawing.
     tooth = np.where(np.arange(len(height)) % 2 == 0, 0.0, np.random.default_rng(0).uniform(0.4, 1, len(height)))
@@ -372,12 +362,12 @@ def _draw_sheet(pen: Pen, element: Element) -> None:
 
 def _draw_mask(pen: Pen, element: Element, pattern: Pattern, scale: int = 1, over_glass: bool = False) -> None:
     """The mask's middle row as a bar, black where it is opaque and white (on glass: nothing) where it is open."""
-    low, high = _range(pen, element, pattern.size[pen.axis] / 2)
+    low, high = drawn_range(pen, element, pattern.size[pen.axis] / 2)
     if high <= low:
         return
     points = 1024 if scale == 1 and not over_glass else 4096
     steps = (np.arange(points) + 0.5) / points
-    values = np.asarray(pattern(*_along(pen.axis, (low + (high - low) * steps) / scale)))
+    values = np.asarray(pattern(*along(pen.axis, (low + (high - low) * steps) / scale)))
     # Neighbours that are alike become one piece, so that a picture for print stays small.
     cuts = np.flatnonzero(np.diff(values)) + 1
     edges = low + (high - low) * np.concatenate([[0.0], cuts / points, [1.0]]) + element.decentre[pen.axis]
@@ -436,94 +426,3 @@ def draw_sensor(pen: Pen, sensor: Sensor, most_pixels: int = 0) -> None:
         first, last = math.ceil((low - centre + half) / pitch), math.floor((high - centre + half) / pitch)
         for border in centre - half + pitch * np.arange(first, last + 1):
             pen.line(sensor.z + np.array([0, thick]), [border, border], color="white", linewidth=0.7, zorder=3.2)
-
-
-# --- words ---
-
-
-def label_of(element: Element, pen: Pen) -> str:
-    """What stands above an element: its kind and name, and what matters most of it."""
-    first = f"{element.kind} {element.name}".strip()
-    for kind, words in _WORDS.items():
-        if isinstance(element, kind):
-            return "\n".join([first, *(line for line in words(element, pen) if line)])
-    return first
-
-
-def length_in_words(value: float) -> str:
-    """A length on a drawing, to 4 digits."""
-    if math.isinf(value):
-        return "∞" if value > 0 else "−∞"
-    return short(value, digits=4).replace("um", "µm").replace("-", "−")
-
-
-def _number(value: float) -> str:
-    return f"{value:.3g}".replace("-", "−")
-
-
-def _lens_words(lens: Any, pen: Pen) -> list[str]:
-    return [f"f = {length_in_words(lens.focal_length)}"]
-
-
-def _prism_words(prism: Any, pen: Pen) -> list[str]:
-    return [f"δ = {_number(prism.deflection[0])}, {_number(prism.deflection[1])}"]
-
-
-def _facet_words(prism: Any, pen: Pen) -> list[str]:
-    sides = f"{prism.sides} sides, " if isinstance(prism, Pyramid) else ""
-    return [f"{sides}δ = {_number(prism.deflection)}"]
-
-
-def _array_words(array: Any, pen: Pen) -> list[str]:
-    faces = array.faces()
-    half = _half_opening(faces, pen.axis)
-    pitch = array.pitch if pen.axis == 0 else array.lattice.row_height
-    count = f"{round(2 * half / pitch)} cells of " if math.isfinite(half) else "pitch "
-    given = array.focal_lengths if isinstance(array, LensArray) else (array.focal_length,)
-    focal = [length_in_words(one) for one in given if one is not None]
-    scale = magnification(array, faces, pen.axis, pen.low, pen.high)
-    return [
-        count + length_in_words(pitch),
-        f"f = {', '.join(focal)}" if focal and focal != ["∞"] else "",
-        f"drawn {scale}× as large" if scale > 1 else "",
-    ]
-
-
-def _plate_words(plate: Any, pen: Pen) -> list[str]:
-    if not isinstance(plate.surface, Surface):
-        return [f"slopes by {getattr(plate.surface, '__name__', type(plate.surface).__name__)}"]
-    words = plate.surface.described().replace("-", "−").replace("um", "µm")
-    return [words if len(words) <= LONGEST_WORDS else words.split(" (")[0]]
-
-
-def _scatter_words(diffuser: Any, pen: Pen) -> list[str]:
-    faces = diffuser.faces()
-    low, high = _range(pen, diffuser, _half_opening(faces, pen.axis))
-    spread = spread_along(faces.spread, pen.axis, *_along(pen.axis, np.linspace(low, high, POINTS)))
-    least, most = (f"{value:.2g}" for value in (float(spread.min()), float(spread.max())))
-    return [f"σ = {least}" if least == most else f"σ = {least} to {most}"]
-
-
-def _system_words(system: Any, pen: Pen) -> list[str]:
-    try:
-        focal_length = system.focal_length
-    except InputError:  # without an axis of symmetry it has none
-        return [""]
-    words = "afocal" if math.isinf(focal_length) else f"f = {length_in_words(focal_length)}"
-    if system.stop_diameter is None or math.isinf(focal_length):
-        return [words]
-    return [f"{words}, f/{_number(system.f_number)}"]
-
-
-_WORDS: dict[type[Any], Callable[[Any, Pen], list[str]]] = {
-    Lens: _lens_words,
-    Prism: _prism_words,
-    Biprism: _facet_words,
-    Pyramid: _facet_words,
-    LensArray: _array_words,
-    PrismArray: _array_words,
-    PhasePlate: _plate_words,
-    Diffuser: _scatter_words,
-    CodedDiffuser: _scatter_words,
-    FirstOrder: _system_words,
-}

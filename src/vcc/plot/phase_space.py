@@ -23,6 +23,7 @@ from vcc.plot.phase_space_rays import (
     NAMES,
     RAYS,
     PhaseSpacePicture,
+    radiance_of,
     sheet_of_rays,
     sheet_of_samples,
     slice_of,
@@ -306,11 +307,7 @@ def _slice(light_field: InMemory, row: int | None, pixel_row: int | None, across
 def _radiance(piece: InMemory, across: str) -> Array:
     """Radiance of a slice, (views, pixels) or (views, pixels, 3)."""
     values = to_numpy(piece.values)
-    values = values[0, :, 0] if across == "u" else values[:, 0, :, 0]
-    radiance: Array = values.astype(np.float64) / piece.grid.full_scale
-    if radiance.ndim == 3 and radiance.shape[2] != 3:
-        radiance = radiance.mean(axis=2)
-    return radiance
+    return radiance_of(values[0, :, 0] if across == "u" else values[:, 0, :, 0], piece)
 
 
 def _for_display(values: Array) -> Any:

@@ -150,6 +150,6 @@ def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
 
 
 def _span(used: Any) -> tuple[int, int]:
-    """The first of those that are used, and the one after the last; the first of all where none is."""
+    """The first of those that are used, and the one after the last."""
     found = np.flatnonzero(used)
-    return (int(found[0]), int(found[-1]) + 1) if found.size else (0, 1)
+    return int(found[0]), int(found[-1]) + 1

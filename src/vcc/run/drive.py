@@ -196,8 +196,7 @@ class Drive:
         looked_at = {block: int(used[slice(*block.rows), slice(*block.columns)].sum()) for block in listed}
         counted = _Counted(progress, sum(looked_at.values()))
         total: Partial | None = None
-        # Where nothing is looked at, the first block tells the picture's size.
-        for block in [block for block in listed if looked_at[block]] or listed[:1]:
+        for block in [block for block in listed if looked_at[block]]:
             values, around = self._values(block, used, counted)
             part = run(core.part(self.plan.block(around)), values)
             del values

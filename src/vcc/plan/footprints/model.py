@@ -160,10 +160,10 @@ class Footprints(Value):
         return replace(self, raster_shape=shape, x=self.x + pixels, y=self.y + pixels)
 
     def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Which of the views of a light field of this shape are looked at, (v, u)."""
+        """Which of the views of a light field of this shape are looked at, (v, u): one where none gives light."""
         used = np.zeros(shape[:2], dtype=bool)
-        taps = np.nonzero(self.weights)
-        used[self.view_rows[taps[0]], self.view_columns[taps[1]]] = True
+        rows, columns = np.nonzero(self.weights) if self.weights.any() else ([0], [0])
+        used[self.view_rows[rows], self.view_columns[columns]] = True
         return used
 
     def scaled(self, factor: float) -> Footprints:
