@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import math
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -337,6 +339,17 @@ def test_negative_disparities_of_parallel_views_are_said(views: Views, folder_of
     with pytest.warns(ResultWarning, match="all negative.*flip-both"):
         open_light_field(folder, transfer="linear", **GIVEN)
     open_light_field(folder, transfer="linear", **(GIVEN | {"focus_distance": 1.0}))
+
+
+# What it takes
+
+
+def test_libraries_of_formats_are_loaded_when_they_are_needed() -> None:
+    """Knowing the formats, and opening no file, loads none of what reads them."""
+    heavy = {"h5py", "av", "tifffile", "OpenEXR", "imagecodecs", "zarr"}
+    code = "import sys, vcc.formats, vcc.store; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not heavy & set(loaded.stdout.split())
 
 
 # What cannot be opened

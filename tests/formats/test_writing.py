@@ -13,8 +13,9 @@ import pytest
 
 from vcc import Affine, InputError, LightField, ResultWarning, open_light_field
 from vcc.files import transfer
-from vcc.formats import read_geometry
+from vcc.formats import arrays, eslf, lftoolbox, read_geometry
 from vcc.formats.writing import save_folder, save_light_field
+from vcc.store import open_store, save_store
 
 RNG = np.random.default_rng(1)
 GEOMETRY = {"spacing": 2.5e-3, "slope_per_pixel": 1.7e-3, "focus_distance": 1.3}
@@ -163,17 +164,11 @@ def test_files_that_keep_everything(tmp_path, ending, kind):
     assert saved.kind == ending[1:]
     assert calls == [(1, 1)]
     if ending == ".zarr":
-        from vcc.store import open_store
-
         back = open_store(path).read()
     elif ending == ".mat":
-        from vcc.formats import lftoolbox
-
         decoded = lftoolbox.read(path)
         back = LightField(decoded.values, decoded.frame)
     else:
-        from vcc.formats import arrays
-
         decoded = arrays.read(path)
         back = LightField(decoded.values, decoded.frame)
     assert back.values.dtype == kind
@@ -185,8 +180,6 @@ def test_eslf(tmp_path):
     light_field = field_of()
     saved = save_light_field(light_field, tmp_path / "a.png")
     assert "holds no geometry" in saved.description
-    from vcc.formats import eslf
-
     back = eslf.read(tmp_path / "a.png", views=(3, 4))
     assert np.abs(transfer.decode(back.values) - light_field.values).max() < 1.8e-5  # 16 bits, as above
 
@@ -199,9 +192,6 @@ def test_a_flight(tmp_path):
 
 
 def test_a_store_is_written_view_by_view(tmp_path):
-    pytest.importorskip("zarr", reason="zarr is not installed")
-    from vcc.store import open_store
-
     light_field = field_of(np.uint8, disparity_range=(0.0, 1.0))
     save_light_field(light_field, tmp_path / "a.zarr")
     save_light_field(open_store(tmp_path / "a.zarr"), tmp_path / "a", transfer="linear")
@@ -209,6 +199,25 @@ def test_a_store_is_written_view_by_view(tmp_path):
     assert np.array_equal(back.values, light_field.values)
     assert same_frame(back, light_field)
     assert back.disparity_range == (0, 1)
+
+
+@pytest.mark.parametrize("name", ["b.zarr", "b.npz", "b.mat", "b.png"])
+def test_from_a_store_as_from_memory(tmp_path, name):
+    """Of a store of sRGB codes that is the light that they stand for."""
+    pytest.importorskip("h5py", reason="not installed")
+    codes = field_of(np.uint8, disparity_range=(0.0, 1.0))
+    stored = save_store(codes, tmp_path / "a.zarr", transfer="srgb")
+    save_light_field(stored, tmp_path / name)
+    if name == "b.zarr":
+        back = open_store(tmp_path / name).read()
+    elif name == "b.png":
+        back = reopened(tmp_path / name, views=(3, 4), **GEOMETRY)
+    else:
+        back = reopened(tmp_path / name)
+    light = transfer.decode(codes.values)
+    assert np.abs(back.values - light).max() <= (1.8e-5 if name == "b.png" else 0)  # 16 bits, as above
+    assert same_frame(back, codes)
+    assert back.disparity_range == (None if name == "b.png" else (0, 1))
 
 
 def test_what_is_too_bright_is_said(tmp_path):

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
 from vcc.fields.arrays import all_samples
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
@@ -44,7 +43,6 @@ def read(
     shape: tuple[int, ...] | None = None,
     axes: str | None = None,
     key: str | None = None,
-    progress: Progress | None = None,
 ) -> Decoded:
     """The light field in an array.
 
@@ -56,7 +54,6 @@ def read(
             views, rows of pixels, columns of pixels, channels. Without it an array of four axes is taken as
             "vuts", of five as "vutsc".
         key: which array of an ``.npz``; needed where there are several and none is called "values".
-        progress: called when it is done.
 
     Returns:
         Samples as stored. Those of an ``.npz`` that states its transfer have that; else floating-point ones
@@ -75,8 +72,6 @@ def read(
             f"{path} holds samples of type {values.dtype}; a light field has unsigned integers (fractions of "
             "their full scale) or floating-point numbers. Convert them, e.g. with values.astype('float32')"
         )
-    if progress is not None:
-        progress(1, 1)
     return Decoded(
         format="NumPy array" if path.suffix.lower() == ".npy" else "NumPy arrays (.npz)",
         values=values,

@@ -14,8 +14,9 @@ from vcc.formats.grid import Decoded
 
 CONTAINERS: tuple[ModuleType, ...] = (
     # Each is a module with `recognised(path: Path) -> bool`, quick and by the ending or the first bytes, and
-    # `read(path: Path, *, progress=None, …) -> Decoded`; further keyword arguments of `read` are options that
-    # `open_light_field(path, …)` passes on. The first that recognises a path reads it.
+    # `read(path: Path, *, …) -> Decoded`; keyword arguments of `read` are options that `open_light_field(path, …)`
+    # passes on, but for `progress`, which it takes if it has something to say. The first that recognises a path
+    # reads it.
     lftoolbox,
     hci_2013,
     plenoptomos_vox,
@@ -49,10 +50,15 @@ def read_container(path: Path, progress: Progress | None = None, **options: Any)
         if not path.exists():
             raise InputError(f"there is no file {path}")
         raise InputError(f"{path} is in no format that is known")
-    taken = [key for key in inspect.signature(module.read).parameters if key not in ("path", "progress")]
+    parameters = inspect.signature(module.read).parameters
+    taken = [key for key in parameters if key not in ("path", "progress")]
     for option in options:
         if option not in taken:
             takes = f"takes {', '.join(taken)}" if taken else "takes no options"
             raise InputError(f"{path}: {option}= means nothing to this format, which {takes}")
-    decoded: Decoded = module.read(path, progress=progress, **options)
+    if "progress" in parameters:
+        options["progress"] = progress
+    decoded: Decoded = module.read(path, **options)
+    if progress is not None and "progress" not in parameters:
+        progress(1, 1)
     return decoded

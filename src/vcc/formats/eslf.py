@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
 from vcc.fields.arrays import all_samples
 from vcc.fields.samples import Samples
 from vcc.files import transfer as curves
 from vcc.files.atomic import atomic_path
 from vcc.files.pictures import read_picture
-from vcc.formats.grid import Decoded
+from vcc.formats.grid import Decoded, weights_apart
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".ppm")
 
@@ -32,7 +31,6 @@ def read(
     path: Path,
     *,
     views: tuple[int, int] | None = None,
-    progress: Progress | None = None,
 ) -> Decoded:
     """The views of a picture of lenslet blocks: pixel (l·rows + j, k·columns + i) is pixel (l, k) of view (j, i).
 
@@ -40,7 +38,6 @@ def read(
         path: the picture. The opacity of a PNG is the weight of its samples.
         views: (rows, columns) of views in a block. Known for the sizes of Stanford's archive (14×14, 7574×5264
             pixels) and of the Light Field Toolbox (15×15, 9375×6510).
-        progress: called when it is done.
 
     Raises:
         InputError: a picture that cannot be read, views that are not known or impossible.
@@ -64,8 +61,6 @@ def read(
             f"{height}×{width} pixels (rows × columns) are no whole number of blocks of {rows}×{columns} views; "
             f"the last {height % rows} rows and {width % columns} columns, cut off blocks, were left out",
         )
-    if progress is not None:
-        progress(1, 1)
     return Decoded(
         format=f"ESLF, {rows}×{columns} views in one picture",
         values=_views(samples, views),
@@ -137,7 +132,6 @@ def _samples(path: Path) -> tuple[NDArray[Any], NDArray[np.float32] | None]:
             "Copy it again from where it came from"
         ) from error
     if samples.ndim == 3 and samples.shape[2] in (2, 4):
-        weights = samples[..., -1].astype(np.float32) / np.float32(np.iinfo(samples.dtype).max)
-        samples = samples[..., :-1] if samples.shape[2] == 4 else samples[..., 0]
-        return samples, weights
+        samples, weights = weights_apart(samples)
+        return samples if samples.shape[2] == 3 else samples[..., 0], weights
     return samples, None

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
@@ -95,6 +96,16 @@ class Decoded:
     weights: NDArray[Any] | None = None
     remarks: tuple[str, ...] = ()
     metadata: dict[str, Any] = field(default_factory=dict)
+
+
+def weights_apart(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.float32]]:
+    """Samples whose last channel is a weight (or an opacity), not copied, and that weight, 0 to 1.
+
+    Args:
+        values: shape (…, channels), unsigned integers or floating point.
+    """
+    whole = np.iinfo(values.dtype).max if values.dtype.kind == "u" else 1
+    return values[..., :-1], values[..., -1].astype(np.float32) / np.float32(whole)
 
 
 @dataclass(frozen=True)

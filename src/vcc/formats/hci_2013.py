@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
 from vcc.formats import hdf5
 from vcc.formats.grid import Decoded, Geometry
 
@@ -18,7 +17,7 @@ def recognised(path: Path) -> bool:
     return path.suffix.lower() in (".h5", ".hdf5") and path.is_file()
 
 
-def read(path: Path, *, progress: Progress | None = None) -> Decoded:
+def read(path: Path) -> Decoded:
     """The data set /LF, axes (v, h, y, x, channel), with the cameras of the root's attributes.
 
     disparity = dH·focalLength/Z − shift, focalLength in pixels. The unit of dH and of the depths is not stated;
@@ -51,8 +50,6 @@ def read(path: Path, *, progress: Progress | None = None) -> Decoded:
     if depth is not None:
         with np.errstate(divide="ignore"):
             disparity = (dh * focal_length / depth - shift).astype(np.float32)
-    if progress is not None:
-        progress(1, 1)
     return Decoded(
         format="HCI light field of 2013 (HDF5)",
         values=values,

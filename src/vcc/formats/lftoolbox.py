@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
 from vcc.fields.arrays import all_samples
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
 from vcc.formats import hdf5
-from vcc.formats.grid import Decoded, Geometry
+from vcc.formats.grid import Decoded, Geometry, weights_apart
 
 _TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
 _FROM_ZERO = Affine.translation(1, 1, 1, 1)  # from indices counted from 0 to MATLAB's
@@ -37,7 +36,7 @@ def recognised(path: Path) -> bool:
     return path.suffix.lower() == ".mat" and path.is_file()
 
 
-def read(path: Path, *, progress: Progress | None = None) -> Decoded:
+def read(path: Path) -> Decoded:
     """The light field ``LF`` with its weights and, if it was rectified, its full frame.
 
     Decoded and not colour-corrected samples are linear; those that DecodeOptions calls colour-corrected have been
@@ -70,20 +69,17 @@ def read(path: Path, *, progress: Progress | None = None) -> Decoded:
     values = np.ascontiguousarray(stored.T)
     if values.dtype == np.float64:
         values = values.astype(np.float32)
-    weights = None
     if has_weight is None:
         has_weight = values.ndim == 5 and values.shape[4] in (2, 4)
+    weights = None
     if has_weight:
-        whole = np.iinfo(values.dtype).max if values.dtype.kind == "u" else 1
-        weights = values[..., -1].astype(np.float32) / np.float32(whole)
-        values = np.ascontiguousarray(values[..., :-1])
+        values, weights = weights_apart(values)
+        values = np.ascontiguousarray(values)
     remarks = []
     if weights is not None and (unknown := float((weights == 0).mean())) > 0:
         remarks.append(
             f"{unknown:.1%} of the samples have the weight 0: nothing is known of them, and they are dark"
         )
-    if progress is not None:
-        progress(1, 1)
     transfer: Literal["srgb", "linear"] = "srgb" if (ours == "srgb" or corrected) else "linear"
     return Decoded(
         format="Light Field Toolbox (.mat)",

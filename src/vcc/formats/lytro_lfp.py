@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
 from vcc.formats.grid import Decoded
 from vcc.formats.lytro_container import Container, begins_as_container, stated_at
 
@@ -162,7 +161,7 @@ def recognised(path: Path) -> bool:
     return path.is_file() and (path.suffix.lower() in ENDINGS or begins_as_container(path))
 
 
-def read(path: Path, *, progress: Progress | None = None) -> Decoded:
+def read(path: Path) -> Decoded:
     """Refuse: a raw recording is no light field yet.
 
     Raises:

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
 from vcc.base.units import mm, um
 from vcc.formats import hdf5
 from vcc.formats.grid import Decoded, Geometry
@@ -40,12 +39,11 @@ def recognised(path: Path) -> bool:
     return path.suffix.lower() in ENDINGS and path.is_file()
 
 
-def read(path: Path, *, progress: Progress | None = None) -> Decoded:
+def read(path: Path) -> Decoded:
     """The light field of a ``.vox`` file, with the frame that its camera makes.
 
     Args:
         path: the file.
-        progress: called when it is done.
 
     Returns:
         Linear samples: 8- and 16-bit counts as stored, others as floating-point numbers. The white and dark
@@ -71,8 +69,6 @@ def read(path: Path, *, progress: Progress | None = None) -> Decoded:
         if kept:
             remarks.append(f"it holds {' and '.join(kept)} pictures too, which are not applied")
         model = _text(file[_CAMERA].attrs.get("model")) if _CAMERA in file else ""
-    if progress is not None:
-        progress(1, 1)
     return Decoded(
         format="plenoptomos .vox",
         values=values,

@@ -97,7 +97,8 @@ def save_light_field(
     =======================  ==========  =====================================================================
 
     Args:
-        light_field: in memory or in a store. For folders and flights one view of a store is read at a time.
+        light_field: in memory or in a store. For stores, folders and flights one view of a
+            store is read at a time.
         path: where to. A folder must not exist yet, or be empty.
         kind: see above; needed for "views".
         progress: called as progress(done, total) after each view of a folder.
