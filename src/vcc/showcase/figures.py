@@ -1,4 +1,4 @@
-"""The demo's drawings: close-ups side by side, phase space, cameras, the contact sheet."""
+"""Drawings: close-ups side by side, views, masks, a contact sheet."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from vcc.fields.sampled import to_numpy
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
+from vcc.files.pictures import read_picture
 from vcc.image import Image
 from vcc.light_field import LightField
+from vcc.optics.sensor import Sensor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,6 +49,22 @@ class Crop:
         row = min(max(self.row, 0), shown.shape[0] - self.size)
         column = min(max(self.column, 0), shown.shape[1] - self.size)
         return shown[row : row + self.size, column : column + self.size]
+
+
+def crop_around(sensor: Sensor, place: tuple[float, float, float], size: int) -> Crop:
+    """The square around a point of the scene, as it is seen through the middle of a lens at z = 0.
+
+    Args:
+        sensor: behind the lens.
+        place: (X, Y, distance) of the point, metres.
+        size: pixels a side.
+    """
+    # Upright, the picture runs the way the scene does.
+    row, column = (
+        (count - 1) / 2 + across / place[2] * sensor.z / pitch
+        for across, count, pitch in zip(place[1::-1], sensor.shape, sensor.pitches, strict=True)
+    )
+    return Crop(round(row) - size // 2, round(column) - size // 2, size)
 
 
 def shown(image: Image, exposure: float) -> Shown:
@@ -259,7 +277,5 @@ def contact_sheet(title: str, rows: Sequence[SheetRow]) -> Figure:
 
 
 def _read(path: Path) -> Any:
-    from vcc.files.pictures import read_picture
-
     picture = read_picture(path)[0][..., :3]
     return np.repeat(picture[..., None], 3, axis=2) if picture.ndim == 2 else picture
