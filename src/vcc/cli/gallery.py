@@ -41,7 +41,6 @@ def gallery(
 ) -> None:
     """Rebuild a published camera, from optics to decoded result, beside what was claimed of it."""
     from vcc.gallery import entries, entry, write_entry
-    from vcc.gallery.page import VERDICTS
 
     if name is None:
         for each in entries():
@@ -52,6 +51,6 @@ def gallery(
     with progress(chosen.title) as advance:
         result = chosen.run(light_field, advance)
     for number in result.numbers:
-        claim = f" (claim: {number.claim}; {VERDICTS[number.reached]})" if number.claim else ""
+        claim = f" (claim: {number.claim}; {number.verdict})" if number.claim else ""
         show(f"{number.what}: {number.measured}{claim}")
     show(f"{write_entry(chosen, result, folder)}: written")

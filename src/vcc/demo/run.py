@@ -274,7 +274,8 @@ def _example_two(work: _Work, bench: Bench, conventional: dict[str, _Taken]) -> 
 def _check(work: _Work, bench: Bench, conventional: dict[str, _Taken]) -> None:
     camera = bench.pinhole()
     exposure = bench.exposure(camera, bench.pinhole_diameter)
-    with work.console.status("the true picture"), work.timed("check: the true picture", note=truth_in_words(bench)):
+    words = truth_in_words(bench)
+    with work.console.status("the true picture"), work.timed("check: the true picture", note=words):
         truth = true_picture(bench)
     truth.save(work.path("check-truth.png"), exposure=exposure)
     columns, errors = [("truth", figures.shown(truth, exposure))], []

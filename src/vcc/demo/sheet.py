@@ -78,7 +78,7 @@ def drawn_sheet(folder: Path, bench: Bench, psnr: dict[str, float], timings: Seq
 
 def _compared(timings: Sequence[Timing]) -> str:
     """How fast the first picture of those was that took the paper 8 minutes; nothing without one."""
-    return next(
-        (f"; {duration(each.first)} ({each.speed_up} faster than the paper’s 8 min)" for each in timings if each.compared),
-        "",
-    )
+    for timing in timings:
+        if timing.compared:
+            return f"; {duration(timing.first)} ({timing.speed_up} faster than the paper’s 8 min)"
+    return ""

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from vcc.analysis import psf
 from vcc.camera import Camera
-from vcc.demo import story
+from vcc.showcase.words import away, length
 from vcc.gallery import flat_target
 from vcc.gallery.closeness import psnr
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.gallery.flat_target import OPENING
 from vcc.gallery.published_codes import VEERARAGHAVAN
 from vcc.optics import Lens, Mask
@@ -207,13 +207,13 @@ def _photon_finding(gain: float) -> Finding:
 
 def _words() -> list[str]:
     return [
-        f"A lens of f = {story.length(flat_target.FOCAL_LENGTH)} with a square opening of "
-        f"{story.length(OPENING)}, and in it, for one of two cameras, the mask of 7×7 cells, 20 of which are "
+        f"A lens of f = {length(flat_target.FOCAL_LENGTH)} with a square opening of "
+        f"{length(OPENING)}, and in it, for one of two cameras, the mask of 7×7 cells, 20 of which are "
         "open. A point out of focus becomes a picture of the aperture. That of an open square has a spectrum with "
         "zeros: detail there is lost. The authors chose the code for a broad spectrum, so that what blur weakens "
         "can be given back.",
         "A flat target, the middle of the middle view, stands "
-        f"{story.away(flat_target.DISTANCE)} before cameras focused {story.away(flat_target.FOCUS)}: its blur is "
+        f"{away(flat_target.DISTANCE)} before cameras focused {away(flat_target.FOCUS)}: its blur is "
         f"{BLUR} pixels wide, {BLUR // CELLS} for each cell. The exposure time is the same, and so is the noise, "
         f"in the sensor’s own units: additive, Gaussian, with a standard deviation of {100 * NOISE:g} % of white "
         "through the open aperture. The mask lets 20/49 of the light through: brightened to the same white, its "
@@ -252,10 +252,10 @@ def _scene(bench: Bench) -> tuple[list[tuple[Picture, ...]], list[Finding], str]
         noise = math.hypot(NOISE * white / passed, MISFIT * float(noisy.std()))
         pictures[name] = wiener(noisy, spread, noise).picture
     titles = {
-        "open-recorded": f"Open aperture, focused {story.away(focus)}, as recorded",
-        "open": f"Refocused {story.away(bench.middle)}: open aperture",
-        "coded": f"Refocused {story.away(bench.middle)}: coded aperture",
-        "coded-recorded": f"Coded aperture, focused {story.away(focus)}, as recorded",
+        "open-recorded": f"Open aperture, focused {away(focus)}, as recorded",
+        "open": f"Refocused {away(bench.middle)}: open aperture",
+        "coded": f"Refocused {away(bench.middle)}: coded aperture",
+        "coded-recorded": f"Coded aperture, focused {away(focus)}, as recorded",
     }
     shown = {name: figures.values_shown(picture[::-1, ::-1], white) for name, picture in pictures.items()}
     rows = [
@@ -266,7 +266,7 @@ def _scene(bench: Bench) -> tuple[list[tuple[Picture, ...]], list[Finding], str]
         (
             Picture(
                 "scene-close-up",
-                f"The middle of the scene, what is {story.away(bench.middle)}",
+                f"The middle of the scene, what is {away(bench.middle)}",
                 "Pixels as they are, not smoothed.",
                 figures.close_ups(
                     [
@@ -282,9 +282,9 @@ def _scene(bench: Bench) -> tuple[list[tuple[Picture, ...]], list[Finding], str]
         )
     )
     words = (
-        f"Below, the light field itself through both apertures, {story.length(APERTURE)} wide and focused "
-        f"{story.away(focus)}, with the same noise. The Wiener filter takes away the blur of what is "
-        f"{story.away(bench.middle)}, {blur:.1f} pixels, by the camera’s point-spread function for that distance "
+        f"Below, the light field itself through both apertures, {length(APERTURE)} wide and focused "
+        f"{away(focus)}, with the same noise. The Wiener filter takes away the blur of what is "
+        f"{away(bench.middle)}, {blur:.1f} pixels, by the camera’s point-spread function for that distance "
         "(<code>vcc.analysis.psf</code>). To this filter, things at other distances are wrong, as errors of "
         f"{100 * MISFIT:g} % of the contrast beside the noise; they come out wrong, too, as out of focus in any "
         "refocused picture."

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.analysis import OptimisedAperture, expected_deblurring_error, natural_image_power, optimised_aperture
-from vcc.demo import story
+from vcc.showcase.words import away, length
 from vcc.gallery import flat_target
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.gallery.flat_target import OPENING
 from vcc.gallery.published_codes import LEVIN, VEERARAGHAVAN, ZHOU_NAYAR
 from vcc.optics import Mask
@@ -346,9 +346,9 @@ def _findings(judged: dict[str, Judged]) -> list[Finding]:
 def _words(judged: dict[str, Judged]) -> list[str]:
     passed = ", ".join(f"{name} {100 * each.kernel.sum():.0f} %" for name, each in judged.items())
     return [
-        f"A lens of f = {story.length(flat_target.FOCAL_LENGTH)}, focused {story.away(flat_target.FOCUS)}, with a "
-        f"pattern in its square opening of {story.length(OPENING)}, looks at a flat target "
-        f"{story.away(flat_target.DISTANCE)}: its blur is a picture of the pattern, {BLUR} pixels wide. Exposure "
+        f"A lens of f = {length(flat_target.FOCAL_LENGTH)}, focused {away(flat_target.FOCUS)}, with a "
+        f"pattern in its square opening of {length(OPENING)}, looks at a flat target "
+        f"{away(flat_target.DISTANCE)}: its blur is a picture of the pattern, {BLUR} pixels wide. Exposure "
         "time and noise are the same for all, so that a pattern which stops light pays for it (light passed: "
         f"{escape(passed)}). The annulus has {ANNULUS:g} of the outer radius inside; this ratio is ours.",
         "R(K) = Σ σ²/(|K|² + σ²/|F₀|²) is the squared error that a Wiener filter is expected to leave of pictures "

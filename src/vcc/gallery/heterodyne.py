@@ -14,10 +14,10 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import mm, um
 from vcc.camera import Camera
-from vcc.demo import story
+from vcc.showcase.words import away, length
 from vcc.gallery import heterodyne_figures
 from vcc.gallery.closeness import psnr
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.gallery.heterodyne_figures import TRANSMITTED
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -158,7 +158,7 @@ def designed(bench: Bench, light_field: LightField) -> Camera:
     if min(sizes) <= 0:
         raise InputError(
             "the views do not share what they look at around the axis when focused "
-            f"{story.away(bench.masked_focus)}: give a light field whose views converge, or with less parallax"
+            f"{away(bench.masked_focus)}: give a light field whose views converge, or with less parallax"
         )
     longer = int(np.argmax(sizes))
     # A view's pixel is to hold two of the light field's or more: there must be something to filter away.
@@ -278,7 +278,7 @@ def _findings(
         "dB",
         None,
         f"its aliasing costs {fitting.inner - taken['sharper'].inner:.1f} dB, focused "
-        f"{story.away(bench.masked_focus)}: strong tiles spill into weak ones",
+        f"{away(bench.masked_focus)}: strong tiles spill into weak ones",
     )
     yield Finding(
         f"scene that fits, with photon noise: {inner}",
@@ -293,7 +293,7 @@ def _findings(
             psnr(pictures[name][place], pictures["true"][place], white) for name in ("decoded", "noisy")
         )
         yield Finding(
-            f"refocused {place} ({story.away(distance)}) against the true views refocused, PSNR",
+            f"refocused {place} ({away(distance)}) against the true views refocused, PSNR",
             "",
             clean,
             "dB",
@@ -398,10 +398,10 @@ def _text(bench: Bench, camera: Camera, sharper: float) -> str:
     )
     return paragraphs(
         [
-            f"<b>The camera.</b> A lens of f = {story.length(bench.focal_length)} behind a square stop of "
-            f"{story.length(stop[0])}, focused {story.away(bench.masked_focus)}, and, {story.length(gap)} before "
+            f"<b>The camera.</b> A lens of f = {length(bench.focal_length)} behind a square stop of "
+            f"{length(stop[0])}, focused {away(bench.masked_focus)}, and, {length(gap)} before "
             f"the sensor, a transparency with {HARMONICS} cosines each way, as many as the published one has; "
-            f"the first has a period of {story.length(stop[0] * gap / sensor.z)}. Seen from one place on the "
+            f"the first has a period of {length(stop[0] * gap / sensor.z)}. Seen from one place on the "
             "sensor, the stop sweeps over just one period: light from the left of the lens has passed another "
             "part of the cosine than light from the right. So the mask writes the direction of light into the "
             "picture, as a radio writes sound on its carrier.",
@@ -411,7 +411,7 @@ def _text(bench: Bench, camera: Camera, sharper: float) -> str:
             "spectrum at n<sub>x</sub> and n<sub>y</sub> periods across the aperture. Each tile is cut out and "
             "divided by that of a calibration recording (a white scene through a pinhole, which shows the "
             f"mask’s shadow alone); the stack of tiles, transformed back, is {VIEWS}×{VIEWS} views. The sensor "
-            f"has {sensor.shape[1]}×{sensor.shape[0]} pixels of {story.length(sensor.pitches[1])}, a view "
+            f"has {sensor.shape[1]}×{sensor.shape[0]} pixels of {length(sensor.pitches[1])}, a view "
             f"{geometry.shape[1]}×{geometry.shape[0]}, of which {BORDER:.0%} at each edge, where recordings are "
             "faded out, are cut off; the authors’ example has 2133×1719 pixels, and views of 237×191.",
             f"<b>The scene that fits.</b> A tile reaches {tile / 2:.3g} cycles per mm to each side. So the views "

@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.measures import psnr
 from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo import story
-from vcc.gallery.closeness import psnr
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.light_field import LightField
 from vcc.optics import Mask
 from vcc.optics.sensor import Sensor
 from vcc.shapes.patterns import Circle
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
+from vcc.showcase.words import length, paragraphs
 
 STEP = 20 * mm
 """How far before and behind the plane of the views new pictures are taken."""
@@ -77,23 +77,7 @@ def run(bench: Bench, progress: Progress) -> Result:
         (Picture("left-out", "A view that was left out", "And as the other views predict it.", close),),
         tuple(Picture(f"from-{name}", title, caption, content) for name, title, caption, content in moved),
     )
-    text = paragraphs(
-        [
-            f"Of {light_field.shape[0]}×{light_field.shape[1]} views every second one each way is kept. "
-            "A new view is "
-            "a slice of the light field on another grid. Samples are interpolated in all four "
-            "dimensions between the plane of the cameras and the plane on which they converge "
-            "(quadrilinear, as Levoy "
-            "and Hanrahan do), or looked up by the rays of a pinhole camera, which blends views along "
-            "the parallax of "
-            "one distance.",
-            f"A view from {story.length(STEP)} before or behind the plane of the cameras is the same "
-            "light field after "
-            "a flight: one matrix on its frame, no sample touched. The reference is the left-out view "
-            "itself, and the "
-            "closed form of the built-in scene where that is known.",
-        ]
-    )
+    text = paragraphs("gallery/prose/light-field-rendering.txt", views=light_field.shape[:2], step=STEP)
     return Result(text, pictures, (*numbers, *found), bench.assumed)
 
 
@@ -170,13 +154,13 @@ def _from_elsewhere(
         # Nearer to the scene: the light field flies back first, and the pinhole stands in its new plane.
         flown = light_field.transformed(Affine.propagation(way)) if way < 0 else light_field
         picture = _pinhole_picture(flown, light_field, (u, v), (s, t), max(way, 0.0))
-        caption = f"{story.length(STEP)} from their plane, where no camera stood."
+        caption = f"{length(STEP)} from their plane, where no camera stood."
         if bench.scene is not None:
             closeness = _psnr(picture, _true_view(bench, (u, v), (s, t), way))
             caption += f" {closeness:.1f} dB against the scene’s closed form."
             numbers.append(
                 Finding(
-                    f"view from {story.length(STEP)} {name} the plane of cameras: PSNR",
+                    f"view from {length(STEP)} {name} the plane of cameras: PSNR",
                     "",
                     closeness,
                     "dB",
@@ -208,15 +192,14 @@ def _psnr(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
     """Peak signal-to-noise ratio in linear light inside the border, the peak being the truth's brightest."""
     rows, columns = (max(int(INNER * n), 1) for n in truth.shape[:2])
     inner = np.s_[rows:-rows, columns:-columns]
-    return psnr(picture[inner], truth[inner], float(truth[inner].max()))
+    return psnr(picture[inner], truth[inner])
 
 
 ENTRY = Entry(
     "light-field-rendering",
     "Light-field rendering by matrix optics",
-    "M. Levoy and P. Hanrahan, Light field rendering, SIGGRAPH 1996; L. Ahrenberg and M. Magnor, Light "
-    "field rendering "
-    "using matrix optics, WSCG 2006; T. Georgiev and C. Intwala, Adobe technical report, 2006",
+    "M. Levoy and P. Hanrahan, Light field rendering, SIGGRAPH 1996; L. Ahrenberg and M. Magnor, Light field "
+    "rendering using matrix optics, WSCG 2006; T. Georgiev and C. Intwala, Adobe technical report, 2006",
     "New views are slices of two-plane data, without depth or matching; moving through space is a matrix.",
     run,
 )

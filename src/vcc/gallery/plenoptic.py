@@ -15,9 +15,9 @@ from vcc.analysis import Refocuser
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import um
 from vcc.camera import Camera
-from vcc.demo import story
+from vcc.showcase.words import away, length
 from vcc.gallery import closeness, fringes
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, LensArray, PhasePlate
@@ -167,7 +167,7 @@ def run(bench: Bench, progress: Progress) -> Result:
     before, after = (psnr(picture, ideal[1], peak) for picture in lens)
     numbers = [
         Finding(
-            f"refocused {story.away(distance)}, against the ideal camera focused there: PSNR",
+            f"refocused {away(distance)}, against the ideal camera focused there: PSNR",
             f"{NEEDED:g} dB or more",
             value,
             "dB",
@@ -186,7 +186,7 @@ def run(bench: Bench, progress: Progress) -> Result:
             "dB",
             after > before,
             "what is left is how the deflection differs within the "
-            f"{story.length(plenoptic.window)} of the lens that a pixel sees, and stripes of two lenslets, which "
+            f"{length(plenoptic.window)} of the lens that a pixel sees, and stripes of two lenslets, which "
             "interpolation cannot move",
         ),
     ]
@@ -200,14 +200,14 @@ def run(bench: Bench, progress: Progress) -> Result:
         "ideal camera": ideal[1],
     }
     whole = [(title, figures.values_shown(picture, peak)) for title, picture in lens_shown.items()]
-    titles = [f"refocused {name}, {story.away(at)}" for name, at in zip(PLACES, distances, strict=True)]
+    titles = [f"refocused {name}, {away(at)}" for name, at in zip(PLACES, distances, strict=True)]
     pairs = [
         [
             (f"{t}: {c:.1f} dB", figures.values_shown(p, peak))
             for t, p, c in zip(titles, refocused, decibels, strict=True)
         ],
         [
-            (f"ideal camera, {story.away(at)}", figures.values_shown(p, peak))
+            (f"ideal camera, {away(at)}", figures.values_shown(p, peak))
             for at, p in zip(distances, ideal, strict=True)
         ],
     ]
@@ -348,7 +348,7 @@ def _text(plenoptic: Plenoptic) -> str:
     return paragraphs(
         [
             f"A lens of f = {length(plenoptic.bench.focal_length)} and {length(plenoptic.diameter)} opening is "
-            f"focused {story.away(plenoptic.bench.middle)}. Where a sensor would stand is a sheet of "
+            f"focused {away(plenoptic.bench.middle)}. Where a sensor would stand is a sheet of "
             f"{plenoptic.lenslets[0]}×{plenoptic.lenslets[1]} lenslets, {length(plenoptic.pitch)} wide, of "
             f"f = {length(focal_length)}; {length(plenoptic.gap)} behind it the sensor, {EACH}×{EACH} pixels of "
             f"{length(plenoptic.camera.sensor.pitches[1])} for each. Lens and lenslets have one f-number, so that "

@@ -86,6 +86,11 @@ def values_shown(upright: NDArray[Any], white: float = 1.0) -> Shown:
     return np.asarray(coded[..., :3], dtype=np.float32)
 
 
+def grey_shown(picture: NDArray[Any]) -> Shown:
+    """A grey picture as screens want it, by the plain power law of 2.2: (rows, columns), 0 to 1."""
+    return np.asarray(np.clip(picture, 0, 1).astype(np.float32) ** np.float32(1 / 2.2))
+
+
 def view_shown(light_field: LightField, row: int, column: int) -> Shown:
     """One view as screens want it; radiance 1 is white."""
     return shown(light_field.view(row, column), 1.0)
@@ -148,12 +153,30 @@ def close_ups(columns: Sequence[tuple[str, Shown]], crops: Sequence[Crop], rows:
         rows: what is to be seen at each.
     """
     figure = new_figure(2.3 * len(columns) + 0.3, 2.3 * len(crops) + 0.35)
-    grid = figure.subplots(len(crops), len(columns), squeeze=False)
-    for row, (crop, name) in enumerate(zip(crops, rows, strict=True)):
-        for axes, (title, picture) in zip(grid[row], columns, strict=True):
-            put(axes, crop.of(picture), title if row == 0 else "")
-        grid[row, 0].set_ylabel(name, fontsize=LABEL, color=INK)
+    pictures = [
+        [(title if row == 0 else "", crop.of(picture)) for title, picture in columns]
+        for row, crop in enumerate(crops)
+    ]
+    fill(figure.subplots(len(crops), len(columns), squeeze=False), pictures, rows)
     return figure
+
+
+def fill(grid: Any, rows: Sequence[Sequence[tuple[str, Any]]], labels: Sequence[str] = (), **options: Any) -> None:
+    """Pictures on a grid of axes, each below its title.
+
+    Args:
+        grid: of axes, (rows, columns).
+        rows: titles and pictures; a row that is shorter than the grid's leaves the last of its places empty.
+        labels: what stands to the left of the rows.
+        options: of `put`.
+    """
+    for line, row in zip(grid, rows, strict=True):
+        for axes, (title, picture) in zip(line, row, strict=False):
+            put(axes, picture, title, **options)
+        for axes in line[len(row) :]:
+            axes.set_axis_off()
+    for line, words in zip(grid, labels, strict=False):
+        line[0].set_ylabel(words, fontsize=LABEL, color=INK)
 
 
 def put(axes: Any, picture: Shown, title: str = "", **options: Any) -> Any:

@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vcc.base.units import mm, short
+from vcc.base.units import mm, short, um
 from vcc.files.atomic import atomic_path
 
 if TYPE_CHECKING:
@@ -76,6 +76,6 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals |= {"length": length, "away": away, "mm": mm}
+    environment.globals |= {"length": length, "away": away, "mm": mm, "um": um}
     environment.filters |= {"fmt": format, "duration": duration}
     return environment
