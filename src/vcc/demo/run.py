@@ -105,16 +105,12 @@ class _Work:
         """Write a figure, or the figure of axes."""
         figures.write_figure(getattr(figure, "figure", figure), self.path(name))
 
-    def note(self, step: str, *seconds: float, **more: Any) -> None:
-        """Remember what a step took."""
-        self.timings.append(Timing(step, *seconds, **more))
-
     @contextmanager
-    def timed(self, step: str, **more: Any) -> Iterator[None]:
+    def timed(self, step: str, note: str = "") -> Iterator[None]:
         """Remember what a step took that is done inside."""
         begun = time.perf_counter()
         yield
-        self.note(step, time.perf_counter() - begun, **more)
+        self.timings.append(Timing(step, time.perf_counter() - begun, note=note))
 
     @contextmanager
     def bar(self, words: str) -> Iterator[Callable[[int, int], None]]:
@@ -173,9 +169,11 @@ def _light_field(work: _Work, given: Path | LightField | None, small: bool) -> B
     compiling = compiled - begun + time.perf_counter() - made
     values = bench.light_field.values
     sizes = f"{'×'.join(map(str, values.shape))}, {values.nbytes / 1e6:.0f} MB"
-    work.note("compiling the loops", compiling, note="once on a machine: kept on disk for the next run")
+    work.timings.append(
+        Timing("compiling the loops", compiling, note="once on a machine: kept on disk for the next run")
+    )
     verb = "synthesizing" if given is None else "reading"
-    work.note(f"{verb} the light field", made - compiled, note=sizes)
+    work.timings.append(Timing(f"{verb} the light field", made - compiled, note=sizes))
     work.console.print(f"{bench.light_field!r}")
     if bench.assumed:
         work.console.print(bench.assumed)
@@ -224,7 +222,7 @@ def _example_one(work: _Work, bench: Bench) -> dict[str, _Taken]:
         camera = bench.conventional(distance)
         taken[name] = work.take(bench, camera, f"example-1-focused-{name}", exposure)
         note = f"one lens, sensor at {length(camera.sensor.z)}"
-        work.note(f"Example 1: focused {name}, {away(distance)}", *taken[name].seconds, note=note)
+        work.timings.append(Timing(f"Example 1: focused {name}, {away(distance)}", *taken[name].seconds, note))
     with work.timed("Example 1: camera and phase space drawn"):
         _draw_example_one(work, bench, taken)
     return taken
@@ -262,7 +260,7 @@ def _example_two(work: _Work, bench: Bench, conventional: dict[str, _Taken]) -> 
     for name, open_share in (("cosine", 0.25), ("coded", 0.5)):
         exposure = bench.exposure(bench.conventional(bench.middle), bench.diameter, open_share)
         taken = work.take(bench, cameras[name], f"example-2-{name}", exposure)
-        work.note(f"Example 2: {MASK_TITLES[name]}", *taken.seconds, note=note, compared=full)
+        work.timings.append(Timing(f"Example 2: {MASK_TITLES[name]}", *taken.seconds, note, full))
         columns.append((MASK_TITLES[name], taken.shown))
         work.draw(f"example-2-{name}-camera.png", cameras[name].plot(light_field=bench.light_field))
     masks = [(MASK_TITLES[name], camera.elements[-1]) for name, camera in cameras.items()]
@@ -283,7 +281,7 @@ def _check(work: _Work, bench: Bench, conventional: dict[str, _Taken]) -> None:
         taken = work.take(bench, camera, f"check-{interpolation}", exposure, interpolation)
         reached = work.psnr[interpolation] = psnr(taken.image, truth, 1 / exposure)
         note = f"PSNR {reached:.1f} dB against the truth"
-        work.note(f"check: pinhole picture, {interpolation}", *taken.seconds, note=note)
+        work.timings.append(Timing(f"check: pinhole picture, {interpolation}", *taken.seconds, note))
         columns.append((f"{interpolation}, {reached:.1f} dB", taken.shown))
         errors.append((f"{interpolation}: error × 3", figures.error_shown(taken.image, truth, exposure)))
     crops, places = _check_places(bench, conventional)

@@ -335,9 +335,7 @@ class Refocused:
     @property
     def shown(self) -> dict[str, figures.Shown]:
         """Upright."""
-        return {
-            name: figures.values_shown(each[::-1, ::-1], self.white) for name, each in self.pictures.items()
-        }
+        return {name: figures.values_shown(each[::-1, ::-1], self.white) for name, each in self.pictures.items()}
 
 
 def _scene_pictures(scene: Refocused) -> list[tuple[Picture, ...]]:

@@ -115,7 +115,7 @@ ENTRY = Entry(
     "conventional",
     "Conventional camera",
     "C. Zhou, Virtual Computational Camera, 2009, Example 1",
-    "A lens and a sensor record one distance sharply; in phase space, flight and lens are shears, and the sensor is "
-    "a projection along slopes.",
+    "A lens and a sensor record one distance sharply; in phase space, flight and lens are shears, and the sensor "
+    "is a projection along slopes.",
     run,
 )

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.gallery import extended_depth
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
-from vcc.gallery.extended_depth import ALIKE, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Sizes
+from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Sizes
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.shapes.patterns import Circle
 from vcc.shapes.surfaces import Surface
@@ -108,7 +108,7 @@ class Kinds:
     radial: tuple[Lens | PhasePlate, ...]
 
 
-def designed(bench: Bench, sizes: Sizes = Sizes()) -> Kinds:
+def designed(bench: Bench, sizes: Sizes = FULL) -> Kinds:
     """Diffusers that bend by `MARGIN` times what defocus does at the rim.
 
     Raises:
@@ -131,7 +131,7 @@ class Run:
         sizes: how much work it is.
     """
 
-    sizes: Sizes = Sizes()
+    sizes: Sizes = FULL
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
         """Take a light field through the three cameras, and measure."""
@@ -140,9 +140,7 @@ class Run:
         advance = Steps(progress, 3 * len(depths) + 2)
         progress(0, advance.total)
         cameras = {"no diffuser": kinds.plain, "random-phase": kinds.random, "radial": kinds.radial}
-        found = {
-            words: comparison.measured(elements, kinds.plain, advance) for words, elements in cameras.items()
-        }
+        found = {words: comparison.measured(elements, kinds.plain, advance) for words, elements in cameras.items()}
         scene = extended_depth.scene_pictures(
             comparison,
             ("No diffuser", kinds.plain),
@@ -204,9 +202,7 @@ def _findings(found: dict[str, Measured], depths: tuple[float, ...]) -> Iterator
         yield from _findings_of(words, found[words], plain, depths)
 
 
-def _findings_of(
-    words: str, coded: Measured, plain: Measured, depths: tuple[float, ...]
-) -> Iterator[Finding]:
+def _findings_of(words: str, coded: Measured, plain: Measured, depths: tuple[float, ...]) -> Iterator[Finding]:
     yield Finding(
         f"PSF alike over depth, {words}: lowest correlation",
         f"alike: {ALIKE} or more",

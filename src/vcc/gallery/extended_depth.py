@@ -66,6 +66,10 @@ class Sizes:
     samples: int = 512
 
 
+FULL = Sizes()
+"""As the pages have it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Measured:
     """What came of a camera.
@@ -99,7 +103,7 @@ class Comparison:
 
     bench: Bench
     round: bool = False
-    sizes: Sizes = Sizes()
+    sizes: Sizes = FULL
 
     def __post_init__(self) -> None:
         if self.misfocus < LEAST_MISFOCUS:
@@ -219,7 +223,7 @@ class Comparison:
 
 def psnr(picture: Array, truth: Array) -> float:
     """Decibels, white 1, without the borders."""
-    return measures.psnr(*(_inner(each, BORDER) for each in (picture, truth)), peak=1.0)
+    return measures.psnr(_inner(picture, BORDER), _inner(truth, BORDER), peak=1.0)
 
 
 def _inner(picture: Array, border: float, whole: Callable[[float], int] = round) -> Array:

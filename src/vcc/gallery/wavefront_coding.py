@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from vcc.gallery import extended_depth
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
-from vcc.gallery.extended_depth import ALIKE, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Sizes
+from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Sizes
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.shapes.patterns import Open
 from vcc.shapes.surfaces import Cubic
@@ -42,7 +42,7 @@ class Run:
         sizes: how much work it is.
     """
 
-    sizes: Sizes = Sizes()
+    sizes: Sizes = FULL
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
         """Take a light field through both cameras, and measure."""
@@ -60,7 +60,7 @@ class Run:
         )
 
 
-def designed(bench: Bench, sizes: Sizes = Sizes()) -> Pair:
+def designed(bench: Bench, sizes: Sizes = FULL) -> Pair:
     """Focused in the middle of the range of 1/Z, with a plate for its ends.
 
     Raises:
