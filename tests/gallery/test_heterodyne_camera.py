@@ -80,8 +80,8 @@ def test_views_are_what_pinholes_at_their_own_places_see(bench):
     calibration = vcc.recover.heterodyne_calibration(camera, samples=16)
     image = heterodyne.recorded(camera, vcc.recover.band_limited(bench.light_field, camera))
     decoded = vcc.recover.decode_heterodyne(image, camera, calibration=calibration, border=heterodyne.BORDER)
-    truth = vcc.recover.true_views(heterodyne._equally_sampled(bench, bench.light_field, camera), camera, decoded)
-    assert heterodyne._psnr(decoded, truth, float(truth.values.max()))[1:-1, 1:-1].mean() > 30
+    truth = vcc.recover.true_views(heterodyne.equally_sampled(bench, bench.light_field, camera), camera, decoded)
+    assert heterodyne.view_decibels(decoded, truth, float(truth.values.max()))[1:-1, 1:-1].mean() > 30
     for axis, end in enumerate(((1, 4), (4, 1))):
         opposite = np.flip(truth.values, axis)[end]
         error = np.linalg.norm(decoded.values[end] - truth.values[end])

@@ -44,7 +44,7 @@ def run(bench: Bench, progress: Progress) -> Result:
     predicted = {}
     for done, method in enumerate(("nearest", "linear")):
         progress(done, 6)
-        predicted[method] = _resampled(kept, light_field, (row, column), method)
+        predicted[method] = resampled_view(kept, light_field, (row, column), method)
     progress(2, 6)
     predicted["along the parallax"] = _through_a_pinhole(kept, light_field, (row, column))
     decibels = {name: _psnr(picture, truth) for name, picture in predicted.items()}
@@ -92,9 +92,17 @@ def _linear(values: NDArray[np.generic], light_field: LightField) -> NDArray[np.
     return picture if picture.ndim == 3 else picture[..., None]
 
 
-def _resampled(
+def resampled_view(
     kept: LightField, light_field: LightField, place: tuple[int, int], interpolation: str
 ) -> NDArray[np.float64]:
+    """A view as samples around it predict it, interpolated in all four dimensions.
+
+    Args:
+        kept: every second view each way.
+        light_field: of which they were kept.
+        place: (row, column) of the view in it.
+        interpolation: "nearest" or "linear".
+    """
     row, column = place
     frame = light_field.frame @ Affine.translation(column, row, 0, 0)
     # Only the neighbours matter, and a resampling holds all four dimensions in memory.
@@ -110,10 +118,10 @@ def _through_a_pinhole(kept: LightField, light_field: LightField, place: tuple[i
     row, column = place
     nt, ns = light_field.shape[2:4]
     u, v, s, t = light_field.frame([column, row, (ns - 1) / 2, (nt - 1) / 2])
-    return _pinhole_picture(kept, light_field, (float(u), float(v)), (float(s), float(t)), 0.0)
+    return pinhole_picture(kept, light_field, (float(u), float(v)), (float(s), float(t)), 0.0)
 
 
-def _pinhole_picture(
+def pinhole_picture(
     given: LightField, like: LightField, hole: tuple[float, float], middle: tuple[float, float], z: float
 ) -> NDArray[np.float64]:
     """A pinhole at (u, v), z behind the given light field, and a sensor that sees slopes as ``like`` does."""
@@ -153,7 +161,7 @@ def _from_elsewhere(
         progress(4 + done, 6)
         # Nearer to the scene: the light field flies back first, and the pinhole stands in its new plane.
         flown = light_field.transformed(Affine.propagation(way)) if way < 0 else light_field
-        picture = _pinhole_picture(flown, light_field, (u, v), (s, t), max(way, 0.0))
+        picture = pinhole_picture(flown, light_field, (u, v), (s, t), max(way, 0.0))
         caption = f"{length(STEP)} from their plane, where no camera stood."
         if bench.scene is not None:
             closeness = _psnr(picture, _true_view(bench, (u, v), (s, t), way))
