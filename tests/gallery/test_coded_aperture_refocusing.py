@@ -19,6 +19,7 @@ from vcc.gallery.judged_apertures import picture_of_the_prior
 from vcc.gallery.published_codes import VEERARAGHAVAN
 from vcc.optics import Mask
 from vcc.shapes.patterns import Open
+from vcc.showcase.bench import built_in
 from vcc.showcase.scene import MIDDLE
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
@@ -68,7 +69,7 @@ def test_both_apertures_pay_the_same_noise():
 
 
 def test_the_chart_s_part_is_where_rays_through_the_lens_s_middle_land():
-    bench = bench_for(None)
+    bench = built_in(small=True)
     camera = entry.Refocusing.of(bench).camera(Mask(Open(), width=20 * mm), MIDDLE)
     rows, columns = entry.chart(camera)
     left, top, right, bottom = entry.CHART_PART

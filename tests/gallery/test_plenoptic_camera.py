@@ -19,7 +19,7 @@ from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
 
 FOCUS, DISTANCE = 1.2, 0.9
-SLOPE, PIXELS = 0.001, 150
+SLOPE, PIXELS = 0.001, 98
 TO_SENSOR = 1 / (1 / (50 * mm) - 1 / FOCUS)
 
 
@@ -62,8 +62,8 @@ def test_the_camera_is_the_published_one(camera):
     assert camera.camera.sensor.pitch == pytest.approx(9 * um, rel=0.01)
     micro_image = camera.diameter * camera.gap / TO_SENSOR
     assert micro_image == pytest.approx(14 * camera.camera.sensor.pitch)
-    # 150 pixels of the light field are 62.6 lenslets; half a one is free at each border.
-    assert camera.lenslets == (61, 61)
+    # 98 pixels of the light field are 40.9 lenslets; half a one is free at each border.
+    assert camera.lenslets == (39, 39)
 
 
 def test_a_plane_refocused_is_its_mean_over_lenslets(camera, decoded):
