@@ -41,7 +41,7 @@ def main() -> None:
 
 
 def fingerprint(name: str) -> str:
-    """A short hash of an entry's prose, source and the gallery's modules that it imports; layout does not count."""
+    """A short hash of an entry's prose, source and what it imports of the gallery; layout does not count."""
     prose = sorted((MODULES / "prose").glob(f"{name}*"))
     sources = {path.name: path.read_text(encoding="utf-8") for path in prose}
     waiting = [name.replace("-", "_")]

@@ -28,6 +28,12 @@ INNER = 0.1
 """Share of a picture at each side that comparisons leave out: there the views end."""
 POINTS = 4
 """Points across a pixel at which the closed form is evaluated, each way."""
+WORDS = {
+    "nearest": "the nearest view",
+    "linear": "quadrilinear",
+    "along the parallax": "pinhole camera, blended along the parallax of the middle distance",
+}
+"""How a view that was left out is predicted."""
 
 
 def run(bench: Bench, progress: Progress) -> Result:
@@ -38,47 +44,58 @@ def run(bench: Bench, progress: Progress) -> Result:
             f"leaving out every second view takes 3×3 views or more, not {light_field.shape[0]}×"
             f"{light_field.shape[1]}: give a light field with more"
         )
-    kept = light_field[::2, ::2]
-    row, column = _left_out(light_field.shape[0]), _left_out(light_field.shape[1])
-    truth = _linear(light_field.values[row, column], light_field)
-    predicted = {}
-    for done, method in enumerate(("nearest", "linear")):
-        progress(done, 6)
-        predicted[method] = resampled_view(kept, light_field, (row, column), method)
-    progress(2, 6)
-    predicted["along the parallax"] = _through_a_pinhole(kept, light_field, (row, column))
+    place = _left_out(light_field.shape[0]), _left_out(light_field.shape[1])
+    truth = _linear(light_field.values[place], light_field)
+    predicted = _predicted(light_field, place, progress)
     decibels = {name: _psnr(picture, truth) for name, picture in predicted.items()}
-    words = {
-        "nearest": "the nearest view",
-        "linear": "quadrilinear",
-        "along the parallax": "pinhole camera, blended along the parallax of the middle distance",
-    }
-    numbers = [
-        Finding(
-            f"left-out view, {words[name]}: PSNR",
-            "" if name == "nearest" else "better than the nearest view",
-            value,
-            "dB",
-            None if name == "nearest" else value > decibels["nearest"],
-        )
-        for name, value in decibels.items()
-    ]
     progress(3, 6)
     moved, found = _from_elsewhere(bench, progress)
-    shown = [("left out", figures.values_shown(truth))]
-    shown += [
-        (f"{words[name].split(',')[0]}, {decibels[name]:.1f} dB", figures.values_shown(p))
-        for name, p in predicted.items()
-    ]
-    size = max(min(truth.shape[:2]) * 22 // 100, 8)
-    wrong = np.abs(figures.values_shown(predicted["nearest"]) - figures.values_shown(truth))
-    close = figures.close_ups(shown, figures.detailed_crops([wrong], size), ["where they differ most"])
     pictures = (
-        (Picture("left-out", "A view that was left out", "And as the other views predict it.", close),),
+        (_left_out_picture(truth, predicted, decibels),),
         tuple(Picture(f"from-{name}", title, caption, content) for name, title, caption, content in moved),
     )
     text = paragraphs("gallery/prose/light-field-rendering.txt", views=light_field.shape[:2], step=STEP)
-    return Result(text, pictures, (*numbers, *found), bench.assumed)
+    return Result(text, pictures, (*_predictions(decibels), *found), bench.assumed)
+
+
+def _predicted(
+    light_field: LightField, place: tuple[int, int], progress: Progress
+) -> dict[str, NDArray[np.float64]]:
+    """The view at a place that every second view each way predicts, by the names of `WORDS`."""
+    kept = light_field[::2, ::2]
+    predicted = {}
+    for done, method in enumerate(("nearest", "linear")):
+        progress(done, 6)
+        predicted[method] = resampled_view(kept, light_field, place, method)
+    progress(2, 6)
+    return predicted | {"along the parallax": _through_a_pinhole(kept, light_field, place)}
+
+
+def _predictions(decibels: dict[str, float]) -> list[Finding]:
+    nearest = decibels["nearest"]
+    return [
+        Finding(
+            f"left-out view, {WORDS[name]}: PSNR",
+            "" if name == "nearest" else "better than the nearest view",
+            value,
+            "dB",
+            None if name == "nearest" else value > nearest,
+        )
+        for name, value in decibels.items()
+    ]
+
+
+def _left_out_picture(
+    truth: NDArray[np.float64], predicted: dict[str, NDArray[np.float64]], decibels: dict[str, float]
+) -> Picture:
+    shown = {"left out": figures.values_shown(truth)}
+    for name, picture in predicted.items():
+        shown[f"{WORDS[name].split(',')[0]}, {decibels[name]:.1f} dB"] = figures.values_shown(picture)
+    size = max(min(truth.shape[:2]) * 22 // 100, 8)
+    wrong = np.abs(figures.values_shown(predicted["nearest"]) - shown["left out"])
+    crops = figures.detailed_crops([wrong], size)
+    close = figures.close_ups(list(shown.items()), crops, ["where they differ most"])
+    return Picture("left-out", "A view that was left out", "And as the other views predict it.", close)
 
 
 def _left_out(count: int) -> int:
