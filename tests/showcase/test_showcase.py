@@ -163,3 +163,15 @@ def test_numbers_read_well():
 def test_a_template_that_asks_for_what_is_not_given_is_an_error():
     with pytest.raises(Exception, match="'bench' is undefined"):
         filled("gallery/prose/conventional.txt")
+
+
+def test_close_ups_are_of_what_is_sharp_in_one_picture_only():
+    """Of black beside noise from bright to faint, running sums leave some −1e-20, whose root is no number."""
+    random = np.random.default_rng(0)
+    noise = random.random((20, 16, 1)) * 10 ** -random.uniform(0, 8, (20, 16, 1))
+    pictures = [np.zeros((64, 64, 3), np.float32) for _ in range(2)]
+    for picture, left in zip(pictures, (8, 40), strict=True):
+        picture[20:40, left : left + 16] = noise
+    for crop, left in zip(figures.detailed_crops(pictures, 12), (8, 40), strict=True):
+        assert 20 - 6 <= crop.row <= 40 - 6
+        assert left - 6 <= crop.column <= left + 16 - 6

@@ -124,7 +124,7 @@ def _detail(picture: Shown, smooth: Any, size: int) -> Any:
     """How much fine structure the square around each pixel holds; none near the border."""
     grey = picture.mean(axis=2)
     fine = (grey - smooth(grey, 5)) ** 2
-    energy = np.sqrt(smooth(fine, size))
+    energy = np.sqrt(np.maximum(smooth(fine, size), 0))  # running sums leave rounding of either sign
     half = size // 2 + 1
     inside = np.zeros_like(energy)
     inside[half:-half, half:-half] = energy[half:-half, half:-half]
