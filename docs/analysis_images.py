@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from panels import new_figure, picture
 
 import vcc
 from vcc.analysis import Refocuser, fft4, plot_spectrum, psf, sampling_advice
@@ -14,6 +13,7 @@ from vcc.files.transfer import encode
 from vcc.kernels import TopHat
 from vcc.patterns import CosineSum
 from vcc.plot import plot_phase_space_stages
+from vcc.showcase.scene import demo_scene
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
 from vcc.surfaces import Cubic
@@ -48,28 +48,24 @@ def draw_spectra(path: Path) -> None:
     spectrum = fft4(field, [None, "hann", None, "hann"])
     behind = spectrum.transformed(vcc.Affine.lens(f))
     on_sensor = behind.transformed(vcc.Affine.propagation(1 / (1 / f - 1 / far)))
-    figure = Figure(figsize=(10, 3.4), dpi=100, layout="constrained")
+    figure = new_figure(10, 3.4)
     titles = ("at the entrance", "behind the lens: sheared along fu", "on the sensor: sheared along fs")
     for axes, stage, title in zip(figure.subplots(1, 3), (spectrum, behind, on_sensor), titles, strict=True):
         plot_spectrum(stage, ("u", "s"), axes=axes)
         axes.set_title(title, fontsize=11)
-    _save(figure, path)
+    figure.savefig(path)
 
 
 def draw_refocused(path: Path) -> None:
     """The scene of the demo, focused near and far."""
-    from vcc.showcase.scene import demo_scene
-
     field = demo_scene().light_field(
         (11, 11), (180, 250), spacing=2 * mm, slope_per_pixel=1.6e-3, focus_distance=1.3, dtype=np.float32
     )
     refocuser = Refocuser(field)
-    figure = Figure(figsize=(9, 3.4), dpi=100, layout="constrained")
+    figure = new_figure(9, 3.4)
     for axes, distance in zip(figure.subplots(1, 2), (0.8, 3.0), strict=True):
-        axes.imshow(encode(refocuser.at(distance).values, 8))
-        axes.set_title(f"focused at {distance:.3g} m", fontsize=11)
-        axes.set_axis_off()
-    _save(figure, path)
+        picture(axes, encode(refocuser.at(distance).values, 8), f"focused at {distance:.3g} m")
+    figure.savefig(path)
 
 
 def draw_points(path: Path) -> None:
@@ -82,7 +78,7 @@ def draw_points(path: Path) -> None:
         "cubic plate": [lens, vcc.PhasePlate(Cubic(50.0))],
         "diffuser": [lens, vcc.Diffuser(kernel=TopHat(3e-3))],
     }
-    figure = Figure(figsize=(8, 5.6), dpi=100, layout="constrained")
+    figure = new_figure(8, 5.6)
     grid = figure.subplots(3, len(cameras))
     for column, (name, elements) in enumerate(cameras.items()):
         for row, distance in enumerate((0.7, 1.0, 1.8)):
@@ -95,13 +91,11 @@ def draw_points(path: Path) -> None:
                 axes.set_title(name, fontsize=11)
             if column == 0:
                 axes.set_ylabel(f"{distance:g} m", fontsize=11)
-    _save(figure, path)
+    figure.savefig(path)
 
 
 def draw_phase_space(path: Path) -> None:
     """A row of pixels of the demo's scene on its way through a plenoptic camera of few, large lenslets."""
-    from vcc.showcase.scene import demo_scene
-
     field = demo_scene().light_field(
         (1, 40), (180, 250), spacing=0.4 * mm, slope_per_pixel=1.2e-3, focus_distance=1.3, dtype=np.float32
     )
@@ -109,7 +103,7 @@ def draw_phase_space(path: Path) -> None:
     lens = vcc.Lens(focal_length=50 * mm, diameter=16 * mm)
     lenslets = vcc.LensArray(pitch=1 * mm, focal_length=3 * mm, z=image)
     camera = vcc.Camera([lens, lenslets], vcc.Sensor(z=image + 3 * mm, shape=(300, 400), pitch=50 * um))
-    _save(plot_phase_space_stages(camera, field, pixel_row=110), path)
+    plot_phase_space_stages(camera, field, pixel_row=110).savefig(path)
 
 
 def draw_sampling(path: Path) -> None:
@@ -121,12 +115,7 @@ def draw_sampling(path: Path) -> None:
     field = vcc.LightField.from_views(
         np.broadcast_to(np.uint8(0), (20, 20, 400, 600)), spacing=1 * mm, slope_per_pixel=4e-4
     )
-    _save(sampling_advice(camera, field, depths=(0.5, 3.0)).plot(), path)
-
-
-def _save(figure: Figure, path: Path) -> None:
-    FigureCanvasAgg(figure)
-    figure.savefig(path)
+    sampling_advice(camera, field, depths=(0.5, 3.0)).plot().savefig(path)
 
 
 if __name__ == "__main__":

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from panels import new_figure
 
 import vcc
+from vcc.base.measures import psnr
 from vcc.files.transfer import from_linear
 from vcc.gallery.entry import bench_for
 from vcc.gallery.heterodyne import designed, recorded
@@ -27,14 +29,11 @@ def shown(values: np.ndarray) -> np.ndarray:
     return from_linear(np.clip(values / np.quantile(values, 0.99), 0, 1))
 
 
-def save(figure: Figure, name: str) -> None:
-    """Without axes, tightly packed."""
-    FigureCanvasAgg(figure)
-    for axes in figure.axes:
-        axes.set_xticks([])
-        axes.set_yticks([])
-        axes.title.set_fontsize(9)
-    figure.savefig(HERE / name, dpi=80)
+def panel(axes: Axes, values: np.ndarray, title: str, **options: Any) -> None:
+    """A picture with a frame, below its title."""
+    axes.imshow(values, **options)
+    axes.set_title(title, fontsize=9)
+    axes.set(xticks=[], yticks=[])
 
 
 def plenoptic() -> None:
@@ -53,18 +52,16 @@ def plenoptic() -> None:
     white = vcc.LightField.from_views(np.ones((4, 4, 8, 8), np.float32), 4 * mm, 0.1, focus)
     raw, flat = camera.capture(scene, samples=64), camera.capture(white, samples=64)
     decoded = decode_plenoptic(raw, find_lenslets(flat), camera=camera, white=flat, views=5)
-    figure = Figure(figsize=(12, 3.2), layout="constrained")
+    figure = new_figure(12, 3.2, dpi=80)
     axes = figure.subplots(1, 5)
     cut = slice(300, 370)
-    axes[0].imshow(shown(raw.values[::-1, ::-1][cut, cut]))
-    axes[0].set_title("raw recording, 70×70 pixels of it")
+    panel(axes[0], shown(raw.values[::-1, ::-1][cut, cut]), "raw recording, 70×70 pixels of it")
     for place, column in zip(axes[1:4], (0, 2, 4), strict=True):
-        place.imshow(shown(decoded.values[2, column]))
-        place.set_title(f"view (2, {column})")
+        panel(place, shown(decoded.values[2, column]), f"view (2, {column})")
     row = decoded.shape[2] // 2
-    axes[4].imshow(shown(decoded.values[2, :, row]), aspect="auto", interpolation="nearest")
-    axes[4].set_title(f"row {row} of views (2, 0) to (2, 4)")
-    save(figure, "plenoptic.png")
+    slices = shown(decoded.values[2, :, row])
+    panel(axes[4], slices, f"row {row} of views (2, 0) to (2, 4)", aspect="auto", interpolation="nearest")
+    figure.savefig(HERE / "plenoptic.png")
 
 
 def heterodyne() -> None:
@@ -83,25 +80,21 @@ def heterodyne() -> None:
     decoded = decode_heterodyne(image, camera, calibration=calibration, border=0.08)
     truth = true_views(scene, camera, decoded)
     inner = np.s_[1:-1, 1:-1]
-    error = np.sqrt(np.mean((decoded.values[inner] - truth.values[inner]) ** 2))
-    reached = -20 * np.log10(error / truth.values.max())
+    reached = psnr(decoded.values[inner], truth.values[inner], float(truth.values.max()))
     print(f"inner views {reached:.1f} dB")
 
-    figure = Figure(figsize=(15, 3.5), layout="constrained")
+    figure = new_figure(15, 3.5, dpi=80)
     axes = figure.subplots(1, 5)
     recording = image.upright().to_numpy()
-    axes[0].imshow(shown(recording))
-    axes[0].set_title(f"recording, {recording.shape[1]}×{recording.shape[0]} pixels")
+    panel(axes[0], shown(recording), f"recording, {recording.shape[1]}×{recording.shape[0]} pixels")
     fade = np.multiply.outer(*(np.hanning(n) for n in recording.shape[:2]))
     spectrum = np.abs(np.fft.fftshift(np.fft.fft2(recording.mean(axis=2) * fade)))
-    axes[1].imshow(np.log10(spectrum / spectrum.max()), cmap="inferno", vmin=-7.5, vmax=0)
-    axes[1].set_title("its spectrum: 9×9 tiles")
+    power = np.log10(spectrum / spectrum.max())
+    panel(axes[1], power, "its spectrum: 9×9 tiles", cmap="inferno", vmin=-7.5, vmax=0)
     for place, column in zip(axes[2:4], (1, 7), strict=True):
-        place.imshow(shown(decoded.values[4, column]))
-        place.set_title(f"view {column + 1} of 9, decoded")
-    axes[4].imshow(shown(truth.values[4, 7]))
-    axes[4].set_title(f"view 8 of 9, true; inner views {reached:.1f} dB")
-    save(figure, "heterodyne.png")
+        panel(place, shown(decoded.values[4, column]), f"view {column + 1} of 9, decoded")
+    panel(axes[4], shown(truth.values[4, 7]), f"view 8 of 9, true; inner views {reached:.1f} dB")
+    figure.savefig(HERE / "heterodyne.png")
 
 
 if __name__ == "__main__":

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from panels import new_figure
 
 import vcc
 from vcc.files.transfer import from_linear
@@ -138,8 +137,7 @@ def from_biprism(path: Path) -> None:
 
 def _draw(panels: list[Any], path: Path, columns: int = 3) -> None:
     rows = math.ceil(len(panels) / columns)
-    figure = Figure(figsize=(3.2 * columns if columns > 1 else 6.4, 2.3 * rows), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(3.2 * columns if columns > 1 else 6.4, 2.3 * rows)
     for n, (title, values, limits) in enumerate(panels):
         axes = figure.add_subplot(rows, columns, n + 1)
         low, high = limits if limits else (None, None)
@@ -149,7 +147,7 @@ def _draw(panels: list[Any], path: Path, columns: int = 3) -> None:
             figure.colorbar(shown, ax=axes, shrink=0.8)
         axes.set_title(title, fontsize=9)
         axes.set(xticks=[], yticks=[])  # the frame stays: a map may be white throughout
-    figure.savefig(path, dpi=100)
+    figure.savefig(path)
 
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import panels
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon as Outline
@@ -69,17 +69,9 @@ def save(figure: Figure, path: Path) -> None:
 # --- shared ---
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """A figure that belongs to nobody else."""
-    figure = Figure(figsize=(width, height), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def small_axes() -> tuple[Figure, Axes]:
     """A figure for the index, all of it one picture."""
     figure = Figure(figsize=(SMALL, SMALL), dpi=100)
-    FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set_axis_off()
     return figure, axes
@@ -121,9 +113,8 @@ def shown(image: vcc.Image, exposure: float | None = None) -> Array:
 
 def picture(axes: Axes, values: Array, title: str, pitch: float | None = None, bar: float = 2 * mm) -> None:
     """An upright picture without axes; with the pixels' pitch on the sensor, a bar of known length."""
-    axes.imshow(values, interpolation="antialiased" if values.shape[0] > 150 else "nearest")
-    axes.set_title(title, fontsize=style.TITLE, color=style.INK)
-    axes.set_axis_off()
+    interpolation = "antialiased" if values.shape[0] > 150 else "nearest"
+    panels.picture(axes, values, title, style.TITLE, style.INK, interpolation=interpolation)
     if pitch is None:
         return
     rows, columns = values.shape[:2]
@@ -158,7 +149,7 @@ def magnified(axes: Axes, whole: Axes, values: Array, corner: tuple[int, int], s
 
 def lens() -> tuple[Figure, Figure]:
     """From the side, and two pictures by the same lens."""
-    figure = new_figure(11, 3.9)
+    figure = panels.new_figure(11, 3.9)
     side, near, far = figure.subplots(1, 3, width_ratios=(1.1, 1, 1))
     plotted(side, camera(NEAR), (NEAR, 0.25))
     pictures = [shown(camera(distance).capture(light_field())) for distance in (NEAR, FAR)]
@@ -176,7 +167,7 @@ def plotted(axes: Axes, drawn: vcc.Camera, distances: tuple[float, ...], **optio
 def prism() -> tuple[Figure, Figure]:
     """From the side, and the picture that it moves."""
     wedge = vcc.Prism(deflection=(0.04, 0.0), z=10 * mm)
-    figure = new_figure(11, 3.9)
+    figure = panels.new_figure(11, 3.9)
     side, without, through = figure.subplots(1, 3, width_ratios=(1.1, 1, 1))
     plotted(side, camera(MIDDLE, wedge), (MIDDLE,))
     white = auto_exposure(camera(MIDDLE).capture(light_field()).to_numpy())
@@ -201,7 +192,7 @@ def mask() -> tuple[Figure, Figure]:
     """A coded aperture in the lens seen in lamps out of focus, and a mask before the sensor."""
     coded = vcc.Mask(vcc.patterns.mura(7), width=14 * mm)
     cosine = vcc.Mask(vcc.patterns.CosineSum(period=1.6 * mm), width=40 * mm, z=46 * mm)
-    figure = new_figure(11, 3.3)
+    figure = panels.new_figure(11, 3.3)
     sheet, clear, through, late = figure.subplots(1, 4)
     grid = (np.arange(280) + 0.5) / 280 * 14 * mm - 7 * mm
     sheet.imshow(coded.faces().pattern(grid[None, :], grid[:, None]), cmap="gray", extent=(-7, 7, 7, -7))
@@ -250,7 +241,7 @@ def diffuser() -> tuple[Figure, Figure]:
     sigma = 0.05 * np.clip(np.hypot(x, y) - 0.22, 0, None) ** 1.2
     coded = vcc.CodedDiffuser(vcc.kernels.Gaussian(1.0), width=20 * mm, widths=sigma, z=36 * mm)
     plain = vcc.Diffuser(vcc.kernels.Gaussian(0.012), z=36 * mm)
-    figure = new_figure(8.6, 8.2)
+    figure = panels.new_figure(8.6, 8.2)
     (clear, even), (sheet, varied) = figure.subplots(2, 2)
     pictures = [
         shown(camera(MIDDLE, *elements, diameter=8 * mm, width=0.34).capture(light_field(), **options), 1 / 0.0145)
@@ -306,7 +297,7 @@ def phase_plate() -> tuple[Figure, Figure]:
     diameter = 10 * mm
     alone: list[vcc.Element] = [vcc.Lens(FOCAL_LENGTH, diameter=15 * mm)]
     cubic = [*alone, vcc.PhasePlate(Cubic.from_alpha(90, half_width=5 * mm, wavelength=550 * nm), width=diameter)]
-    figure = new_figure(10.5, 6.9)
+    figure = panels.new_figure(10.5, 6.9)
     grid = figure.subplots(3, 5)
     square = even_square(diameter)
     for column, defocus in enumerate((-1.0, -0.5, 0.0, 0.5, 1.0)):
@@ -367,7 +358,7 @@ def lens_array() -> tuple[Figure, Figure]:
     raw = [shown(one.capture(light_field(), samples=256)) for one in cameras]
     scene = shown(camera(MIDDLE, diameter=10 * mm, width=0.23).capture(light_field()))
 
-    figure = new_figure(10.5, 10.8)
+    figure = panels.new_figure(10.5, 10.8)
     above, below = figure.subfigures(2, 1, height_ratios=(3.5, 7.3))
     side = above.subplots()
     coarse = vcc.LensArray(pitch=2 * mm, focal_length=8 * mm, z=z, width=14 * mm)
@@ -400,7 +391,7 @@ def prism_array() -> tuple[Figure, Figure]:
     with warnings.catch_warnings():  # each cell sees all of the sensor, and its view fills a ninth of it
         warnings.simplefilter("ignore", vcc.ResultWarning)
         raw = shown(vcc.Camera([array], sensor).capture(narrow, samples=256))
-    figure = new_figure(11, 4.3)
+    figure = panels.new_figure(11, 4.3)
     side, whole, pair = figure.subplots(1, 3, width_ratios=(1.1, 1.15, 0.6))
     plotted(side, vcc.Camera([array], sensor), (MIDDLE, 0.2), rays=19)
     picture(whole, raw, "one recording: nine views, 6 mm apart", 3 * apart / pixels, 5 * mm)
@@ -414,9 +405,8 @@ def prism_array() -> tuple[Figure, Figure]:
         whole.add_patch(
             Rectangle((n * third + corner[1], corner[0]), size, size, fill=False, ec=style.ORANGE, lw=2)
         )
-    pair.imshow(np.concatenate([left, np.full((5, size, 3), 255, np.uint8), right]), interpolation="nearest")
-    pair.set_title("left and right view", fontsize=style.TITLE, color=style.INK)
-    pair.set_axis_off()
+    both = np.concatenate([left, np.full((5, size, 3), 255, np.uint8), right])
+    panels.picture(pair, both, "left and right view", style.TITLE, style.INK, interpolation="nearest")
     return figure, small_picture(raw)
 
 
@@ -434,7 +424,7 @@ def biprism() -> tuple[Figure, Figure]:
         (11, 21), (300, 520), spacing=1.5 * mm, slope_per_pixel=FIELD / PIXELS, focus_distance=MIDDLE
     )
     values = shown(taken.capture(wide))
-    figure = new_figure(11, 3.8)
+    figure = panels.new_figure(11, 3.8)
     side, seen, curve = figure.subplots(1, 3, width_ratios=(1.25, 1.2, 0.9))
     plotted(side, taken, (0.25,), rays=14)
     side.set_yticks([-10, -5, 0, 5, 10])
@@ -472,7 +462,7 @@ def pyramid() -> tuple[Figure, Figure]:
     board = PlanesScene([TexturedPlane(Chart(), away)]).light_field(
         (13, 13), (PIXELS, PIXELS), spacing=1.5 * mm, slope_per_pixel=FIELD / PIXELS, focus_distance=away
     )
-    figure = new_figure(10.5, 3.9)
+    figure = panels.new_figure(10.5, 3.9)
     pictures = []
     for axes, (sides, turn) in zip(figure.subplots(1, 3), ((3, np.pi / 2), (4, np.pi / 4), (6, 0)), strict=True):
         facets = vcc.Pyramid(sides=sides, deflection=0.075, rotation=turn)
@@ -506,7 +496,7 @@ def first_order() -> tuple[Figure, Figure]:
     """Surfaces, stop and rays of a lens, with what its matrix knows: principal planes, focus, pupils."""
     prescription = telephoto()
     system = prescription.first_order()
-    figure = new_figure(10.5, 4.8)
+    figure = panels.new_figure(10.5, 4.8)
     axes = figure.subplots()
     last = prescription.length
     front, back = system.front_principal_distance, last + system.back_principal_distance
@@ -612,7 +602,7 @@ def own_element() -> tuple[Figure, Figure]:
     sharp = plain.capture(stars).upright().to_numpy()
     rings_image = with_plate.capture(stars, samples=2048)
     rings = rings_image.upright().to_numpy()
-    figure = new_figure(11, 3.4)
+    figure = panels.new_figure(11, 3.4)
     left, right, profile = figure.subplots(1, 3, width_ratios=(1.25, 1.25, 0.95))
     pitch = with_plate.sensor.pitches[0]
     pictures = [encode(values / values.max() * gain, 8) for values, gain in ((sharp, 1.5), (rings, 1.2))]

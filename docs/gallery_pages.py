@@ -41,8 +41,10 @@ def main() -> None:
 
 
 def fingerprint(name: str) -> str:
-    """A short hash of an entry's source and of the gallery's modules that it imports; layout does not count."""
-    waiting, sources = [name.replace("-", "_")], {}
+    """A short hash of an entry's prose, source and what it imports of the gallery; layout does not count."""
+    prose = sorted((MODULES / "prose").glob(f"{name}*"))
+    sources = {path.name: path.read_text(encoding="utf-8") for path in prose}
+    waiting = [name.replace("-", "_")]
     while waiting:
         module = waiting.pop()
         sources[module] = (MODULES / f"{module}.py").read_text(encoding="utf-8")

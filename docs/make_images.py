@@ -14,8 +14,7 @@ import element_images
 import matplotlib.image
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from panels import new_figure, picture
 
 import vcc
 from vcc.demo import run_demo
@@ -42,12 +41,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         demo = Path(folder)
         run_demo(demo)
-        figure = Figure(figsize=(10.8, 7.5), dpi=100, layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = new_figure(10.8, 7.5)
         for axes, (name, title) in zip(figure.subplots(2, 3).flat, PICTURES, strict=True):
-            axes.imshow(matplotlib.image.imread(demo / f"{name}.png"))
-            axes.set_title(title, fontsize=11)
-            axes.set_axis_off()
+            picture(axes, matplotlib.image.imread(demo / f"{name}.png"), title)
         figure.savefig(HERE / "demo.png")
         for name in ("example-1-phase-space-points", "example-2-coded-camera", "check-close-ups"):
             shutil.copyfile(demo / f"{name}.png", HERE / f"{name}.png")
@@ -58,8 +54,7 @@ def main() -> None:
 def draw_sensor(path: Path) -> None:
     """docs/sensor.md: a photon transfer curve, and the demo's scene through a colour filter, well and ill lit."""
     electronics = vcc.Electronics(color_filter="RGGB")
-    figure = Figure(figsize=(13, 4.1), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(13, 4.1)
     curve, raw, bright, dark = figure.subplots(1, 4, width_ratios=(1.45, 1, 1, 1))
     _draw_photon_transfer(curve, electronics)
 
@@ -84,9 +79,8 @@ def draw_sensor(path: Path) -> None:
         (dark, "a sixtieth of the light", ill.demosaiced().values),
     ]
     for axes, title, values in pictures:
-        axes.imshow(encode(values[::-1, ::-1][place] * white, 8), interpolation="nearest")
-        axes.set_title(title, fontsize=style.TITLE, color=style.INK)
-        axes.set_axis_off()
+        shown = encode(values[::-1, ::-1][place] * white, 8)
+        picture(axes, shown, title, style.TITLE, style.INK, interpolation="nearest")
     figure.savefig(path)
 
 

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from panels import new_figure
 
 import vcc
 from vcc.plot.style import BLUE, INK, ORANGE, QUIET, SMALL, TEXT, TITLE
@@ -107,8 +106,7 @@ def noise_left(interpolation: str, count: int) -> float:
 
 def main(folder: Path = HERE) -> None:
     """Draw it into a folder."""
-    figure = Figure(figsize=(12, 7), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(12, 7)
     above, below = figure.subfigures(2, 1, height_ratios=(1.25, 1))
     left, right = above.subplots(1, 2)
     profile(left, 1, "A hard edge in one view, between pixels")

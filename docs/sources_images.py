@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+import panels
 from numpy.typing import NDArray
 
 from vcc.files.transfer import encode
@@ -93,12 +92,9 @@ def draw_views(renderer: Any, cameras: CameraArray, path: Path) -> None:
     last = cameras.views[1] - 1
     row = cameras.views[0] // 2
     pictures = [renderer.render(cameras.camera(row, column)) for column in (0, last // 2, last)]
-    figure = Figure(figsize=(10.8, 3.0), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = panels.new_figure(10.8, 3.0)
     for axes, picture, words in zip(figure.subplots(1, 3), pictures, ("left", "middle", "right"), strict=True):
-        axes.imshow(encode(picture, 8))
-        axes.set_title(f"the {words} view", fontsize=11)
-        axes.set_axis_off()
+        panels.picture(axes, encode(picture, 8), f"the {words} view")
     figure.savefig(path)
 
 
@@ -124,13 +120,12 @@ def draw_depth(path: Path, cameras: CameraArray) -> None:
         (encode(truth.render(corner), 8), "the true one"),
         (scene.uncovered(corner), "what was made up"),
     ]
-    figure = Figure(figsize=(10.8, 5.6), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = panels.new_figure(10.8, 5.6)
     for axes, entry in zip(figure.subplots(2, 3).flat, [*shown[:2], None, *shown[2:]], strict=True):
-        axes.set_axis_off()
-        if entry is not None:
-            axes.imshow(entry[0], cmap="gray")
-            axes.set_title(entry[1], fontsize=11)
+        if entry is None:
+            axes.set_axis_off()
+        else:
+            panels.picture(axes, *entry, cmap="gray")
     figure.savefig(path)
 
 

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from panels import new_figure, picture
 
 import vcc
+from vcc.base.measures import psnr
 from vcc.files.transfer import encode
 from vcc.sources import CameraArray
 from vcc.sources.mitsuba import SCENES, DemoScene, MitsubaRenderer, demo_scene
@@ -85,15 +85,9 @@ def margin_of(cameras: CameraArray, distance: float) -> int:
     return math.ceil(abs(cameras.disparity(distance)) * cameras.views[1] / 2) + 1
 
 
-def psnr(one: Picture, other: Picture) -> float:
-    """Decibels; the peak is radiance 1."""
-    return -10 * math.log10(float(np.mean((one - other) ** 2, dtype=np.float64)))
-
-
 def draw_scenes(path: Path) -> None:
     """One view of each of our scenes."""
-    figure = Figure(figsize=(9.6, 2.35), dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(9.6, 2.35, dpi=150)
     for axes, name in zip(figure.subplots(1, len(SCENES)), SCENES, strict=True):
         scene: DemoScene = demo_scene(name)
         cameras = scene.cameras((1, 1), (320, 480))
@@ -110,15 +104,14 @@ def draw_comparison(path: Path) -> None:
     cameras = scene.cameras((VIEWS, VIEWS), (PIXELS[0] * FINER, PIXELS[1] * FINER))
     light_field = synthesize(renderer, cameras, dtype="float32")
     assert isinstance(light_field, vcc.LightField)
-    figure = Figure(figsize=(9.6, 6.6), dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(9.6, 6.6, dpi=150)
     for row, distance in zip(figure.subplots(len(DISTANCES), 3), DISTANCES, strict=True):
         ours = refocused(light_field, cameras, scene.aperture, distance, FINER)
         theirs = by_thin_lens(renderer, pictures, scene.aperture, distance, LENS_SAMPLES)
         edge = margin_of(pictures, distance)
         within = slice(edge, -edge)
         ours, theirs = ours[within, within], theirs[within, within]
-        decibels = psnr(ours, theirs)
+        decibels = psnr(ours.astype(float), theirs, peak=1.0)
         print(f"focus at {distance} m: {decibels:.1f} dB, margin of {edge} pixels")
         show(row[0], ours, f"light field, focused at {distance} m")
         show(row[1], theirs, "Mitsuba's thin lens")
@@ -128,9 +121,7 @@ def draw_comparison(path: Path) -> None:
 
 def show(axes: Axes, radiance: Picture, title: str) -> None:
     """A linear picture as people see it."""
-    axes.imshow(encode(radiance, 8), interpolation="nearest")
-    axes.set_title(title, fontsize=8)
-    axes.set_axis_off()
+    picture(axes, encode(radiance, 8), title, 8, interpolation="nearest")
 
 
 if __name__ == "__main__":

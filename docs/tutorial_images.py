@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+import panels
 
 from vcc.files.pictures import read_picture
 from vcc.plot import style
@@ -71,24 +70,20 @@ def shown(name: str) -> np.ndarray:
     return np.asarray(read_picture(Path(f"{name}.png"))[0])
 
 
-def row(path: Path, panels: list[tuple[str, np.ndarray]]) -> None:
+def row(path: Path, pictures: list[tuple[str, np.ndarray]]) -> None:
     """Pictures side by side, as high as each other."""
-    widths = [picture.shape[1] / picture.shape[0] for _, picture in panels]
+    widths = [picture.shape[1] / picture.shape[0] for _, picture in pictures]
     height = min(11 / sum(widths), 3.6)
-    figure = Figure(figsize=(height * sum(widths), height + 0.3), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
-    places = figure.subplots(1, len(panels), width_ratios=widths, squeeze=False)[0]
-    for axes, (title, picture) in zip(places, panels, strict=True):
-        axes.imshow(picture, cmap="gray", interpolation="nearest")
-        axes.set_title(title, fontsize=style.TITLE, color=style.INK)
-        axes.set_axis_off()
+    figure = panels.new_figure(height * sum(widths), height + 0.3)
+    places = figure.subplots(1, len(pictures), width_ratios=widths, squeeze=False)[0]
+    for axes, (title, picture) in zip(places, pictures, strict=True):
+        panels.picture(axes, picture, title, style.TITLE, style.INK, cmap="gray", interpolation="nearest")
     figure.savefig(path)
 
 
 def contrast_curves(path: Path, curves: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
     """The MTF of each camera; the sensor itself shows 6 line pairs per millimetre."""
-    figure = Figure(figsize=(6.4, 3), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = panels.new_figure(6.4, 3)
     axes = figure.subplots()
     for (name, (frequency, contrast)), colour in zip(curves.items(), (style.BLUE, style.ORANGE), strict=True):
         axes.plot(frequency, contrast, color=colour, lw=1.3, label=name)

@@ -13,12 +13,13 @@ from vcc.analysis import expected_deblurring_error, natural_image_power
 from vcc.base.units import mm
 from vcc.gallery import coded_aperture_refocusing as entry
 from vcc.gallery import flat_target
-from vcc.gallery.entry import bench_for
+from vcc.gallery.entry import bench_for, silent
 from vcc.gallery.flat_target import OPENING
-from vcc.gallery.good_apertures import picture_of_the_prior
+from vcc.gallery.judged_apertures import picture_of_the_prior
 from vcc.gallery.published_codes import VEERARAGHAVAN
 from vcc.optics import Mask
 from vcc.shapes.patterns import Open
+from vcc.showcase.bench import built_in
 from vcc.showcase.scene import MIDDLE
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
@@ -37,18 +38,11 @@ def light_field() -> vcc.LightField:
 def test_the_gain_is_that_of_r_k():
     """Pictures of power 1/f²: the gain is the ratio of the expected errors, at the same noise."""
     target = MEAN + (picture_of_the_prior((126, 126)) - MEAN) / 2
-    kernels = {
-        "open": flat_target.kernel(Mask(Open(), width=OPENING), entry.BLUR),
-        "coded": flat_target.kernel(Mask(VEERARAGHAVAN, width=OPENING), entry.BLUR),
-    }
-    clean = {
-        "open": flat_target.recorded(Mask(Open(), width=OPENING), target, entry.BLUR),
-        "coded": flat_target.recorded(Mask(VEERARAGHAVAN, width=OPENING), target, entry.BLUR),
-    }
+    recordings = entry.Recordings.of(target)
     power = natural_image_power(target.shape, 0.1, MEAN)
     for noise in (0.0005, 0.002, 0.01):
         error, variance = {}, 0.0
-        for name, each in kernels.items():
+        for name, each in recordings.kernels.items():
             error[name] = expected_deblurring_error(each, noise, power)
             by_frequency = 1 / (np.abs(np.fft.fft2(each, s=power.shape)) ** 2 / noise**2 + 1 / power)
             # Pairs of frequencies ±f err at random, exponentially distributed: variance 2·Σ e².
@@ -58,7 +52,7 @@ def test_the_gain_is_that_of_r_k():
         # the right one its error is least, so that a few per cent of contrast cost none that counts here.
         tolerance = 4 * 10 / math.log(10) * math.sqrt(variance)
         assert tolerance < 0.7
-        assert entry._linear_gain(clean, kernels, target, noise) == pytest.approx(expected, abs=tolerance)
+        assert recordings.gain(entry.additive(noise)) == pytest.approx(expected, abs=tolerance)
 
 
 def test_both_apertures_pay_the_same_noise():
@@ -66,7 +60,7 @@ def test_both_apertures_pay_the_same_noise():
     flat = np.full((100, 100), 0.5)
     deviations = {}
     for name, mask in (("open", Mask(Open(), width=OPENING)), ("coded", Mask(VEERARAGHAVAN, width=OPENING))):
-        recording = entry._noisy(flat_target.recorded(mask, flat, 7), 0.01)
+        recording = entry.additive(0.01)(flat_target.recorded(mask, flat, 7))[0]
         kernel = flat_target.kernel(mask, 7)
         assert recording.mean() == pytest.approx(0.5 * kernel.sum(), abs=4 * 0.01 / 100)
         deviations[name] = float((recording / kernel.sum()).std())
@@ -75,9 +69,9 @@ def test_both_apertures_pay_the_same_noise():
 
 
 def test_the_chart_s_part_is_where_rays_through_the_lens_s_middle_land():
-    bench = bench_for(None)
-    camera = entry._scene_camera(bench, Mask(Open(), width=20 * mm), MIDDLE)
-    rows, columns = entry._chart(camera)
+    bench = built_in(small=True)
+    camera = entry.Refocusing.of(bench).camera(Mask(Open(), width=20 * mm), MIDDLE)
+    rows, columns = entry.chart(camera)
     left, top, right, bottom = entry.CHART_PART
     # The chart's middle is at (18, 4) mm; a ray from (X, Y) through the middle of the lens lands at −d·(X, Y)/Z.
     for x, column in ((right, columns.start), (left, columns.stop - 1)):
@@ -90,15 +84,16 @@ def test_the_chart_s_part_is_where_rays_through_the_lens_s_middle_land():
 
 def test_a_scene_in_focus_is_not_refocused(light_field):
     bench = replace(bench_for(light_field), near=1.0, middle=1.001)
-    rows, findings, words = entry._scene(bench)
-    assert (rows, findings) == ([], [])
-    assert "not refocused" in words
+    assert not entry.Refocusing.of(bench).shown
+    result = entry.Run(target=64, iterations=2, noises=(0.002,))(bench, silent)
+    assert len(result.pictures) == 3  # the flat target's alone
+    assert "not refocused" in result.text
 
 
-def test_runs_on_a_light_field_of_one_s_own(light_field, monkeypatch):
-    monkeypatch.setattr(entry, "STEPS", 15)
+def test_runs_on_a_light_field_of_one_s_own(light_field):
+    run = entry.Run(target=96, iterations=15, noises=(0.002, 0.02))
     seen_steps = []
-    result = entry.ENTRY.run(light_field, lambda done, total: seen_steps.append(done))
+    result = run(bench_for(light_field), lambda done, total: seen_steps.append(done))
     assert all(math.isfinite(number.value) for number in result.numbers)
     assert len(result.numbers) == 3  # without the chart's: nobody knows where in such a scene things are
     assert len(result.pictures) == 6

@@ -11,8 +11,8 @@ import pytest
 import vcc
 from vcc.base.units import mm
 from vcc.gallery import diffuser_depth_of_field as diffuser
-from vcc.gallery import entry, extended_depth
-from vcc.gallery.entry import bench_for
+from vcc.gallery import extended_depth
+from vcc.gallery.entry import bench_for, silent
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
 
@@ -22,7 +22,7 @@ SCENE = PlanesScene([TexturedPlane(Waves(0.03), 0.8, width=0.16), TexturedPlane(
 @pytest.fixture(scope="module")
 def fine() -> vcc.LightField:
     return SCENE.light_field(
-        (5, 5), (320, 320), spacing=4 * mm, slope_per_pixel=0.00125, focus_distance=1.2, dtype="float32"
+        (5, 5), (160, 160), spacing=4 * mm, slope_per_pixel=0.00125, focus_distance=1.2, dtype="float32"
     )
 
 
@@ -49,11 +49,9 @@ def test_the_path_is_continuous_between_rings(power):
     assert np.abs(step).max() < 0.002 * 5 * mm * 1e-8
 
 
-def test_rays_land_where_each_ring_s_own_focal_length_says(fine, monkeypatch):
+def test_rays_land_where_each_ring_s_own_focal_length_says(fine):
     """A ring of the deflection −c·r is a lens 1/c: a point at Z then spreads to d·r·|1/Z − 1/F − c| at most."""
-    monkeypatch.setattr(extended_depth, "RAYS", 200)
-    monkeypatch.setattr(extended_depth, "DEPTHS", 3)
-    kinds = diffuser.designed(bench_for(fine))
+    kinds = diffuser.designed(bench_for(fine), extended_depth.Sizes(depths=3, rays=200))
     comparison, surface = kinds.comparison, kinds.random[1].surface
     spreads = comparison.spreads(kinds.random)
     radius, d = extended_depth.PUPIL / 2, comparison.sensor((1, 1)).z
@@ -76,10 +74,9 @@ def test_contrast_of_a_box_is_its_closed_form():
     np.testing.assert_allclose(diffuser.contrast(spread, f), expected, atol=1e-14)
 
 
-def test_it_runs_on_a_light_field_of_one_s_own(fine, monkeypatch):
-    for name, value in (("DEPTHS", 3), ("RAYS", 200), ("TARGET", 80), ("SAMPLES", 32)):
-        monkeypatch.setattr(extended_depth, name, value)
-    result = entry("diffuser-depth-of-field").run(fine)
+def test_it_runs_on_a_light_field_of_one_s_own(fine):
+    run = diffuser.Run(extended_depth.Sizes(depths=3, target=80, rays=200, samples=32))
+    result = run(bench_for(fine), silent)
     without, random = result.numbers[:2]
     assert random.value > 0.85 > without.value
     assert all(math.isfinite(number.value) for number in result.numbers)

@@ -10,6 +10,7 @@ import pytest
 
 import vcc
 from command_line import run
+from vcc.base import measures
 from vcc.base.units import mm
 from vcc.files.pictures import read_picture
 from vcc.formats.writing import save_light_field
@@ -18,7 +19,7 @@ from vcc.gallery import biprism_stereo as biprism
 from vcc.gallery import integral_lens_prism as integral
 from vcc.gallery import light_field_rendering as rendering
 from vcc.gallery import wavefront_coding as wavefront
-from vcc.gallery.entry import bench_for
+from vcc.gallery.entry import bench_for, silent
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
 
@@ -39,7 +40,7 @@ def light_field() -> vcc.LightField:
 
 
 def psnr(picture: np.ndarray, truth: np.ndarray) -> float:
-    return -10 * math.log10(float(np.mean((picture - truth) ** 2)))
+    return measures.psnr(picture, truth, peak=1.0)
 
 
 # --- the frame ---
@@ -112,7 +113,7 @@ def test_what_lies_where_the_views_converge_is_predicted_to_rounding():
     plane = PlanesScene([TexturedPlane(Waves(0.05), CONVERGENCE)])
     flat = seen_by_views(plane)
     like = flat.view(3, 3).to_numpy()
-    found = rendering._resampled(flat[::2, ::2], flat, (3, 3), "linear")
+    found = rendering.resampled_view(flat[::2, ::2], flat, (3, 3), "linear")
     # All views are the same picture; float32 samples are weighted.
     np.testing.assert_allclose(found, like, atol=1e-5)
 
@@ -120,7 +121,7 @@ def test_what_lies_where_the_views_converge_is_predicted_to_rounding():
 def test_views_where_no_camera_stood_are_the_closed_form(light_field):
     (u, v), z = (1.3 * mm, -2.1 * mm), 15 * mm
     _, _, s0, t0 = light_field.frame([4, 4, 47.5, 47.5])
-    picture = rendering._pinhole_picture(light_field, light_field, (u, v), (float(s0), float(t0)), z)
+    picture = rendering.pinhole_picture(light_field, light_field, (u, v), (float(s0), float(t0)), z)
     s = t = (47.5 - np.arange(96)) * SLOPE
     truth = SCENE.radiance_along(u - z * s[None, :], v - z * t[:, None], s[None, :], t[:, None])
     inner = np.s_[14:-14, 14:-14]
@@ -214,8 +215,8 @@ def test_distance_from_one_recording():
 
 def test_a_cubic_plate_spreads_a_point_as_far_as_its_parabola(light_field):
     bench = bench_for(light_field)
-    pair = wavefront.designed(bench)
-    spread = pair.comparison.spreads(pair.coded)[extended_depth.DEPTHS // 2]
+    pair = wavefront.designed(bench, extended_depth.Sizes(depths=3, rays=200))
+    spread = pair.comparison.spreads(pair.coded)[1]
     assert spread.sum() == pytest.approx(1)
     # α·x³ bends by 3αλ/(2πR)·x² at most, hence a spot that wide times d, from the axis to one side (of an upright
     # picture: the other).
@@ -234,13 +235,22 @@ def test_a_scene_without_depth_is_refused(light_field):
         wavefront.designed(replace(bench, near=1.0, far=1.01))
 
 
-def test_wavefront_coding_runs_on_a_light_field_of_one_s_own(monkeypatch):
+def test_wavefront_coding_runs_on_a_light_field_of_one_s_own():
     fine = SCENE.light_field(
-        (5, 5), (320, 320), spacing=4 * mm, slope_per_pixel=0.00125, focus_distance=CONVERGENCE, dtype="float32"
+        (5, 5), (160, 160), spacing=4 * mm, slope_per_pixel=0.00125, focus_distance=CONVERGENCE, dtype="float32"
     )
-    for name, value in (("DEPTHS", 3), ("RAYS", 200), ("TARGET", 80)):
-        monkeypatch.setattr(extended_depth, name, value)
-    result = entry("wavefront-coding").run(fine)
+    run = wavefront.Run(extended_depth.Sizes(depths=3, target=80, rays=200, samples=32))
+    result = run(bench_for(fine), silent)
     with_plate, without = result.numbers[:2]
-    assert with_plate.value > 0.9 > without.value
+    # With the plate, defocus moves a share ψ/(3α) = 1/9 of the light of each axis elsewhere, 1 − (8/9)² = 0.21 of
+    # all: if what is moved is spread like the rest, a correlation of 0.79/√(0.79² + 0.21²) = 0.966 is left.
+    assert with_plate.value > 0.96
+    # Without it, a point in focus lies in one pixel, and defocus spreads its light over a square of D·|1/Z − 1/F|,
+    # here 1 to 3 pixels wide: along each axis the middle pixel holds 1/w of it, its neighbours half of the rest.
+    comparison = wavefront.designed(bench_for(fine)).comparison
+    middle = comparison.slope / (extended_depth.PUPIL * comparison.reach)
+    assert 1 / 3 < middle < 1
+    # Rays stand 200 to the opening: a pixel's border is met to one of them, in 100 of the middle pixel.
+    correlation = middle**2 / (middle**2 + (1 - middle) ** 2 / 2)
+    assert without.value == pytest.approx(correlation, abs=0.02)
     assert all(math.isfinite(number.value) for number in result.numbers)

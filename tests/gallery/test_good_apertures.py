@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 import pytest
 
 import vcc
-from vcc.analysis import natural_image_power, optimised_aperture
+from vcc.analysis import natural_image_power
 from vcc.base.units import mm
-from vcc.gallery import flat_target
-from vcc.gallery import good_apertures as entry
+from vcc.gallery import flat_target, good_apertures, judged_apertures
 from vcc.gallery.entry import bench_for
 from vcc.gallery.flat_target import OPENING
 from vcc.gallery.published_codes import LEVIN, VEERARAGHAVAN, ZHOU_NAYAR
@@ -70,26 +68,26 @@ def test_views_that_are_too_small_or_dark_are_refused():
 
 def test_pictures_drawn_from_the_prior_are_deblurred_as_well_as_expected():
     shape = (128, 128)
-    drawn = entry.picture_of_the_prior(shape)
-    power = natural_image_power(shape, entry.CONTRAST, entry.MEAN)
+    drawn = judged_apertures.picture_of_the_prior(shape)
+    power = natural_image_power(shape, judged_apertures.CONTRAST, judged_apertures.MEAN)
     for code in (ZHOU_NAYAR, LEVIN):
-        judged = entry.judge("some", Mask(code, width=OPENING), drawn, drawn)
+        judged = judged_apertures.judge("some", Mask(code, width=OPENING), drawn, drawn)
         passed = np.abs(np.fft.fft2(judged.kernel, s=shape)) ** 2
-        for level, noise in enumerate(entry.NOISES):
+        for level, noise in enumerate(judged_apertures.NOISES):
             errors = 1 / (passed / noise**2 + 1 / power)
             assert judged.expected[level] == pytest.approx(errors.mean(), rel=1e-9)
             # Each pair of frequencies ±f brings an exponentially distributed error: the variance of the sum over
             # all is 2·Σ errors². Four standard deviations, and single precision in the recording (1e-6 of white,
             # magnified by up to the filter's 1/(2|K|)): seen where the noise is least.
             spread = math.sqrt(2 * np.sum(errors**2)) / errors.sum()
-            tolerance = 4 * spread + 1e-2 * (noise == entry.NOISES[0])
+            tolerance = 4 * spread + 1e-2 * (noise == judged_apertures.NOISES[0])
             assert judged.drawn[level] == pytest.approx(errors.mean(), rel=tolerance)
 
 
 def test_a_picture_s_own_spectrum_foretells_its_error():
     bench = bench_for(seen(96))
-    real = entry._with_contrast(flat_target.grey_view(bench, 96))
-    judged = entry.judge("some", Mask(VEERARAGHAVAN, width=OPENING), real, real)
+    real = judged_apertures.with_contrast(flat_target.grey_view(bench, 96))
+    judged = judged_apertures.judge("some", Mask(VEERARAGHAVAN, width=OPENING), real, real)
     # Of 96² noisy pixels 4·√(2/96²) is 4 %, for errors that are spread over all frequencies; few hold most of
     # what the filter takes, but that part is not random.
     np.testing.assert_allclose(judged.real, judged.foretold, rtol=0.2)
@@ -100,8 +98,8 @@ def test_pairs_are_counted_where_they_differ():
     expected = np.array([[1.0, 1.0], [2.0, 1.01], [3.0, 2.0]])
     measured = np.array([[1.0, 5.0], [3.0, 4.0], [2.0, 6.0]])
     # Noise 1: three pairs, of which the last two change places. Noise 2: the first two count as alike.
-    assert entry.pairs_in_order(expected, measured) == (4, 5)
-    assert entry.rank_correlations(expected[:, :1], measured[:, :1]) == [pytest.approx(0.5)]
+    assert judged_apertures.pairs_in_order(expected, measured) == (4, 5)
+    assert judged_apertures.rank_correlations(expected[:, :1], measured[:, :1]) == [pytest.approx(0.5)]
 
 
 def test_the_published_ranking():
@@ -119,11 +117,11 @@ def test_the_published_ranking():
         assert (min(r, key=r.__getitem__) == "circle") is not best
 
 
-def test_runs_on_a_light_field_of_one_s_own(monkeypatch):
-    few = partial(optimised_aperture, population=100, survivors=20, generations=5)
-    monkeypatch.setattr(entry, "optimised_aperture", few)
+def test_runs_on_a_light_field_of_one_s_own():
+    few = good_apertures.Search(population=100, survivors=20, generations=5)
+    run = good_apertures.Run(few, target=64, noises=(0.001, 0.005, 0.02, 0.1))
     seen_steps = []
-    result = entry.ENTRY.run(seen(96), lambda done, total: seen_steps.append((done, total)))
+    result = run(bench_for(seen(96)), lambda done, total: seen_steps.append((done, total)))
     assert all(math.isfinite(number.value) for number in result.numbers)
     assert len(result.pictures) == 4
     assert "<table>" in result.text

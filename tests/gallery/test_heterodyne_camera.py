@@ -14,13 +14,15 @@ import pytest
 import vcc
 from vcc.base.units import mm
 from vcc.gallery import heterodyne
-from vcc.gallery.entry import bench_for
+from vcc.gallery.entry import bench_for, silent
 from vcc.recover.heterodyne import HeterodyneGeometry
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
 
 NEAR, FAR, CONVERGENCE = 0.8, 2.0, 1.2
 VIEWS, PIXELS, SLOPE = 10, 96, 0.4 / 96
+TILE = 24
+"""Pixels of a view: as few as the camera takes."""
 SCENE = PlanesScene([TexturedPlane(Waves(0.05), NEAR, width=0.16), TexturedPlane(Waves(0.15, seed=1), FAR)])
 
 
@@ -43,7 +45,7 @@ def bench():
 @pytest.fixture(scope="module")
 def result():
     """Of someone's own light field: the scene is not known."""
-    return heterodyne.ENTRY.run(seen_by_views(9))
+    return heterodyne.Run(tile=TILE, calibration_rays=16)(bench_for(seen_by_views(9)), silent)
 
 
 def finding(result, begins: str):
@@ -76,12 +78,12 @@ def test_a_scene_that_fits_is_decoded_to_the_views_that_it_came_from(result):
 
 def test_views_are_what_pinholes_at_their_own_places_see(bench):
     """And not at the opposite ones: by the triangle inequality they are nearer to views less than half as far."""
-    camera = heterodyne.designed(bench, bench.light_field)
+    camera = heterodyne.designed(bench, bench.light_field, 36)
     calibration = vcc.recover.heterodyne_calibration(camera, samples=16)
     image = heterodyne.recorded(camera, vcc.recover.band_limited(bench.light_field, camera))
     decoded = vcc.recover.decode_heterodyne(image, camera, calibration=calibration, border=heterodyne.BORDER)
-    truth = vcc.recover.true_views(heterodyne._equally_sampled(bench, bench.light_field, camera), camera, decoded)
-    assert heterodyne._psnr(decoded, truth, float(truth.values.max()))[1:-1, 1:-1].mean() > 30
+    truth = vcc.recover.true_views(heterodyne.equally_sampled(bench, bench.light_field, camera), camera, decoded)
+    assert heterodyne.view_decibels(decoded, truth, float(truth.values.max()))[1:-1, 1:-1].mean() > 30
     for axis, end in enumerate(((1, 4), (4, 1))):
         opposite = np.flip(truth.values, axis)[end]
         error = np.linalg.norm(decoded.values[end] - truth.values[end])

@@ -9,8 +9,9 @@ import pytest
 
 import vcc
 from vcc.base.units import mm, um
-from vcc.gallery import entry, fringes
+from vcc.gallery import fringes
 from vcc.gallery import plenoptic as gallery
+from vcc.gallery.entry import bench_for, silent
 from vcc.recover import without_aberration
 from vcc.shapes.surfaces import Tilt, Zernike
 from vcc.showcase.bench import Bench
@@ -18,7 +19,7 @@ from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
 
 FOCUS, DISTANCE = 1.2, 0.9
-SLOPE, PIXELS = 0.001, 150
+SLOPE, PIXELS = 0.001, 98
 TO_SENSOR = 1 / (1 / (50 * mm) - 1 / FOCUS)
 
 
@@ -61,8 +62,8 @@ def test_the_camera_is_the_published_one(camera):
     assert camera.camera.sensor.pitch == pytest.approx(9 * um, rel=0.01)
     micro_image = camera.diameter * camera.gap / TO_SENSOR
     assert micro_image == pytest.approx(14 * camera.camera.sensor.pitch)
-    # 150 pixels of the light field are 62.6 lenslets; half a one is free at each border.
-    assert camera.lenslets == (61, 61)
+    # 98 pixels of the light field are 40.9 lenslets; half a one is free at each border.
+    assert camera.lenslets == (39, 39)
 
 
 def test_a_plane_refocused_is_its_mean_over_lenslets(camera, decoded):
@@ -85,9 +86,8 @@ def test_a_plane_refocused_is_its_mean_over_lenslets(camera, decoded):
     assert off(camera.ideal(camera.bench.light_field, DISTANCE), truth) < 0.002
 
 
-def test_fringes_lose_contrast_as_windows_and_discs_say(camera, monkeypatch):
-    monkeypatch.setattr(gallery, "DEPTHS", 4)
-    sharpness = gallery.depth_of_field(camera)
+def test_fringes_lose_contrast_as_windows_and_discs_say(camera):
+    sharpness = gallery.depth_of_field(camera, 4)
     # Brute force: the mean of a wave over points of a square and of a disc.
     x = (np.arange(400) + 0.5) / 400 - 0.5
     disc = np.hypot(x[:, None], x[None, :]) < 0.5
@@ -133,12 +133,10 @@ def test_few_pixels_are_refused():
         gallery.designed(bench_with(vcc.LightField.from_views(small, 4 * mm, SLOPE * 4.5, FOCUS)))
 
 
-def test_runs_on_a_light_field_of_one_s_own(monkeypatch):
+def test_runs_on_a_light_field_of_one_s_own():
     scene = PlanesScene([TexturedPlane(Waves(0.03), 0.8, width=0.16), TexturedPlane(Waves(0.07, seed=1), 2.0)])
     field = scene.light_field((9, 9), (96, 96), spacing=20 * mm / 9, slope_per_pixel=0.004, focus_distance=1.2)
-    for name, value in (("EACH", 7), ("DEPTHS", 4)):
-        monkeypatch.setattr(gallery, name, value)
-    result = entry("plenoptic").run(field)
+    result = gallery.Run(each=7, depths=4)(bench_for(field), silent)
     assert all(math.isfinite(number.value) for number in result.numbers)
     refocused = [number for number in result.numbers if number.what.startswith("refocused")]
     assert len(refocused) == 3

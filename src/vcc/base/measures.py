@@ -1,4 +1,4 @@
-"""How close a picture is to the true one."""
+"""How far pictures are from the true ones."""
 
 from __future__ import annotations
 
@@ -8,17 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 LEAST = 1e-20
-"""Mean squared errors below this share of the squared peak are rounding: 200 dB."""
+"""Mean squared errors below this are rounding: 200 dB for a peak of 1."""
 
 
 def psnr(picture: NDArray[np.floating], truth: NDArray[np.floating], peak: float | None = None) -> float:
-    """The peak signal-to-noise ratio in linear light, decibels; 200 where there is no difference.
+    """The peak signal-to-noise ratio of a picture in linear light, decibels.
 
     Args:
         picture: any shape.
         truth: the same shape.
-        peak: in their unit; None takes the largest value of the truth.
+        peak: in their unit; None for the brightest of the truth.
     """
-    most = float(truth.max()) if peak is None else peak
-    error = np.asarray(picture, dtype=np.float64) - np.asarray(truth, dtype=np.float64)
-    return -10 * math.log10(max(float(np.mean(error**2)) / most**2, LEAST))
+    return decibels(float(np.mean((picture - truth) ** 2)), float(truth.max()) if peak is None else peak)
+
+
+def decibels(mean_square: float, peak: float = 1.0) -> float:
+    """The peak signal-to-noise ratio of a mean squared error, for errors that are averaged in another way."""
+    return -10 * math.log10(max(mean_square, LEAST) / peak**2)

@@ -7,7 +7,6 @@ from cyclopts import Parameter
 
 from vcc.cli.console import make_folder, progress, show
 from vcc.gallery import entries, entry, write_entry
-from vcc.gallery.page import VERDICTS
 
 
 def gallery(
@@ -33,6 +32,6 @@ def gallery(
     with progress(chosen.title) as advance:
         result = chosen.run(light_field, advance)
     for number in result.numbers:
-        claim = f" (claim: {number.claim}; {VERDICTS[number.reached]})" if number.claim else ""
+        claim = f" (claim: {number.claim}; {number.verdict})" if number.claim else ""
         show(f"{number.what}: {number.measured}{claim}")
     show(f"{write_entry(chosen, result, folder)}: written")

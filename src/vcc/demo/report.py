@@ -32,6 +32,12 @@ class Timing:
         """How many times faster than the paper's 8 minutes; None for other work."""
         return PAPER_SECONDS / self.first if self.compared else None
 
+    @property
+    def speed_up(self) -> str:
+        """The same as text; nothing where there is nothing to compare."""
+        times = self.times_the_paper
+        return "" if times is None else f"{float(f'{times:.2g}'):,.0f} ×"
+
 
 @dataclass(frozen=True)
 class DemoReport:
@@ -62,18 +68,3 @@ class DemoReport:
     def sheet(self) -> Path:
         """The contact sheet, one picture of all pictures."""
         return self.folder / "contact-sheet.png"
-
-
-def duration(seconds: float | None) -> str:
-    """A time as people read it: 35 ms, 1.8 s; a dash for None."""
-    if seconds is None:
-        return "–"
-    if seconds < 0.9995:
-        return f"{seconds * 1e3:.2g} ms" if seconds < 0.0995 else f"{seconds * 1e3:.0f} ms"
-    return f"{seconds:.1f} s"
-
-
-def speed_up(timing: Timing) -> str:
-    """How much faster than the paper, as text; nothing where there is nothing to compare."""
-    times = timing.times_the_paper
-    return "" if times is None else f"{float(f'{times:.2g}'):,.0f} ×"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,24 +15,28 @@ import numpy as np
 
 from vcc.base.errors import InputError, ResultWarning
 from vcc.camera import Camera
-from vcc.demo import story
-from vcc.demo.report import DemoReport, Timing, duration, speed_up
+from vcc.demo.report import DemoReport, Timing
+from vcc.demo.sheet import MASK_TITLES, drawn_sheet, truth_in_words
 from vcc.image import Image
 from vcc.light_field import LightField
-from vcc.run.drive import drive
+from vcc.plan.how import Interpolation
+from vcc.plot import plot_phase_space_stages
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench, built_in, from_someone
-from vcc.showcase.figures import Crop, SheetRow, Shown
-from vcc.showcase.page import write_page
+from vcc.showcase.figures import Crop, Shown
+from vcc.showcase.scene import CHECK_PLACES, PLACES
 from vcc.showcase.truth import psnr, true_picture
+from vcc.showcase.words import away, duration, length, write_page
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Uniform
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-INTERPOLATIONS = ("nearest", "linear", "cubic", "sharp")
+INTERPOLATIONS: tuple[Interpolation, ...] = ("nearest", "linear", "cubic", "sharp")
 PAPER_SHAPE = (20, 20, 500, 500)
+OTHER_PLACES = "sharp when focused near", "sharp at middle distance", "sharp when focused far"
+"""What close-ups of someone's own light field show."""
 
 
 def run_demo(
@@ -62,14 +66,23 @@ def run_demo(
 
         console = Console()
     work = _Work(_made(Path(output)), console)
-    begun = time.perf_counter()
-    bench = _light_field(work, light_field, small)
-    _show_light_field(work, bench)
-    conventional = _example_one(work, bench)
-    _example_two(work, bench, conventional)
-    truth_text = _check(work, bench, conventional)
-    work.timings.append(Timing("everything, drawings and files included", time.perf_counter() - begun))
-    return _finish(work, bench, truth_text)
+    with work.timed("everything, drawings and files included"):
+        bench = _light_field(work, light_field, small)
+        _show_light_field(work, bench)
+        conventional = _example_one(work, bench)
+        _example_two(work, bench, conventional)
+        _check(work, bench, conventional)
+    return _finish(work, bench, conventional["near"].exposure)
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """A picture that a camera took, how it is shown, and how long it took."""
+
+    image: Image
+    exposure: float
+    shown: Shown
+    seconds: tuple[float, float]
 
 
 @dataclass
@@ -81,8 +94,7 @@ class _Work:
     timings: list[Timing] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
     psnr: dict[str, float] = field(default_factory=dict)
-    crops: list[Crop] = field(default_factory=list)
-    told: story.Told = field(default_factory=story.Told)
+    gaps: dict[str, float] = field(default_factory=dict)
 
     def path(self, name: str) -> Path:
         """Where a file goes; it is remembered."""
@@ -95,10 +107,11 @@ class _Work:
         figures.write_figure(getattr(figure, "figure", figure), self.path(name))
 
     @contextmanager
-    def status(self, words: str) -> Iterator[None]:
-        """Say what is going on, while it is."""
-        with self.console.status(words):
-            yield
+    def timed(self, step: str, note: str = "") -> Iterator[None]:
+        """Remember what a step took that is done inside."""
+        begun = time.perf_counter()
+        yield
+        self.timings.append(Timing(step, time.perf_counter() - begun, note=note))
 
     @contextmanager
     def bar(self, words: str) -> Iterator[Callable[[int, int], None]]:
@@ -108,6 +121,22 @@ class _Work:
         with Progress(console=self.console, transient=True) as progress:
             task = progress.add_task(words, total=None)
             yield lambda done, total: progress.update(task, completed=done, total=total)
+
+    def take(
+        self, bench: Bench, camera: Camera, name: str, exposure: float, interpolation: Interpolation = "sharp"
+    ) -> _Taken:
+        """Capture twice, timed, and write the picture."""
+        seconds = []
+        with warnings.catch_warnings(), self.console.status(name):
+            warnings.simplefilter("ignore", ResultWarning)  # the page says what share of the rays is missing
+            for _ in range(2):
+                begun = time.perf_counter()
+                image = camera.capture(bench.light_field, interpolation=interpolation)
+                seconds.append(time.perf_counter() - begun)
+        if image.missing_rays > 0.01:
+            self.gaps[name] = image.missing_rays
+        image.save(self.path(f"{name}.png"), exposure=exposure)
+        return _Taken(image, exposure, figures.shown(image, exposure), (seconds[0], seconds[1]))
 
 
 def _made(folder: Path) -> Path:
@@ -127,47 +156,54 @@ def _made(folder: Path) -> Path:
 
 
 def _light_field(work: _Work, given: Path | LightField | None, small: bool) -> Bench:
-    with work.status("compiling"):
-        begun = time.perf_counter()
-        if given is None:
-            _tiny().light_field((1, 1), (2, 2), spacing=1e-3, slope_per_pixel=1e-3)
-        compiling = time.perf_counter() - begun
+    begun = time.perf_counter()
+    if given is None:  # one tiny plane, so that what is timed next is not compiling
+        with work.console.status("compiling"):
+            tiny = PlanesScene([TexturedPlane(Uniform(), 1.0)])
+            tiny.light_field((1, 1), (2, 2), spacing=1e-3, slope_per_pixel=1e-3)
+    compiled = time.perf_counter()
     with work.bar("light field") as progress:
-        begun = time.perf_counter()
         bench = built_in(small, progress) if given is None else from_someone(given, small, progress)
-        made = time.perf_counter() - begun
-    with work.status("compiling"):
-        begun = time.perf_counter()
+    made = time.perf_counter()
+    with work.console.status("compiling"):
         _warm_up(bench)
-        compiling += time.perf_counter() - begun
+    compiling = compiled - begun + time.perf_counter() - made
     values = bench.light_field.values
-    sizes = "×".join(map(str, values.shape))
+    sizes = f"{'×'.join(map(str, values.shape))}, {values.nbytes / 1e6:.0f} MB"
     work.timings.append(
         Timing("compiling the loops", compiling, note="once on a machine: kept on disk for the next run")
     )
     verb = "synthesizing" if given is None else "reading"
-    work.timings.append(Timing(f"{verb} the light field", made, note=f"{sizes}, {values.nbytes / 1e6:.0f} MB"))
+    work.timings.append(Timing(f"{verb} the light field", made - compiled, note=sizes))
     work.console.print(f"{bench.light_field!r}")
     if bench.assumed:
         work.console.print(bench.assumed)
     return bench
 
 
-def _tiny() -> PlanesScene:
-    return PlanesScene([TexturedPlane(Uniform(), 1.0)])
-
-
 def _warm_up(bench: Bench) -> None:
-    """Run each kind of plan once on a few views, so that what follows is not compiling.
+    """Run each kind of plan once on a few views, so that what follows is not compiling."""
+    few = few_views(bench)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResultWarning)  # most of the sensor stays dark
+        for camera in kinds_of_camera(bench):
+            for interpolation in INTERPOLATIONS:
+                camera.capture(few, interpolation=interpolation)
+
+
+def kinds_of_camera(bench: Bench) -> tuple[Camera, ...]:
+    """One for each kind of plan that the demo runs."""
+    return bench.conventional(bench.near), bench.cosine(), bench.coded()
+
+
+def few_views(bench: Bench) -> LightField:
+    """A corner of the pixels of four views.
 
     Views of the middle: those of the corners lie outside the round lens, and a plan passes them over.
     """
     row, column = (n // 2 for n in bench.light_field.shape[:2])
     middle = bench.light_field[row - 1 : row + 1, column - 1 : column + 1, :8, :8]
-    middle = middle.replaced(np.ascontiguousarray(middle.values))
-    for camera in (bench.conventional(bench.near), bench.cosine(), bench.coded()):
-        for interpolation in INTERPOLATIONS:
-            drive(camera.compile(middle, interpolation=interpolation), middle)
+    return middle.replaced(np.ascontiguousarray(middle.values))
 
 
 def _show_light_field(work: _Work, bench: Bench) -> None:
@@ -175,183 +211,115 @@ def _show_light_field(work: _Work, bench: Bench) -> None:
     rows, columns = light_field.shape[:2]
     light_field.view(rows // 2, columns // 2).save(work.path("light-field-middle-view.png"), exposure=1.0)
     work.draw("light-field-views.png", figures.views_figure(light_field))
-    work.told.light_field(bench)
 
 
 # --- pictures ---
 
 
-@dataclass(frozen=True)
-class _Taken:
-    """A picture that a camera took, how it is shown, and how long it took."""
-
-    image: Image
-    exposure: float
-    shown: Shown
-    first: float
-    again: float
-
-
-def _take(
-    work: _Work, bench: Bench, camera: Camera, name: str, exposure: float, interpolation: str = "sharp"
-) -> _Taken:
-    """Capture twice, timed, and write the picture."""
-    seconds = []
-    with warnings.catch_warnings(), work.status(name):
-        warnings.simplefilter("ignore", ResultWarning)  # the page says what share of the rays is missing
-        for _ in range(2):
-            begun = time.perf_counter()
-            image = camera.capture(bench.light_field, interpolation=interpolation)
-            seconds.append(time.perf_counter() - begun)
-    if image.missing_rays > 0.01:
-        work.told.missing(name, image.missing_rays)
-    image.save(work.path(f"{name}.png"), exposure=exposure)
-    return _Taken(image, exposure, figures.shown(image, exposure), *seconds)
-
-
 def _example_one(work: _Work, bench: Bench) -> dict[str, _Taken]:
-    distances = {"near": bench.near, "middle": bench.middle, "far": bench.far}
     exposure = bench.exposure(bench.conventional(bench.middle), bench.diameter)
     taken = {}
-    for name, distance in distances.items():
+    for name, distance in bench.distances.items():
         camera = bench.conventional(distance)
-        taken[name] = _take(work, bench, camera, f"example-1-focused-{name}", exposure)
-        away = story.away(distance)
-        note = f"one lens, sensor at {story.length(camera.sensor.z)}"
-        work.timings.append(
-            Timing(f"Example 1: focused {name}, {away}", taken[name].first, taken[name].again, note)
-        )
-    work.crops = _crops(bench, taken)
-    begun = time.perf_counter()
-    _draw_example_one(work, bench, taken)
-    work.timings.append(Timing("Example 1: camera and phase space drawn", time.perf_counter() - begun))
-    work.told.example_one(bench, exposure)
+        taken[name] = work.take(bench, camera, f"example-1-focused-{name}", exposure)
+        note = f"one lens, sensor at {length(camera.sensor.z)}"
+        work.timings.append(Timing(f"Example 1: focused {name}, {away(distance)}", *taken[name].seconds, note))
+    with work.timed("Example 1: camera and phase space drawn"):
+        _draw_example_one(work, bench, taken)
     return taken
 
 
 def _draw_example_one(work: _Work, bench: Bench, taken: dict[str, _Taken]) -> None:
-    from vcc.plot import plot_phase_space_stages
-
     far = bench.conventional(bench.far)
     work.draw("example-1-camera.png", far.plot(light_field=bench.light_field))
     points = figures.points_field(bench.focal_length, bench.diameter)
     focused_far_away = bench.conventional(math.inf)
     work.draw("example-1-phase-space-points.png", plot_phase_space_stages(focused_far_away, points))
-    pixel_row = round(0.46 * bench.light_field.shape[2])
-    work.draw(
-        "example-1-phase-space-scene.png",
-        plot_phase_space_stages(far, bench.light_field, pixel_row=pixel_row),
-    )
+    row = round(0.46 * bench.light_field.shape[2])
+    stages = plot_phase_space_stages(far, bench.light_field, pixel_row=row)
+    work.draw("example-1-phase-space-scene.png", stages)
     columns = [(f"focused {name}", picture.shown) for name, picture in taken.items()]
-    work.draw("example-1-close-ups.png", figures.close_ups(columns, work.crops, story.places(bench)))
+    crops, places = _close_ups(bench, taken)
+    work.draw("example-1-close-ups.png", figures.close_ups(columns, crops, places))
 
 
-def _crops(bench: Bench, taken: dict[str, _Taken]) -> list[Crop]:
-    """Where to look closely: known places of the built-in scene, else what is sharp in one picture only."""
+def _close_ups(bench: Bench, taken: dict[str, _Taken]) -> tuple[list[Crop], Sequence[str]]:
+    """Where to look closely, and what is there: known places, else what is sharp in one picture only."""
     size = max(min(bench.light_field.shape[2:4]) * 13 // 100, 8)
     if bench.scene is None:
-        return figures.detailed_crops([picture.shown for picture in taken.values()], size)
-    return [_around(bench, place, size) for place in story.PLACES.values()]
-
-
-def _around(bench: Bench, place: tuple[float, float, float], size: int) -> Crop:
-    """The square around a point (X, Y) at a distance, as the camera focused near shows it."""
-    x, y, distance = place
+        return figures.detailed_crops([picture.shown for picture in taken.values()], size), OTHER_PLACES
     sensor = bench.sensor(bench.near)
-    # Through the middle of the lens; upright, the picture runs the way the scene does.
-    column = (sensor.shape[1] - 1) / 2 + x / distance * sensor.z / sensor.pitches[1]
-    row = (sensor.shape[0] - 1) / 2 + y / distance * sensor.z / sensor.pitches[0]
-    return Crop(round(row) - size // 2, round(column) - size // 2, size)
+    return [figures.crop_around(sensor, place, size) for place in PLACES.values()], list(PLACES)
 
 
 def _example_two(work: _Work, bench: Bench, conventional: dict[str, _Taken]) -> None:
-    full = bench.light_field.shape[:4] == PAPER_SHAPE
-    taken = {}
-    for name, camera, title, open_share in (
-        ("cosine", bench.cosine(), "cosine mask near the sensor", 0.25),
-        ("coded", bench.coded(), "coded mask half-way", 0.5),
-    ):
-        exposure = bench.exposure(bench.conventional(bench.middle), bench.diameter, open_share)
-        taken[name] = _take(work, bench, camera, f"example-2-{name}", exposure)
-        work.timings.append(
-            Timing(
-                f"Example 2: {title}",
-                taken[name].first,
-                taken[name].again,
-                "one mask in mid-path" + (", three channels for the paper’s one" if full else ""),
-                compared=full,
-            )
-        )
-    unmasked = conventional["near" if bench.masked_focus == bench.near else "middle"]
-    _draw_example_two(work, bench, {"no mask": unmasked, **taken})
-    work.told.example_two(bench)
-
-
-def _draw_example_two(work: _Work, bench: Bench, taken: dict[str, _Taken]) -> None:
     cameras = {"cosine": bench.cosine(), "coded": bench.coded()}
-    for name, camera in cameras.items():
-        work.draw(f"example-2-{name}-camera.png", camera.plot(light_field=bench.light_field))
-    masks = [(story.MASK_TITLES[name], camera.elements[-1]) for name, camera in cameras.items()]
+    unmasked = conventional["near" if bench.masked_focus == bench.near else "middle"]
+    full = bench.light_field.shape[:4] == PAPER_SHAPE
+    note = "one mask in mid-path" + (", three channels for the paper’s one" if full else "")
+    columns = [("no mask", unmasked.shown)]
+    for name, open_share in (("cosine", 0.25), ("coded", 0.5)):
+        exposure = bench.exposure(bench.conventional(bench.middle), bench.diameter, open_share)
+        taken = work.take(bench, cameras[name], f"example-2-{name}", exposure)
+        work.timings.append(Timing(f"Example 2: {MASK_TITLES[name]}", *taken.seconds, note, full))
+        columns.append((MASK_TITLES[name], taken.shown))
+        work.draw(f"example-2-{name}-camera.png", cameras[name].plot(light_field=bench.light_field))
+    masks = [(MASK_TITLES[name], camera.elements[-1]) for name, camera in cameras.items()]
     width = max(cameras["cosine"].sensor.size) * 0.9
     work.draw("example-2-masks.png", figures.mask_figure(masks, width))
-    titles = {"no mask": "no mask", **story.MASK_TITLES}
-    columns = [(titles[name], picture.shown) for name, picture in taken.items()]
-    work.draw("example-2-close-ups.png", figures.close_ups(columns, work.crops, story.places(bench)))
+    work.draw("example-2-close-ups.png", figures.close_ups(columns, *_close_ups(bench, conventional)))
 
 
-def _check(work: _Work, bench: Bench, conventional: dict[str, _Taken]) -> str:
+def _check(work: _Work, bench: Bench, conventional: dict[str, _Taken]) -> None:
     camera = bench.pinhole()
     exposure = bench.exposure(camera, bench.pinhole_diameter)
-    with work.status("the true picture"):
-        begun = time.perf_counter()
+    words = truth_in_words(bench)
+    with work.console.status("the true picture"), work.timed("check: the true picture", note=words):
         truth = true_picture(bench)
-        seconds = time.perf_counter() - begun
     truth.save(work.path("check-truth.png"), exposure=exposure)
-    columns = [("truth", figures.shown(truth, exposure))]
-    errors = []
+    columns, errors = [("truth", figures.shown(truth, exposure))], []
     for interpolation in INTERPOLATIONS:
-        taken = _take(work, bench, camera, f"check-{interpolation}", exposure, interpolation)
-        work.psnr[interpolation] = psnr(taken.image, truth, 1 / exposure)
-        work.timings.append(
-            Timing(
-                f"check: pinhole picture, {interpolation}",
-                taken.first,
-                taken.again,
-                f"PSNR {work.psnr[interpolation]:.1f} dB against the truth",
-            )
-        )
-        columns.append((f"{interpolation}, {work.psnr[interpolation]:.1f} dB", taken.shown))
+        taken = work.take(bench, camera, f"check-{interpolation}", exposure, interpolation)
+        reached = work.psnr[interpolation] = psnr(taken.image, truth, 1 / exposure)
+        note = f"PSNR {reached:.1f} dB against the truth"
+        work.timings.append(Timing(f"check: pinhole picture, {interpolation}", *taken.seconds, note))
+        columns.append((f"{interpolation}, {reached:.1f} dB", taken.shown))
         errors.append((f"{interpolation}: error × 3", figures.error_shown(taken.image, truth, exposure)))
-    work.timings.append(Timing("check: the true picture", seconds, note=story.truth_in_words(bench)))
-    crops = _check_crops(bench, conventional)
-    work.draw("check-close-ups.png", figures.close_ups(columns, crops, story.check_places(bench)))
-    work.draw("check-errors.png", figures.close_ups(errors, [crops[0]], [story.check_places(bench)[0]]))
-    work.told.check(bench, work.psnr)
-    return story.truth_in_words(bench)
+    crops, places = _check_places(bench, conventional)
+    work.draw("check-close-ups.png", figures.close_ups(columns, crops, places))
+    work.draw("check-errors.png", figures.close_ups(errors, crops[:1], places[:1]))
 
 
-def _check_crops(bench: Bench, conventional: dict[str, _Taken]) -> list[Crop]:
+def _check_places(bench: Bench, conventional: dict[str, _Taken]) -> tuple[list[Crop], list[str]]:
     size = max(min(bench.light_field.shape[2:4]) * 12 // 100, 8)
     if bench.scene is None:
-        return figures.detailed_crops([picture.shown for picture in conventional.values()], size)
-    return [_around(bench, place, size) for place in story.CHECK_PLACES.values()]
+        pictures = [picture.shown for picture in conventional.values()]
+        return figures.detailed_crops(pictures, size), list(conventional)
+    sensor = bench.sensor(bench.near)
+    return [figures.crop_around(sensor, place, size) for place in CHECK_PLACES.values()], list(CHECK_PLACES)
 
 
 # --- the end ---
 
 
-def _finish(work: _Work, bench: Bench, truth: str) -> DemoReport:
-    folder = work.folder
-    rows = [
-        SheetRow(row.title, row.text, [(name, folder / file) for name, file in row.pictures])
-        for row in story.sheet_rows(bench, work.psnr, work.timings)
-    ]
-    work.draw("contact-sheet.png", figures.contact_sheet("Virtual Computational Camera", rows))
-    page = work.path("index.html")
-    write_page(page, story.TITLE, story.introduction(bench, work.timings), work.told.sections(work.timings))
-    first = [page, folder / "contact-sheet.png"]
-    files = (*first, *(file for file in work.files if file not in first))
-    report = DemoReport(folder, files, tuple(work.timings), dict(work.psnr), truth, repr(bench.light_field))
+def _finish(work: _Work, bench: Bench, exposure: float) -> DemoReport:
+    work.draw("contact-sheet.png", drawn_sheet(work.folder, bench, work.psnr, work.timings))
+    write_page(
+        work.path("index.html"),
+        "demo/page.html",
+        title="A virtual computational camera at work",
+        bench=bench,
+        disparities=bench.light_field.measured_disparity_range() or (0.0, 0.0),
+        exposure=exposure,
+        psnr=work.psnr,
+        timings=work.timings,
+        compared=[timing for timing in work.timings if timing.compared],
+        gaps=work.gaps,
+    )
+    files = (*work.files[:-3:-1], *work.files[:-2])
+    report = DemoReport(
+        work.folder, files, tuple(work.timings), work.psnr, truth_in_words(bench), repr(bench.light_field)
+    )
     _print(work.console, report)
     return report
 
@@ -365,7 +333,7 @@ def _print(console: Console, report: DemoReport) -> None:
         table.add_column(name, justify="right")
     table.add_column("", style="dim")
     for timing in report.timings:
-        table.add_row(timing.step, duration(timing.first), duration(timing.again), speed_up(timing), timing.note)
+        table.add_row(timing.step, duration(timing.first), duration(timing.again), timing.speed_up, timing.note)
     console.print(table)
     best = max(report.psnr, key=lambda name: report.psnr[name] if math.isfinite(report.psnr[name]) else -1.0)
     console.print(

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo import story
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.optics import Biprism, Lens
 from vcc.optics.sensor import Sensor
 from vcc.recover import BiprismStereo, StereoDepth, depth_by_biprism
 from vcc.showcase import figures
 from vcc.showcase.bench import APERTURE, Bench
+from vcc.showcase.words import away, paragraphs
 from vcc.sources import PlanesScene
 
 if TYPE_CHECKING:
@@ -68,18 +68,7 @@ def run(bench: Bench, progress: Progress) -> Result:
             ),
         ),
     )
-    text = paragraphs(
-        [
-            f"A biprism of δ = {stereo.deflection:.3f} for each face stands {story.length(stereo.ahead)} before "
-            f"a lens of f = {story.length(bench.focal_length)} and {story.length(OPENING)} opening. Each half of "
-            "the sensor looks through one face: two cameras with a baseline of 2·δ·a = "
-            f"{story.length(stereo.baseline)}, turned towards each other by 2·δ.",
-            "A point’s two pictures are 2·δ·d·Z/(Z + a) apart. Blocks of one half are looked for in the other by "
-            "normalised correlation, then to a fraction of a pixel along the gradient (Lucas and Kanade), and "
-            "Z = a·Δ/(2·δ·d − Δ). The parameters are ours, chosen such that the light field holds all rays; the "
-            "geometry is theirs.",
-        ]
-    )
+    text = paragraphs("gallery/prose/biprism-stereo.txt", stereo=stereo, bench=bench, opening=OPENING)
     return Result(text, pictures, tuple(numbers), bench.assumed)
 
 
@@ -120,7 +109,7 @@ def _against_the_scene(
         off = float(np.median(np.abs(depth.distance[alone] / plane.distance - 1)))
         share = f"{np.count_nonzero(alone):,} blocks; {np.mean(errors < 0.1):.0%} within 0.1 pixel"
         claim = f"2·δ·d·Z/(Z + a) = {expected:.2f} pixels, within 0.1"
-        where, median = story.away(plane.distance), float(np.median(errors))
+        where, median = away(plane.distance), float(np.median(errors))
         numbers += [
             Finding(f"disparity {where}: median error", claim, median, "pixels", median <= 0.1, share),
             Finding(f"distance {where}: median error", "within 2 %", 100 * off, "%", off <= 0.02),

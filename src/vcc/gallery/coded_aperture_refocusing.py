@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.analysis import psf
+from vcc.base.measures import psnr
 from vcc.camera import Camera
-from vcc.demo import story
 from vcc.gallery import flat_target
-from vcc.gallery.closeness import psnr
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.gallery.flat_target import OPENING
 from vcc.gallery.published_codes import VEERARAGHAVAN
 from vcc.optics import Lens, Mask
@@ -24,6 +24,7 @@ from vcc.shapes.patterns import Open
 from vcc.showcase import figures
 from vcc.showcase.bench import APERTURE, Bench
 from vcc.showcase.scene import MIDDLE
+from vcc.showcase.words import away, paragraphs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,10 +40,6 @@ NOISES = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02)
 """Those that gains are drawn for."""
 FULL_WELL, READ_NOISE = 10_000.0, 2.5
 """Electrons at white through the open aperture, and of reading a pixel: `vcc.optics.electronics`' defaults."""
-TARGET = 300
-"""Largest side of the flat target, pixels."""
-STEPS = 60
-"""Of the iterative solver, at most."""
 CHART_PART = (-60e-3, -100e-3, 160e-3, 100e-3)
 """A part of the built-in scene's chart that nothing stands before: left, top, right, bottom from its middle, m."""
 LOST = 0.01
@@ -68,58 +65,105 @@ class Deblurred:
     sparse: Array
 
 
-def run(bench: Bench, progress: Progress) -> Result:
-    """The flat target through both apertures, the gain over noise, and the scene refocused."""
-    masks = {"open": Mask(Open(), width=OPENING), "coded": Mask(VEERARAGHAVAN, width=OPENING)}
-    target = flat_target.grey_view(bench, TARGET)
-    steps = 2 * STEPS + 20
-    kernels = {name: flat_target.kernel(mask, BLUR) for name, mask in masks.items()}
-    clean = {name: flat_target.recorded(mask, target, BLUR) for name, mask in masks.items()}
-    deblurred = {
-        name: _deblurred(
-            _noisy(clean[name], NOISE),
-            kernels[name],
-            NOISE,
-            _after(progress, part * STEPS, steps),
-        )
-        for part, name in enumerate(masks)
-    }
-    progress(2 * STEPS, steps)
-    gains = [_linear_gain(clean, kernels, target, noise) for noise in NOISES]
-    photons = _photon_gain(clean, kernels, target)
-    progress(2 * STEPS + 5, steps)
-    rows, findings, words = _scene(bench)
-    progress(steps, steps)
-    numbers = (*_findings(deblurred, target), *findings, _photon_finding(photons))
-    pictures = (
-        (
-            Picture(
-                "psf",
-                "The blur of a point and its spectrum",
-                "The open aperture’s MTF has lines of zeros, where detail is lost; the mask’s has few of them.",
-                _spectra_figure(masks),
-            ),
-        ),
-        (
-            Picture(
-                "target",
-                "A flat target out of focus, recorded and deblurred",
-                "Decibels are those of the whole target. Exposure time and noise are the same for both.",
-                _target_figure(deblurred, target),
-            ),
-        ),
-        *rows,
-        (
-            Picture(
-                "noise",
-                "Gain over noise",
-                "By the Wiener filter, which knows the noise; the open aperture’s picture is the recording where "
-                "that is better.",
-                _noise_figure(gains),
-            ),
-        ),
+Noise = Callable[[Array], tuple[Array, float]]
+"""Gives a recording its noise, and says how much that is in the mean, as shares of white."""
+
+
+def additive(noise: float) -> Noise:
+    """Gaussian noise, the same for all that have as many pixels."""
+    return lambda recording: (recording + noise * np.random.default_rng(0).standard_normal(recording.shape), noise)
+
+
+def of_photons(recording: Array) -> tuple[Array, float]:
+    """The noise of photons and of reading."""
+    random = np.random.default_rng(0)
+    charge = random.poisson(FULL_WELL * np.maximum(recording, 0)) + READ_NOISE * random.standard_normal(
+        recording.shape
     )
-    return Result(paragraphs([*_words(), words]), pictures, numbers, bench.assumed)
+    return charge / FULL_WELL, math.sqrt(max(float(charge.mean()), 0.0) + READ_NOISE**2) / FULL_WELL
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """The flat target through the open and the coded aperture, without noise.
+
+    Args:
+        target: radiances, (rows, columns).
+        masks: by name, "open" and "coded".
+        clean: recordings; 1 is radiance 1 through the open aperture.
+        kernels: what becomes of a point.
+    """
+
+    target: Array
+    masks: dict[str, Mask]
+    clean: dict[str, Array]
+    kernels: dict[str, Array]
+
+    @classmethod
+    def of(cls, target: Array) -> Recordings:
+        """Recorded through both."""
+        masks = {"open": Mask(Open(), width=OPENING), "coded": Mask(VEERARAGHAVAN, width=OPENING)}
+        clean = {name: flat_target.recorded(mask, target, BLUR) for name, mask in masks.items()}
+        return cls(target, masks, clean, {name: flat_target.kernel(mask, BLUR) for name, mask in masks.items()})
+
+    def exposed(self, name: str, noise: Noise) -> tuple[Array, Array, float]:
+        """A recording with its noise, its kernel and how much noise that is, all over the light that passes."""
+        passed = float(self.kernels[name].sum())
+        noisy, level = noise(self.clean[name])
+        return noisy / passed, self.kernels[name] / passed, level / passed
+
+    def gain(self, noise: Noise) -> float:
+        """The coded aperture's decibels by the Wiener filter over the open one's, by the filter or without."""
+        return self._reached("coded", noise)[1] - max(self._reached("open", noise))
+
+    def _reached(self, name: str, noise: Noise) -> tuple[float, float]:
+        """Decibels as recorded, and by the filter."""
+        white, spread, level = self.exposed(name, noise)
+        filtered = wiener(white, spread, level, borders="periodic").picture
+        return psnr(white, self.target, peak=1.0), psnr(filtered, self.target, peak=1.0)
+
+
+@dataclass(frozen=True)
+class Run:
+    """The flat target through both apertures, the gain over noise, and the scene refocused.
+
+    Args:
+        target: largest side of the flat target, pixels.
+        iterations: of the solver, at most.
+        noises: those that gains are drawn for.
+    """
+
+    target: int = 300
+    iterations: int = 60
+    noises: tuple[float, ...] = NOISES
+
+    def __call__(self, bench: Bench, progress: Progress) -> Result:
+        """Take the middle view, and then the light field, through both cameras, and measure."""
+        recordings = Recordings.of(flat_target.grey_view(bench, self.target))
+        steps = 2 * self.iterations + 20
+        deblurred = {
+            name: self._deblurred(recordings, name, _after(progress, part * self.iterations, steps))
+            for part, name in enumerate(recordings.masks)
+        }
+        progress(2 * self.iterations, steps)
+        gains = {noise: recordings.gain(additive(noise)) for noise in self.noises}
+        photons = recordings.gain(of_photons)
+        progress(2 * self.iterations + 5, steps)
+        refocusing = Refocusing.of(bench)
+        scene = refocusing.done() if refocusing.shown else None
+        progress(steps, steps)
+        numbers = (*_findings(deblurred, recordings.target), *_scene_findings(scene), _photon_finding(photons))
+        pictures = _pictures(recordings, deblurred, gains)
+        shown = (*pictures[:2], *([] if scene is None else _scene_pictures(scene)), *pictures[2:])
+        return Result(_text(bench, refocusing), shown, numbers, bench.assumed)
+
+    def _deblurred(self, recordings: Recordings, name: str, progress: Progress) -> Deblurred:
+        white, spread, noise = recordings.exposed(name, additive(NOISE))
+        linear = wiener(white, spread, noise, borders="periodic").picture
+        sparse = sparse_gradients(
+            white, spread, noise, borders="periodic", iterations=self.iterations, progress=progress
+        ).picture
+        return Deblurred(white, linear, sparse)
 
 
 def _after(progress: Progress, before: int, steps: int) -> Progress:
@@ -127,70 +171,25 @@ def _after(progress: Progress, before: int, steps: int) -> Progress:
     return lambda done, total: progress(before + done, steps)
 
 
-def _noisy(recording: Array, noise: float) -> Array:
-    return np.asarray(recording + noise * np.random.default_rng(0).standard_normal(recording.shape))
-
-
-def _deblurred(recording: Array, kernel: Array, noise: float, progress: Progress) -> Deblurred:
-    passed = float(kernel.sum())
-    white, spread, uncertain = recording / passed, kernel / passed, noise / passed
-    linear = wiener(white, spread, uncertain, borders="periodic").picture
-    sparse = sparse_gradients(
-        white, spread, uncertain, borders="periodic", iterations=STEPS, progress=progress
-    ).picture
-    return Deblurred(white, linear, sparse)
-
-
-def _linear_gain(clean: dict[str, Array], kernels: dict[str, Array], target: Array, noise: float) -> float:
-    """The coded aperture's decibels by the Wiener filter over the open one's, by the filter or without."""
-    found = {}
-    for name, kernel in kernels.items():
-        passed = float(kernel.sum())
-        white = _noisy(clean[name], noise) / passed
-        found[name] = psnr(wiener(white, kernel / passed, noise / passed, borders="periodic").picture, target)
-        if name == "open":
-            found[name] = max(found[name], psnr(white, target))
-    return found["coded"] - found["open"]
-
-
-def _photon_gain(clean: dict[str, Array], kernels: dict[str, Array], target: Array) -> float:
-    """The same with the noise of photons and of reading, instead of noise that is the same for both."""
-    found = {}
-    for name, kernel in kernels.items():
-        passed = float(kernel.sum())
-        random = np.random.default_rng(0)
-        charge = random.poisson(FULL_WELL * np.maximum(clean[name], 0)) + READ_NOISE * random.standard_normal(
-            clean[name].shape
-        )
-        noise = math.sqrt(max(float(charge.mean()), 0.0) + READ_NOISE**2) / FULL_WELL  # its mean over the picture
-        white = charge / FULL_WELL / passed
-        found[name] = psnr(wiener(white, kernel / passed, noise / passed, borders="periodic").picture, target)
-        if name == "open":
-            found[name] = max(found[name], psnr(white, target))
-    return found["coded"] - found["open"]
-
-
 def _findings(deblurred: dict[str, Deblurred], target: Array) -> list[Finding]:
     opened, coded = deblurred["open"], deblurred["coded"]
-    without = psnr(opened.recording, target)
+    without = psnr(opened.recording, target, peak=1.0)
     numbers = []
     for what, name, rivals in (
         ("Wiener filter", "linear", ("linear",)),
         ("sparse gradients; the open aperture by whichever is best", "sparse", ("linear", "sparse")),
     ):
-        ours = psnr(getattr(coded, name), target)
-        best = max(without, *(psnr(getattr(opened, rival), target) for rival in rivals))
-        numbers.append(
-            Finding(
-                f"flat target, blur of {BLUR} pixels, deblurred ({what}): gain of the mask over the open aperture",
-                "2 dB or more at the same noise",
-                ours - best,
-                "dB",
-                ours - best >= 2,
-                f"{ours:.1f} dB against {best:.1f} dB ({without:.1f} dB as recorded)",
-            )
-        )
+        ours = psnr(getattr(coded, name), target, peak=1.0)
+        best = max(without, *(psnr(getattr(opened, rival), target, peak=1.0) for rival in rivals))
+        what = f"flat target, blur of {BLUR} pixels, deblurred ({what}): gain of the mask over the open aperture"
+        numbers.append(_gain_finding(what, ours, best, without))
     return numbers
+
+
+def _gain_finding(what: str, ours: float, best: float, without: float) -> Finding:
+    """The mask's decibels over the best of the open aperture's, which has ``without`` as recorded."""
+    why = f"{ours:.1f} dB against {best:.1f} dB ({without:.1f} dB as recorded)"
+    return Finding(what, "2 dB or more at the same noise", ours - best, "dB", ours - best >= 2, why)
 
 
 def _photon_finding(gain: float) -> Finding:
@@ -205,116 +204,179 @@ def _photon_finding(gain: float) -> Finding:
     )
 
 
-def _words() -> list[str]:
+def _text(bench: Bench, refocusing: Refocusing) -> str:
+    return paragraphs(
+        "gallery/prose/coded-aperture-refocusing.txt",
+        bench=bench,
+        refocusing=refocusing,
+        focal_length=flat_target.FOCAL_LENGTH,
+        focus=flat_target.FOCUS,
+        target=flat_target.DISTANCE,
+        opening=OPENING,
+        blur=BLUR,
+        cells=CELLS,
+        noise=NOISE,
+        misfit=MISFIT,
+        aperture=APERTURE,
+    )
+
+
+def _pictures(
+    recordings: Recordings, deblurred: dict[str, Deblurred], gains: dict[float, float]
+) -> list[tuple[Picture, ...]]:
     return [
-        f"A lens of f = {story.length(flat_target.FOCAL_LENGTH)} with a square opening of "
-        f"{story.length(OPENING)}, and in it, for one of two cameras, the mask of 7×7 cells, 20 of which are "
-        "open. A point out of focus becomes a picture of the aperture. That of an open square has a spectrum with "
-        "zeros: detail there is lost. The authors chose the code for a broad spectrum, so that what blur weakens "
-        "can be given back.",
-        "A flat target, the middle of the middle view, stands "
-        f"{story.away(flat_target.DISTANCE)} before cameras focused {story.away(flat_target.FOCUS)}: its blur is "
-        f"{BLUR} pixels wide, {BLUR // CELLS} for each cell. The exposure time is the same, and so is the noise, "
-        f"in the sensor’s own units: additive, Gaussian, with a standard deviation of {100 * NOISE:g} % of white "
-        "through the open aperture. The mask lets 20/49 of the light through: brightened to the same white, its "
-        "picture has 2.45 times the noise.",
-        "The point-spread function is what each simulated camera makes of one point of the target, whose "
-        "distance is known. Two decoders, both told the noise: the Wiener filter with a 1/f² prior, and the "
-        "solver for sparse gradients (total variation) of <code>vcc.recover</code>. The target repeats beyond its "
-        "borders, so that borders play no part.",
-    ]
-
-
-def _scene(bench: Bench) -> tuple[list[tuple[Picture, ...]], list[Finding], str]:
-    """The light field, focused nearer, recorded through both apertures and refocused on its middle distance."""
-    slope = abs(float(bench.light_field.frame.linear[2, 2]))
-    # Views that differ by more than a pixel hold no such blur: then the camera is focused less near.
-    most = min(bench.light_field.shape[:2])
-    blur = min(APERTURE * (1 / bench.near - 1 / bench.middle) / slope, most)
-    focus = 1 / (1 / bench.middle + blur * slope / APERTURE)
-    if blur < SMALLEST_BLUR:
-        words = f"Out of focus, this light field has a blur of {blur:.1f} pixels only: it is not refocused here."
-        return [], [], words
-    sharp_camera = _scene_camera(bench, Mask(Open(), width=APERTURE), bench.middle)
-    truth = sharp_camera.capture(bench.light_field, interpolation="cubic")
-    scale = sharp_camera.sensor.z**2 / APERTURE**2
-    sharp = truth.to_numpy().astype(np.float64) * scale
-    white = float(np.percentile(sharp, 99.5)) if bench.scene is None else 1.0
-    pictures = {"sharp": sharp}
-    for name, mask in (("open", Mask(Open(), width=APERTURE)), ("coded", Mask(VEERARAGHAVAN, width=APERTURE))):
-        camera = _scene_camera(bench, mask, focus)
-        recording = camera.capture(bench.light_field, interpolation="cubic").to_numpy().astype(np.float64)
-        point = psf(camera, bench.middle)
-        passed = point.collecting_area / APERTURE**2
-        noisy = _noisy(recording * camera.sensor.z**2 / APERTURE**2, NOISE * white) / passed
-        spread = point.values / point.values.sum()
-        pictures[f"{name}-recorded"] = noisy
-        noise = math.hypot(NOISE * white / passed, MISFIT * float(noisy.std()))
-        pictures[name] = wiener(noisy, spread, noise).picture
-    titles = {
-        "open-recorded": f"Open aperture, focused {story.away(focus)}, as recorded",
-        "open": f"Refocused {story.away(bench.middle)}: open aperture",
-        "coded": f"Refocused {story.away(bench.middle)}: coded aperture",
-        "coded-recorded": f"Coded aperture, focused {story.away(focus)}, as recorded",
-    }
-    shown = {name: figures.values_shown(picture[::-1, ::-1], white) for name, picture in pictures.items()}
-    rows = [
-        tuple(Picture(f"scene-{name}", titles[name], "", shown[name]) for name in pair)
-        for pair in (("open-recorded", "coded-recorded"), ("open", "coded"))
-    ]
-    rows.append(
         (
             Picture(
-                "scene-close-up",
-                f"The middle of the scene, what is {story.away(bench.middle)}",
-                "Pixels as they are, not smoothed.",
-                figures.close_ups(
-                    [
-                        ("focused there", shown["sharp"]),
-                        ("open, as recorded", shown["open-recorded"]),
-                        ("open, refocused", shown["open"]),
-                        ("coded, refocused", shown["coded"]),
-                    ],
-                    [_middle(shown["sharp"])],
-                    ["middle"],
-                ),
+                "psf",
+                "The blur of a point and its spectrum",
+                "The open aperture’s MTF has lines of zeros, where detail is lost; the mask’s has few of them.",
+                _spectra_figure(recordings.masks),
             ),
-        )
+        ),
+        (
+            Picture(
+                "target",
+                "A flat target out of focus, recorded and deblurred",
+                "Decibels are those of the whole target. Exposure time and noise are the same for both.",
+                _target_figure(deblurred, recordings.target),
+            ),
+        ),
+        (
+            Picture(
+                "noise",
+                "Gain over noise",
+                "By the Wiener filter, which knows the noise; the open aperture’s picture is the recording where "
+                "that is better.",
+                _noise_figure(gains),
+            ),
+        ),
+    ]
+
+
+# --- the scene ---
+
+
+@dataclass(frozen=True)
+class Refocusing:
+    """The light field, focused nearer, to be refocused on its middle distance.
+
+    Args:
+        bench: whose light field it is.
+        blur: of what is at the middle distance, pixels.
+        focus: where the cameras are focused, metres.
+    """
+
+    bench: Bench
+    blur: float
+    focus: float
+
+    @classmethod
+    def of(cls, bench: Bench) -> Refocusing:
+        """Focused near, or less near: views that differ by more than a pixel hold no such blur."""
+        slope = abs(float(bench.light_field.frame.linear[2, 2]))
+        most = min(bench.light_field.shape[:2])
+        blur = min(APERTURE * (1 / bench.near - 1 / bench.middle) / slope, most)
+        return cls(bench, blur, 1 / (1 / bench.middle + blur * slope / APERTURE))
+
+    @property
+    def shown(self) -> bool:
+        """Whether there is enough blur to take away."""
+        return self.blur >= SMALLEST_BLUR
+
+    def camera(self, mask: Mask, focus: float) -> Camera:
+        """Pixels of all these cameras see the same angles, so that their pictures lie pixel on pixel."""
+        distance = self.bench.image_distance(focus)
+        angles = [pitch / self.bench.image_distance(self.bench.middle) for pitch in self.bench.pitch]
+        rows, columns = self.bench.light_field.shape[2:4]
+        sensor = Sensor(distance, (rows, columns), (angles[0] * distance, angles[1] * distance))
+        return Camera([Lens(self.bench.focal_length), mask], sensor)
+
+    def done(self) -> Refocused:
+        """Recorded through both apertures and refocused."""
+        sharp_camera = self.camera(Mask(Open(), width=APERTURE), self.bench.middle)
+        sharp = self._recorded(sharp_camera)
+        white = float(np.percentile(sharp, 99.5)) if self.bench.scene is None else 1.0
+        pictures = {"sharp": sharp}
+        for name, mask in (("open", Mask(Open(), width=APERTURE)), ("coded", Mask(VEERARAGHAVAN, width=APERTURE))):
+            pictures[f"{name}-recorded"], pictures[name] = self._restored(mask, white)
+        return Refocused(self, pictures, white, chart(sharp_camera))
+
+    def _recorded(self, camera: Camera) -> Array:
+        """As light lands; 1 is radiance 1 through the whole square opening."""
+        image = camera.capture(self.bench.light_field, interpolation="cubic")
+        return image.to_numpy().astype(np.float64) * camera.sensor.z**2 / APERTURE**2
+
+    def _restored(self, mask: Mask, white: float) -> tuple[Array, Array]:
+        """A recording with its noise over the light that passes, and refocused."""
+        camera = self.camera(mask, self.focus)
+        point = psf(camera, self.bench.middle)
+        passed = point.collecting_area / APERTURE**2
+        noisy = additive(NOISE * white)(self._recorded(camera))[0] / passed
+        noise = math.hypot(NOISE * white / passed, MISFIT * float(noisy.std()))
+        return noisy, wiener(noisy, point.values / point.values.sum(), noise).picture
+
+
+@dataclass(frozen=True, eq=False)
+class Refocused:
+    """What came of it.
+
+    Args:
+        refocusing: of what.
+        pictures: "sharp", "open-recorded", "open", "coded-recorded" and "coded", as light lands.
+        white: radiance.
+        chart: rows and columns of `CHART_PART`; only in the built-in scene is something there.
+    """
+
+    refocusing: Refocusing
+    pictures: dict[str, Array]
+    white: float
+    chart: tuple[slice, slice]
+
+    @property
+    def shown(self) -> dict[str, figures.Shown]:
+        """Upright."""
+        return {name: figures.values_shown(each[::-1, ::-1], self.white) for name, each in self.pictures.items()}
+
+
+def _scene_pictures(scene: Refocused) -> list[tuple[Picture, ...]]:
+    there, focused = away(scene.refocusing.bench.middle), away(scene.refocusing.focus)
+    titles = {
+        "open-recorded": f"Open aperture, focused {focused}, as recorded",
+        "coded-recorded": f"Coded aperture, focused {focused}, as recorded",
+        "open": f"Refocused {there}: open aperture",
+        "coded": f"Refocused {there}: coded aperture",
+    }
+    columns = {
+        "sharp": "focused there",
+        "open-recorded": "open, as recorded",
+        "open": "open, refocused",
+        "coded": "coded, refocused",
+    }
+    shown = scene.shown
+    close = figures.close_ups(
+        [(words, shown[name]) for name, words in columns.items()], [_middle(shown["sharp"])], ["middle"]
     )
-    words = (
-        f"Below, the light field itself through both apertures, {story.length(APERTURE)} wide and focused "
-        f"{story.away(focus)}, with the same noise. The Wiener filter takes away the blur of what is "
-        f"{story.away(bench.middle)}, {blur:.1f} pixels, by the camera’s point-spread function for that distance "
-        "(<code>vcc.analysis.psf</code>). To this filter, things at other distances are wrong, as errors of "
-        f"{100 * MISFIT:g} % of the contrast beside the noise; they come out wrong, too, as out of focus in any "
-        "refocused picture."
+    whole = [Picture(f"scene-{name}", title, "", shown[name]) for name, title in titles.items()]
+    title = f"The middle of the scene, what is {there}"
+    close_up = Picture("scene-close-up", title, "Pixels as they are, not smoothed.", close)
+    return [(whole[0], whole[1]), (whole[2], whole[3]), (close_up,)]
+
+
+def _scene_findings(scene: Refocused | None) -> list[Finding]:
+    """The gain where things are at a known distance; nobody knows where in someone's own scene that is."""
+    if scene is None or scene.refocusing.bench.scene is None:
+        return []
+    sharp = scene.pictures["sharp"][scene.chart]
+    found = {name: psnr(each[scene.chart], sharp, peak=1.0) for name, each in scene.pictures.items()}
+    what = (
+        f"the scene’s chart, blur of {scene.refocusing.blur:.1f} pixels, refocused by the Wiener filter: gain of "
+        "the mask"
     )
-    if bench.scene is None:
-        return rows, [], words
-    part = _chart(sharp_camera)
-    found = {name: psnr(pictures[name][part], sharp[part]) for name in pictures if name != "sharp"}
     best = max(found["open"], found["open-recorded"])
-    finding = Finding(
-        f"the scene’s chart, blur of {blur:.1f} pixels, refocused by the Wiener filter: gain of the mask",
-        "2 dB or more at the same noise",
-        found["coded"] - best,
-        "dB",
-        found["coded"] - best >= 2,
-        f"{found['coded']:.1f} dB against {best:.1f} dB ({found['open-recorded']:.1f} dB as recorded)",
-    )
-    return rows, [finding], words
+    return [_gain_finding(what, found["coded"], best, found["open-recorded"])]
 
 
-def _scene_camera(bench: Bench, mask: Mask, focus: float) -> Camera:
-    """Pixels of all these cameras see the same angles, so that their pictures lie pixel on pixel."""
-    distance = bench.image_distance(focus)
-    angles = [pitch / bench.image_distance(bench.middle) for pitch in bench.pitch]
-    rows, columns = bench.light_field.shape[2:4]
-    sensor = Sensor(distance, (rows, columns), (angles[0] * distance, angles[1] * distance))
-    return Camera([Lens(bench.focal_length), mask], sensor)
-
-
-def _chart(camera: Camera) -> tuple[slice, slice]:
+def chart(camera: Camera) -> tuple[slice, slice]:
     """Rows and columns, as light lands on the sensor, of `CHART_PART`."""
     rows, columns = camera.sensor.shape
     sides = []
@@ -363,27 +425,27 @@ def _spectra_figure(masks: dict[str, Mask]) -> Figure:
 
 
 def _target_figure(deblurred: dict[str, Deblurred], target: Array) -> Figure:
-    figure = figures.new_figure(10.5, 5.8)
     side = min(*target.shape, 160)
     top, left = ((n - side) // 2 for n in target.shape)
+
+    def part(picture: Array) -> figures.Shown:
+        return figures.grey_shown(picture[top : top + side, left : left + side])
+
     kinds = (("recording", "as recorded"), ("linear", "Wiener"), ("sparse", "sparse gradients"))
-    grid = figure.subplots(2, 4)
-    for row, (name, found) in zip(grid, deblurred.items(), strict=True):
-        columns = [(f"{name}, {words}", getattr(found, kind)) for kind, words in kinds]
-        if name == "open":
-            columns.append(("true", target))
-        for axes, (words, picture) in zip(row, columns, strict=False):
-            part = np.clip(picture[top : top + side, left : left + side], 0, 1).astype(np.float32)
-            value = "" if words == "true" else f": {psnr(picture, target):.1f} dB"
-            figures.put(axes, part ** np.float32(1 / 2.2), words + value, cmap="gray", vmin=0, vmax=1)
-    grid[1, 3].set_axis_off()
+    rows = []
+    for name, found in deblurred.items():
+        pictures = [(f"{name}, {words}", getattr(found, kind)) for kind, words in kinds]
+        rows.append([(f"{words}: {psnr(each, target, peak=1.0):.1f} dB", part(each)) for words, each in pictures])
+    rows[0].append(("true", part(target)))
+    figure = figures.new_figure(10.5, 5.8)
+    figures.fill(figure.subplots(2, 4), rows, cmap="gray", vmin=0, vmax=1)
     return figure
 
 
-def _noise_figure(gains: list[float]) -> Figure:
+def _noise_figure(gains: dict[float, float]) -> Figure:
     figure = figures.new_figure(6.5, 3.4)
     axes = figure.subplots()
-    axes.semilogx(100 * np.array(NOISES), gains, "o-", color=figures.ACCENT, linewidth=1.4)
+    axes.semilogx(100 * np.array(list(gains)), list(gains.values()), "o-", color=figures.ACCENT, linewidth=1.4)
     axes.axhline(2, color=figures.QUIET, linewidth=0.9, linestyle=(0, (6, 4)))
     axes.axhline(0, color=figures.INK, linewidth=0.9)
     axes.set_xlabel("noise [% of white through the open aperture]", fontsize=figures.LABEL)
@@ -402,5 +464,5 @@ ENTRY = Entry(
     "section 4",
     "A broadband mask in the aperture keeps the detail that defocus loses, so that a picture can be refocused at "
     "full resolution.",
-    run,
+    Run(),
 )

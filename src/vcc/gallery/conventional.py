@@ -11,12 +11,14 @@ from vcc.base.affine import Affine
 from vcc.base.errors import ResultWarning
 from vcc.base.units import um
 from vcc.camera import Camera
-from vcc.demo import story
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.light_field import LightField
 from vcc.optics.sensor import Sensor
+from vcc.plot import plot_phase_space_stages
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
+from vcc.showcase.scene import CHECK_PLACES, PLACES
+from vcc.showcase.words import away, length, paragraphs
 
 POINT_VIEWS = 60
 """Views a side of the light field of a point: a disc of so many cells has its second moment within 0.1 %."""
@@ -25,16 +27,13 @@ POINT_PITCH = 4 * um
 
 def run(bench: Bench, progress: Progress) -> Result:
     """Pictures focused on three distances, phase space on the way, and the blur of points by closed form."""
-    from vcc.plot import plot_phase_space_stages
-
-    distances = {"near": bench.near, "middle": bench.middle, "far": bench.far}
     exposure = bench.exposure(bench.conventional(bench.middle), bench.diameter)
     taken, pictures = {}, []
-    for done, (name, distance) in enumerate(distances.items()):
+    for done, (name, distance) in enumerate(bench.distances.items()):
         progress(done, 4)
         image = bench.conventional(distance).capture(bench.light_field)
         taken[name] = figures.shown(image, exposure)
-        caption = f"Sensor at {story.length(bench.image_distance(distance))}, focused {story.away(distance)}."
+        caption = f"Sensor at {length(bench.image_distance(distance))}, focused {away(distance)}."
         pictures.append(Picture(f"focused-{name}", f"Focused {name}", caption, taken[name]))
     progress(3, 4)
     points = plot_phase_space_stages(
@@ -51,17 +50,8 @@ def run(bench: Bench, progress: Progress) -> Result:
         ),
         Picture("phase-space-scene", "Phase space of the scene", "One row of pixels, focused far.", scene),
     )
-    text = paragraphs(
-        [
-            f"A thin lens of f = {story.length(bench.focal_length)} and {story.length(bench.diameter)} "
-            "opening, and a "
-            "sensor at 1/d = 1/f − 1/Z. Lens and flight are matrices on the light field’s frame; the picture is "
-            "its integral over slopes. A thing in focus stands upright in phase space at the sensor: "
-            "all of its rays "
-            "have one u."
-        ]
-    )
-    numbers = (*_in_focus(bench, list(taken.values())), *_blurs(bench, distances))
+    numbers = (*_in_focus(bench, list(taken.values())), *_blurs(bench))
+    text = paragraphs("gallery/prose/conventional.txt", bench=bench)
     return Result(text, (tuple(pictures), *((stage,) for stage in stages)), numbers, bench.assumed)
 
 
@@ -69,34 +59,31 @@ def _in_focus(bench: Bench, taken: list[figures.Shown]) -> list[Finding]:
     """For how many things the picture focused on them is the sharpest."""
     if bench.scene is None:
         return []  # nobody knows where in someone's own scene things are at which distance
-    rows, columns = bench.light_field.shape[2:4]
-    size = max(min(rows, columns) // 20, 8)  # small enough to lie on a leaf
+    size = max(min(bench.light_field.shape[2:4]) // 20, 8)  # small enough to lie on a leaf
     right = 0
-    places = (story.CHECK_PLACES["leaf"], story.PLACES["the chart's star"], story.PLACES["lamps of the town"])
-    for place, (x, y, distance) in enumerate(places):
-        sensor = bench.sensor(distance)
-        column = (columns - 1) / 2 + x / distance * sensor.z / sensor.pitches[1]
-        row = (rows - 1) / 2 + y / distance * sensor.z / sensor.pitches[0]
-        crop = figures.Crop(round(row) - size // 2, round(column) - size // 2, size)
+    places = (CHECK_PLACES["leaf"], PLACES["the chart's star"], PLACES["lamps of the town"])
+    for number, place in enumerate(places):
+        crop = figures.crop_around(bench.sensor(place[2]), place, size)
         detail = [float(np.square(np.diff(crop.of(picture), axis=1)).mean()) for picture in taken]
-        right += int(np.argmax(detail)) == place
+        right += int(np.argmax(detail)) == number
     claim = "leaves, chart and town each in the picture focused there"
     return [Finding("things that are sharpest where focused", claim, right, "of 3", right == 3)]
 
 
-def _blurs(bench: Bench, distances: dict[str, float]) -> list[Finding]:
+def _blurs(bench: Bench) -> list[Finding]:
     """The spread of the picture of a point, focused in the middle, beside D·d·|1/Z − 1/F|/4 of geometry."""
     found = []
     distance_to_sensor = bench.image_distance(bench.middle)
     for name in ("near", "far"):
-        defocus = 1 / distances[name] - 1 / bench.middle
+        distance = bench.distances[name]
+        defocus = 1 / distance - 1 / bench.middle
         expected = bench.diameter * distance_to_sensor * abs(defocus) / 4
         pixels = 2 * math.ceil(2.3 * expected / POINT_PITCH) + 9
         camera = Camera([bench.lens], Sensor(distance_to_sensor, (pixels, pixels), POINT_PITCH))
         with warnings.catch_warnings():
             # All that the light field holds is the point: the sensor looks past it, as it should.
             warnings.simplefilter("ignore", ResultWarning)
-            image = camera.capture(_point(distances[name], bench.diameter), between_views="none").to_numpy()
+            image = camera.capture(_point(distance, bench.diameter), between_views="none").to_numpy()
         x = camera.sensor.column_places
         across = image.sum(axis=0, dtype=np.float64)
         # A pixel and the point's own width add their variances.
@@ -104,7 +91,7 @@ def _blurs(bench: Bench, distances: dict[str, float]) -> list[Finding]:
         spread = math.sqrt(max(float(across @ x**2 / across.sum()) - extra, 0.0))
         found.append(
             Finding(
-                f"blur of a point {story.away(distances[name])}, focused {story.away(bench.middle)}: σ",
+                f"blur of a point {away(distance)}, focused {away(bench.middle)}: σ",
                 f"D·d·|1/Z − 1/F|/4 = {expected / um:.1f} µm, within 1 %",
                 spread / um,
                 "µm",
@@ -128,8 +115,7 @@ ENTRY = Entry(
     "conventional",
     "Conventional camera",
     "C. Zhou, Virtual Computational Camera, 2009, Example 1",
-    "A lens and a sensor record one distance sharply; in phase space, flight and lens are shears, and "
-    "the sensor is a "
-    "projection along slopes.",
+    "A lens and a sensor record one distance sharply; in phase space, flight and lens are shears, and the sensor "
+    "is a projection along slopes.",
     run,
 )

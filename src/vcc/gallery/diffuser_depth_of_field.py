@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -10,15 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.demo import story
 from vcc.gallery import extended_depth
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, paragraphs
-from vcc.gallery.extended_depth import ALIKE, PUPIL, WAVELENGTH, Comparison, Elements, Measured
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Sizes
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.shapes.patterns import Circle
 from vcc.shapes.surfaces import Surface
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
+from vcc.showcase.words import away, paragraphs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -107,13 +108,13 @@ class Kinds:
     radial: tuple[Lens | PhasePlate, ...]
 
 
-def designed(bench: Bench) -> Kinds:
+def designed(bench: Bench, sizes: Sizes = FULL) -> Kinds:
     """Diffusers that bend by `MARGIN` times what defocus does at the rim.
 
     Raises:
         InputError: a range of depths so small that nothing is out of focus.
     """
-    comparison = Comparison(bench, round=True)
+    comparison = Comparison(bench, round=True, sizes=sizes)
     lens = Lens(bench.focal_length)
     strongest = MARGIN * comparison.reach * PUPIL / 2
     random, radial = (
@@ -122,134 +123,118 @@ def designed(bench: Bench) -> Kinds:
     return Kinds(comparison, strongest, (lens, Mask(Circle(PUPIL))), random, radial)
 
 
-def run(bench: Bench, progress: Progress) -> Result:
-    """PSFs over depth without and with both diffusers, a flat target restored by one filter, and the scene."""
-    kinds = designed(bench)
-    comparison, depths = kinds.comparison, kinds.comparison.depths
-    advance = Steps(progress, 3 * len(depths) + 2)
-    progress(0, advance.total)
-    cameras: dict[str, Elements] = {
-        "no diffuser": kinds.plain,
-        "random-phase": kinds.random,
-        "radial": kinds.radial,
-    }
-    found = {words: comparison.measured(elements, kinds.plain, advance) for words, elements in cameras.items()}
-    pictures = (
-        (
-            Picture(
-                "psf",
-                "Point-spread functions",
-                "From near to far, rays traced; brightness is the square root of light, each PSF by its own peak.",
-                extended_depth.spreads_figure(found, depths),
-            ),
-        ),
-        (
-            Picture(
-                "target",
-                "A flat target near, in focus and far",
-                "Restored by one filter for each camera; in focus without a diffuser no filter is needed.",
-                extended_depth.target_figure(found, depths),
-            ),
-        ),
-        (
-            Picture(
-                "contrast",
-                "Contrast",
-                "Modulation transfer along a row: in focus (full lines) and at the near end (dashed).",
-                _contrast_figure(found),
-            ),
-        ),
-        extended_depth.scene_pictures(
+@dataclass(frozen=True)
+class Run:
+    """PSFs over depth without and with both diffusers, a flat target restored by one filter, and the scene.
+
+    Args:
+        sizes: how much work it is.
+    """
+
+    sizes: Sizes = FULL
+
+    def __call__(self, bench: Bench, progress: Progress) -> Result:
+        """Take a light field through the three cameras, and measure."""
+        kinds = designed(bench, self.sizes)
+        comparison, depths = kinds.comparison, kinds.comparison.depths
+        advance = Steps(progress, 3 * len(depths) + 2)
+        progress(0, advance.total)
+        cameras = {"no diffuser": kinds.plain, "random-phase": kinds.random, "radial": kinds.radial}
+        found = {words: comparison.measured(elements, kinds.plain, advance) for words, elements in cameras.items()}
+        scene = extended_depth.scene_pictures(
             comparison,
             ("No diffuser", kinds.plain),
             ("Radial diffuser", kinds.radial),
             found["radial"].spreads,
             advance,
+        )
+        pictures = (*((picture,) for picture in _figures(found, depths)), scene)
+        return Result(_text(kinds), pictures, tuple(_findings(found, depths)), bench.assumed)
+
+
+def _figures(found: dict[str, Measured], depths: tuple[float, ...]) -> tuple[Picture, ...]:
+    return (
+        Picture(
+            "psf",
+            "Point-spread functions",
+            "From near to far, rays traced; brightness is the square root of light, each PSF by its own peak.",
+            extended_depth.spreads_figure(found, depths),
+        ),
+        Picture(
+            "target",
+            "A flat target near, in focus and far",
+            "Restored by one filter for each camera; in focus without a diffuser no filter is needed.",
+            extended_depth.target_figure(found, depths),
+        ),
+        Picture(
+            "contrast",
+            "Contrast",
+            "Modulation transfer along a row: in focus (full lines) and at the near end (dashed).",
+            _contrast_figure(found),
         ),
     )
+
+
+def _text(kinds: Kinds) -> str:
     narrowest = PUPIL / 2 * (1 - math.sqrt(1 - 1 / RINGS))
-    spread = WAVELENGTH * comparison.sensor((1, 1)).z / narrowest
-    text = paragraphs(
-        [
-            f"A lens of f = {story.length(bench.focal_length)} and {story.length(PUPIL)} opening, focused "
-            f"{story.away(comparison.focus)}, with a clear diffuser in it: a plate of {RINGS} rings of equal "
-            "area, each of which bends light by a random amount along the radius. <i>Random-phase</i>, after "
-            "García-Guerrero and others: each ring is a lens of its own, so that light of a point comes to a "
-            "focus at places spread evenly along the axis. <i>Radial</i>, after Cossairt, Zhou and Nayar: each "
-            "ring is a wedge, and light is scattered along the radius as far in the middle as at the rim. "
-            f"Either bends by up to {1e3 * kinds.strongest:.2g} mrad at the rim, {MARGIN:g} times what defocus "
-            "does at the ends of the range. At every depth some light of a point meets in its middle: a peak "
-            "that falls as one over the distance from it. Number and order of the rings are ours: with fewer of "
-            "them chance counts for more.",
-            f"A flat target, the middle view of the light field, is recorded at {len(depths)} depths with noise "
-            f"of {extended_depth.NOISE:.1%} of white, and restored by one Wiener filter for all depths. The "
-            "camera without a diffuser has a filter made likewise, or none where that is better. Decibels are "
-            "against the lens’s picture in focus without noise.",
-            f"Rays, no diffraction. The outermost ring is {story.length(narrowest)} wide, and by itself would "
-            f"spread light over λ·d/a = {story.length(spread)}: a real plate must be laid out by waves, as "
-            "the published ones were.",
-        ]
+    return paragraphs(
+        "gallery/prose/diffuser-depth-of-field.txt",
+        comparison=kinds.comparison,
+        strongest=kinds.strongest,
+        pupil=PUPIL,
+        rings=RINGS,
+        margin=MARGIN,
+        noise=NOISE,
+        narrowest=narrowest,
+        spread=WAVELENGTH * kinds.comparison.sensor((1, 1)).z / narrowest,
     )
-    numbers = tuple(
-        number
-        for words in ("random-phase", "radial")
-        for number in _findings(words, found[words], found["no diffuser"], depths)
-    )
-    plain = found["no diffuser"].alike
-    without = Finding(
+
+
+def _findings(found: dict[str, Measured], depths: tuple[float, ...]) -> Iterator[Finding]:
+    plain = found["no diffuser"]
+    yield Finding(
         "PSF alike over depth, no diffuser: lowest correlation",
         f"not alike: below {ALIKE}",
-        plain,
-        "",
-        plain < ALIKE,
+        plain.alike,
+        reached=plain.alike < ALIKE,
     )
-    return Result(text, pictures, (without, *numbers), bench.assumed)
+    for words in ("random-phase", "radial"):
+        yield from _findings_of(words, found[words], plain, depths)
 
 
-def _findings(words: str, coded: Measured, plain: Measured, depths: tuple[float, ...]) -> list[Finding]:
-    numbers = [
-        Finding(
-            f"PSF alike over depth, {words}: lowest correlation",
-            f"alike: {ALIKE} or more",
-            coded.alike,
-            "",
-            coded.alike >= ALIKE,
-            "the peak in the middle stays; what lies around it changes with depth",
-        )
-    ]
+def _findings_of(words: str, coded: Measured, plain: Measured, depths: tuple[float, ...]) -> Iterator[Finding]:
+    yield Finding(
+        f"PSF alike over depth, {words}: lowest correlation",
+        f"alike: {ALIKE} or more",
+        coded.alike,
+        reached=coded.alike >= ALIKE,
+        why="the peak in the middle stays; what lies around it changes with depth",
+    )
     for end in (0, -1):
         gain = coded.decibels[end] - plain.decibels[end]
-        numbers.append(
-            Finding(
-                f"flat target {story.away(depths[end])}, {words}, one filter for all depths: gain",
-                f"{LEAST_GAIN:g} dB or more",
-                gain,
-                "dB",
-                gain >= LEAST_GAIN,
-                f"{coded.decibels[end]:.1f} dB against {plain.decibels[end]:.1f} dB",
-            )
+        yield Finding(
+            f"flat target {away(depths[end])}, {words}, one filter for all depths: gain",
+            f"{LEAST_GAIN:g} dB or more",
+            gain,
+            "dB",
+            gain >= LEAST_GAIN,
+            f"{coded.decibels[end]:.1f} dB against {plain.decibels[end]:.1f} dB",
         )
     middle = len(depths) // 2
     kept = float(contrast(coded.spreads[middle], FREQUENCY)) / float(contrast(plain.spreads[middle], FREQUENCY))
-    numbers += [
-        Finding(
-            f"contrast in focus at {FREQUENCY:g} cycles per pixel that is left, {words}",
-            "",
-            kept,
-            "",
-            None,
-            "what is spread around the peak veils the picture",
-        ),
-        Finding(
-            f"what the diffuser costs in focus, {words}",
-            "",
-            plain.decibels[middle] - coded.decibels[middle],
-            "dB",
-            None,
-            "the filter that gives contrast back amplifies noise",
-        ),
-    ]
-    return numbers
+    yield Finding(
+        f"contrast in focus at {FREQUENCY:g} cycles per pixel that is left, {words}",
+        "",
+        kept,
+        why="what is spread around the peak veils the picture",
+    )
+    yield Finding(
+        f"what the diffuser costs in focus, {words}",
+        "",
+        plain.decibels[middle] - coded.decibels[middle],
+        "dB",
+        why="the filter that gives contrast back amplifies noise",
+    )
 
 
 def contrast(spread: Array, frequency: ArrayLike) -> Array:
@@ -284,5 +269,5 @@ ENTRY = Entry(
     "on Graphics 29 (SIGGRAPH 2010)",
     "A clear diffuser at the lens makes the blur alike at all depths, so that one filter restores them all, at a "
     "cost in contrast.",
-    run,
+    Run(),
 )

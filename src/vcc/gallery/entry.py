@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -77,6 +77,11 @@ class Finding:
     why: str = ""
 
     @property
+    def verdict(self) -> str:
+        """Whether the claim was reached, in words; a dash where nothing is claimed."""
+        return {True: "reached", False: "not reached", None: "–"}[self.reached]
+
+    @property
     def measured(self) -> str:
         """The value with its unit, as people read it."""
         return f"{self.value:.3g} {self.unit}".strip()
@@ -113,7 +118,8 @@ class Entry:
         title: in words.
         citation: who published it, and where.
         claim: what they say it does, in a sentence.
-        runner: takes a bench through the camera; see `run`.
+        runner: takes a bench through the camera, see `run`; where that is much work, a dataclass whose fields say
+            how much.
     """
 
     name: str
@@ -134,7 +140,7 @@ class Entry:
         Raises:
             InputError: a light field that cannot be read or used.
         """
-        return self.runner(bench_for(light_field), progress or _silent)
+        return self.runner(bench_for(light_field), progress or silent)
 
 
 def bench_for(light_field: Path | LightField | None) -> Bench:
@@ -147,10 +153,5 @@ def _scene() -> Bench:
     return built_in(small=False)
 
 
-def _silent(done: int, total: int) -> None:
-    pass
-
-
-def paragraphs(texts: Sequence[str]) -> str:
-    """HTML paragraphs."""
-    return "\n".join(f"<p>{text}</p>" for text in texts)
+def silent(done: int, total: int) -> None:
+    """Progress that nobody is told of."""

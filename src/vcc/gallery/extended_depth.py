@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import measures
 from vcc.base.errors import InputError
 from vcc.base.units import mm, nm
 from vcc.camera import Camera
-from vcc.demo import story
-from vcc.gallery import closeness, flat_target
+from vcc.gallery import flat_target
 from vcc.gallery.entry import Picture
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, PhasePlate
@@ -27,6 +27,7 @@ from vcc.plot.tracing import trace
 from vcc.recover import wiener
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
+from vcc.showcase.words import away
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,19 +40,34 @@ PUPIL = 10 * mm
 WAVELENGTH = 550 * nm
 LEAST_MISFOCUS = 20 / 3
 """ψ in radians at the ends of the range below which there is no depth of field to extend."""
-DEPTHS = 7
 NOISE = 0.005
 """Standard deviation of the noise of all recordings, as a share of white."""
-TARGET = 240
-"""Largest side of the flat target, pixels."""
-RAYS = 800
-"""Rays across the opening of which a point-spread function is made."""
-SAMPLES = 512
-"""Rays for each pixel of a recording: of fewer the sampling, not the noise, would limit what filters restore."""
 BORDER = 0.14
 """Share of the flat target at each side that decibels leave out: filters know too little there."""
 ALIKE = 0.95
 """Correlation from which on PSFs count as alike."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much work a comparison is.
+
+    Args:
+        depths: at how many of them.
+        target: largest side of the flat target, pixels.
+        rays: across the opening, of which a point-spread function is made.
+        samples: rays for each pixel of a recording: of fewer the sampling, not the noise, would limit what filters
+            restore.
+    """
+
+    depths: int = 7
+    target: int = 240
+    rays: int = 800
+    samples: int = 512
+
+
+FULL = Sizes()
+"""As the pages have it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,10 +98,12 @@ class Comparison:
     Args:
         bench: whose light field they see, and whose middle view is the flat target.
         round: whether their opening is a disc, of the diameter `PUPIL`, or else a square.
+        sizes: how much work it is.
     """
 
     bench: Bench
     round: bool = False
+    sizes: Sizes = FULL
 
     def __post_init__(self) -> None:
         if self.misfocus < LEAST_MISFOCUS:
@@ -112,7 +130,7 @@ class Comparison:
     @property
     def depths(self) -> tuple[float, ...]:
         """Metres, nearest first, in equal steps of 1/Z."""
-        vergences = np.linspace(1 / self.bench.near, 1 / self.bench.far, DEPTHS)
+        vergences = np.linspace(1 / self.bench.near, 1 / self.bench.far, self.sizes.depths)
         return tuple(1 / float(v) if v > 1e-9 else math.inf for v in vergences)
 
     @property
@@ -132,7 +150,7 @@ class Comparison:
             (depths, rows, columns), upright as pictures are, each of sum 1.
         """
         sensor = self.sensor((1, 1))
-        places = ((np.arange(RAYS) + 0.5) / RAYS - 0.5) * PUPIL
+        places = ((np.arange(self.sizes.rays) + 0.5) / self.sizes.rays - 0.5) * PUPIL
         u, v = (axis.ravel() for axis in np.meshgrid(places, places))
         if self.round:
             inside = np.hypot(u, v) <= PUPIL / 2
@@ -150,7 +168,7 @@ class Comparison:
 
     def target(self) -> Array:
         """A flat target: the middle of the middle view, grey, 0 to 1; see `vcc.gallery.flat_target.grey_view`."""
-        return flat_target.grey_view(self.bench, TARGET)
+        return flat_target.grey_view(self.bench, self.sizes.target)
 
     def recorded(self, elements: Elements, depth: float, noise: float = NOISE) -> tuple[Array, float]:
         """The flat target at a depth, through a camera; upright, white 1, with noise; and how much of it.
@@ -173,7 +191,7 @@ class Comparison:
         Radiance 1 through the whole opening is 1.
         """
         camera = Camera(elements, self.sensor(shape))
-        image = camera.capture(field, method="rays", samples=SAMPLES)
+        image = camera.capture(field, method="rays", samples=self.sizes.samples)
         scale = camera.sensor.z**2 / (PUPIL**2 * (math.pi / 4 if self.round else 1))
         values = image.upright().to_numpy().astype(np.float64) * scale
         noisy = values + noise * np.random.default_rng(0).standard_normal(values.shape)
@@ -205,9 +223,13 @@ class Comparison:
 
 def psnr(picture: Array, truth: Array) -> float:
     """Decibels, white 1, without the borders."""
-    rows, columns = (round(BORDER * n) for n in truth.shape[:2])
-    inner = np.s_[rows : truth.shape[0] - rows, columns : truth.shape[1] - columns]
-    return closeness.psnr(picture[inner], truth[inner])
+    return measures.psnr(_inner(picture, BORDER), _inner(truth, BORDER), peak=1.0)
+
+
+def _inner(picture: Array, border: float, whole: Callable[[float], int] = round) -> Array:
+    """A picture without a share of it at each side, in whole pixels."""
+    rows, columns = (whole(border * n) for n in picture.shape)
+    return picture[rows : picture.shape[0] - rows, columns : picture.shape[1] - columns]
 
 
 def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Figure:
@@ -220,28 +242,38 @@ def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Fi
     side = min(max(each.spreads.shape[1] for each in found.values()), 61)
     figure = figures.new_figure(1.5 * len(depths), 1.6 * len(found) + 0.2)
     grid = figure.subplots(len(found), len(depths), squeeze=False)
-    for row, (words, each) in enumerate(found.items()):
-        for axes, spread, depth in zip(grid[row], each.spreads, depths, strict=True):
-            wide = np.pad(spread, max((side - len(spread)) // 2, 0))
-            cut = max((len(wide) - side) // 2, 0)
-            shown = np.sqrt(wide / wide.max()).astype(np.float32)[cut : cut + side, cut : cut + side]
-            figures.put(axes, shown, story.away(depth) if row == 0 else "", cmap="gray", vmin=0, vmax=1)
-        grid[row, 0].set_ylabel(words, fontsize=figures.LABEL)
+    rows = [
+        [
+            (away(depth) if row == 0 else "", _middle(np.sqrt(spread / spread.max()), side))
+            for spread, depth in zip(each.spreads, depths, strict=True)
+        ]
+        for row, each in enumerate(found.values())
+    ]
+    figures.fill(grid, rows, list(found), cmap="gray", vmin=0, vmax=1)
     return figure
+
+
+def _middle(picture: Array, side: int) -> figures.Shown:
+    """So many pixels of the middle, with dark around it where there are fewer; both sides are odd."""
+    wide = np.pad(picture, max((side - len(picture)) // 2, 0)).astype(np.float32)
+    cut = (len(wide) - side) // 2
+    return wide[cut : cut + side, cut : cut + side]
 
 
 def target_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Figure:
     """The flat target restored near, in focus and far, a row a camera."""
     figure = figures.new_figure(9.0, 3.2 * len(found))
-    grid = figure.subplots(len(found), 3, squeeze=False)
-    for row, (words, each) in enumerate(found.items()):
-        for axes, place in zip(grid[row], (0, len(depths) // 2, -1), strict=True):
-            picture = each.restored[place]
-            rows, columns = (int(BORDER / 2 * n) for n in picture.shape)
-            inner = picture[rows : picture.shape[0] - rows, columns : picture.shape[1] - columns]
-            title = f"{words}, {story.away(depths[place])}: {each.decibels[place]:.1f} dB"
-            shown = np.clip(inner, 0, 1).astype(np.float32) ** np.float32(1 / 2.2)
-            figures.put(axes, shown, title, cmap="gray", vmin=0, vmax=1)
+    rows = [
+        [
+            (
+                f"{words}, {away(depths[place])}: {each.decibels[place]:.1f} dB",
+                figures.grey_shown(_inner(each.restored[place], 0.5 * BORDER, math.floor)),
+            )
+            for place in (0, len(depths) // 2, -1)
+        ]
+        for words, each in found.items()
+    ]
+    figures.fill(figure.subplots(len(found), 3, squeeze=False), rows, cmap="gray", vmin=0, vmax=1)
     return figure
 
 

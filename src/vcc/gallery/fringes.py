@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.demo import story
 from vcc.gallery.entry import Finding
 from vcc.light_field import LightField
 from vcc.showcase import figures
+from vcc.showcase.words import length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,7 +104,7 @@ class Sharpness:
         axes.set_ylabel("contrast")
         axes.set_ylim(-0.15, 1)
         axes.axhline(0, color=figures.QUIET, linewidth=0.6)
-        places = ["∞" if math.isinf(distance) else story.length(distance) for distance in self.distances]
+        places = ["∞" if math.isinf(distance) else length(distance) for distance in self.distances]
         axes.secondary_xaxis("top").set_xticks(self.blurs, places)
         axes.legend(frameon=False)
         return figure

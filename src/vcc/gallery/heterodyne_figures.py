@@ -125,14 +125,20 @@ def views_figure(columns: dict[str, tuple[LightField, Array | None]], white: flo
     """
     some = next(iter(columns.values()))[0]
     count, (nt, ns) = some.shape[0], some.shape[2:4]
-    figure = figures.new_figure(4 * 3.6, 2 * (3.6 * nt / ns + 0.3))
-    for line, number in zip(figure.subplots(2, len(columns)), (1, count - 2), strict=True):
-        for axes, (title, (field, decibels)) in zip(line, columns.items(), strict=True):
-            reached = "" if decibels is None else f": {decibels[count // 2, number]:.1f} dB"
-            figures.put(
-                axes, figures.values_shown(np.asarray(field.values[count // 2, number]), white), title + reached
+    numbers, middle = (1, count - 2), count // 2
+    rows = [
+        [
+            (
+                title if decibels is None else f"{title}: {decibels[middle, number]:.1f} dB",
+                figures.values_shown(np.asarray(field.values[middle, number]), white),
             )
-        line[0].set_ylabel(f"view {number + 1} of {count}", fontsize=figures.LABEL, color=figures.INK)
+            for title, (field, decibels) in columns.items()
+        ]
+        for number in numbers
+    ]
+    figure = figures.new_figure(4 * 3.6, 2 * (3.6 * nt / ns + 0.3))
+    labels = [f"view {number + 1} of {count}" for number in numbers]
+    figures.fill(figure.subplots(2, len(columns)), rows, labels)
     return figure
 
 
@@ -140,8 +146,9 @@ def refocus_figure(rows: dict[str, dict[str, Floats]], white: float) -> Figure:
     """Pictures by the name of a row and that of a place."""
     height, width = next(iter(next(iter(rows.values())).values())).shape[:2]
     figure = figures.new_figure(3 * 4.4, len(rows) * (4.4 * height / width + 0.3))
-    for line, (words, pictures) in zip(figure.subplots(len(rows), 3), rows.items(), strict=True):
-        for axes, (place, picture) in zip(line, pictures.items(), strict=True):
-            figures.put(axes, figures.values_shown(picture, white), place)
-        line[0].set_ylabel(words, fontsize=figures.LABEL, color=figures.INK)
+    shown = [
+        [(place, figures.values_shown(picture, white)) for place, picture in pictures.items()]
+        for pictures in rows.values()
+    ]
+    figures.fill(figure.subplots(len(rows), 3), shown, list(rows))
     return figure

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import ResultWarning
+from vcc.base.measures import decibels
 from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo import story
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, PrismArray
@@ -21,6 +21,7 @@ from vcc.optics.sensor import Sensor
 from vcc.shapes.patterns import Open
 from vcc.showcase import figures
 from vcc.showcase.bench import APERTURE, Bench
+from vcc.showcase.words import length, paragraphs
 
 Array = NDArray[np.float64]
 
@@ -108,22 +109,13 @@ def run(bench: Bench, progress: Progress) -> Result:
         ),
     )
     text = paragraphs(
-        [
-            f"{SIDE}×{SIDE} pairs of a negative lens of f = {story.length(integral.focal_length)} and a prism, "
-            f"{story.length(integral.cell)} apart, stand {story.length(TO_LENS)} before a camera of "
-            f"f = {story.length(MAIN)} and {story.length(OPENING)} opening. Each lens makes a small "
-            "virtual picture of the "
-            "scene, on which the camera is focused, and its own edge bounds that picture on the sensor. "
-            "Its prism, "
-            "δ = −c/L − c/F at the place c, turns the views so that all look at the same.",
-            "By matrices: through the pair at c, the place c + ξ of the array shows the slope c/F − κ·ξ, with "
-            "κ = 1/L + 1/|f|. So each view looks from a point 1/κ behind the array. The recording is "
-            "cut into windows, "
-            "each is turned upright, and the stack is a light field with a frame in that plane. The design is the "
-            f"report’s; the parameters are ours, for a light field that is {story.length(APERTURE)} "
-            "wide, and the pairs "
-            "stand on a square lattice.",
-        ]
+        "gallery/prose/integral-lens-prism.txt",
+        integral=integral,
+        side=SIDE,
+        to_lens=TO_LENS,
+        main=MAIN,
+        opening=OPENING,
+        aperture=APERTURE,
     )
     return Result(text, pictures, tuple(numbers), bench.assumed)
 
@@ -227,14 +219,13 @@ def _against_truth(bench: Bench, integral: Integral, decoded: LightField) -> Fin
         truth = seen.reshape(nt, points, ns, points, 3).mean(axis=(1, 3))
         errors.append(float(np.mean((np.asarray(decoded.values[row, column], np.float64) - truth) ** 2)))
         peak = max(peak, float(truth.max()))
-    closeness = 10 * math.log10(peak**2 / float(np.mean(errors)))
     return Finding(
         "decoded views against the scene’s closed form from their places: PSNR",
         "",
-        closeness,
+        decibels(float(np.mean(errors)), peak),
         "dB",
         None,
-        f"pinholes there, where the views have openings: {story.length(OPENING)} at the main lens",
+        f"pinholes there, where the views have openings: {length(OPENING)} at the main lens",
     )
 
 

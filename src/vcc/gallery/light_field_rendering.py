@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.measures import psnr
 from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.demo import story
-from vcc.gallery.closeness import psnr
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
 from vcc.light_field import LightField
 from vcc.optics import Mask
 from vcc.optics.sensor import Sensor
 from vcc.shapes.patterns import Circle
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
+from vcc.showcase.words import length, paragraphs
 
 STEP = 20 * mm
 """How far before and behind the plane of the views new pictures are taken."""
@@ -28,6 +28,12 @@ INNER = 0.1
 """Share of a picture at each side that comparisons leave out: there the views end."""
 POINTS = 4
 """Points across a pixel at which the closed form is evaluated, each way."""
+WORDS = {
+    "nearest": "the nearest view",
+    "linear": "quadrilinear",
+    "along the parallax": "pinhole camera, blended along the parallax of the middle distance",
+}
+"""How a view that was left out is predicted."""
 
 
 def run(bench: Bench, progress: Progress) -> Result:
@@ -38,63 +44,58 @@ def run(bench: Bench, progress: Progress) -> Result:
             f"leaving out every second view takes 3×3 views or more, not {light_field.shape[0]}×"
             f"{light_field.shape[1]}: give a light field with more"
         )
+    place = _left_out(light_field.shape[0]), _left_out(light_field.shape[1])
+    truth = _linear(light_field.values[place], light_field)
+    predicted = _predicted(light_field, place, progress)
+    decibels = {name: _psnr(picture, truth) for name, picture in predicted.items()}
+    progress(3, 6)
+    moved, found = _from_elsewhere(bench, progress)
+    pictures = (
+        (_left_out_picture(truth, predicted, decibels),),
+        tuple(Picture(f"from-{name}", title, caption, content) for name, title, caption, content in moved),
+    )
+    text = paragraphs("gallery/prose/light-field-rendering.txt", views=light_field.shape[:2], step=STEP)
+    return Result(text, pictures, (*_predictions(decibels), *found), bench.assumed)
+
+
+def _predicted(
+    light_field: LightField, place: tuple[int, int], progress: Progress
+) -> dict[str, NDArray[np.float64]]:
+    """The view at a place that every second view each way predicts, by the names of `WORDS`."""
     kept = light_field[::2, ::2]
-    row, column = _left_out(light_field.shape[0]), _left_out(light_field.shape[1])
-    truth = _linear(light_field.values[row, column], light_field)
     predicted = {}
     for done, method in enumerate(("nearest", "linear")):
         progress(done, 6)
-        predicted[method] = _resampled(kept, light_field, (row, column), method)
+        predicted[method] = resampled_view(kept, light_field, place, method)
     progress(2, 6)
-    predicted["along the parallax"] = _through_a_pinhole(kept, light_field, (row, column))
-    decibels = {name: _psnr(picture, truth) for name, picture in predicted.items()}
-    words = {
-        "nearest": "the nearest view",
-        "linear": "quadrilinear",
-        "along the parallax": "pinhole camera, blended along the parallax of the middle distance",
-    }
-    numbers = [
+    return predicted | {"along the parallax": _through_a_pinhole(kept, light_field, place)}
+
+
+def _predictions(decibels: dict[str, float]) -> list[Finding]:
+    nearest = decibels["nearest"]
+    return [
         Finding(
-            f"left-out view, {words[name]}: PSNR",
+            f"left-out view, {WORDS[name]}: PSNR",
             "" if name == "nearest" else "better than the nearest view",
             value,
             "dB",
-            None if name == "nearest" else value > decibels["nearest"],
+            None if name == "nearest" else value > nearest,
         )
         for name, value in decibels.items()
     ]
-    progress(3, 6)
-    moved, found = _from_elsewhere(bench, progress)
-    shown = [("left out", figures.values_shown(truth))]
-    shown += [
-        (f"{words[name].split(',')[0]}, {decibels[name]:.1f} dB", figures.values_shown(p))
-        for name, p in predicted.items()
-    ]
+
+
+def _left_out_picture(
+    truth: NDArray[np.float64], predicted: dict[str, NDArray[np.float64]], decibels: dict[str, float]
+) -> Picture:
+    shown = {"left out": figures.values_shown(truth)}
+    for name, picture in predicted.items():
+        shown[f"{WORDS[name].split(',')[0]}, {decibels[name]:.1f} dB"] = figures.values_shown(picture)
     size = max(min(truth.shape[:2]) * 22 // 100, 8)
-    wrong = np.abs(figures.values_shown(predicted["nearest"]) - figures.values_shown(truth))
-    close = figures.close_ups(shown, figures.detailed_crops([wrong], size), ["where they differ most"])
-    pictures = (
-        (Picture("left-out", "A view that was left out", "And as the other views predict it.", close),),
-        tuple(Picture(f"from-{name}", title, caption, content) for name, title, caption, content in moved),
-    )
-    text = paragraphs(
-        [
-            f"Of {light_field.shape[0]}×{light_field.shape[1]} views every second one each way is kept. "
-            "A new view is "
-            "a slice of the light field on another grid. Samples are interpolated in all four "
-            "dimensions between the plane of the cameras and the plane on which they converge "
-            "(quadrilinear, as Levoy "
-            "and Hanrahan do), or looked up by the rays of a pinhole camera, which blends views along "
-            "the parallax of "
-            "one distance.",
-            f"A view from {story.length(STEP)} before or behind the plane of the cameras is the same "
-            "light field after "
-            "a flight: one matrix on its frame, no sample touched. The reference is the left-out view "
-            "itself, and the "
-            "closed form of the built-in scene where that is known.",
-        ]
-    )
-    return Result(text, pictures, (*numbers, *found), bench.assumed)
+    wrong = np.abs(figures.values_shown(predicted["nearest"]) - shown["left out"])
+    crops = figures.detailed_crops([wrong], size)
+    close = figures.close_ups(list(shown.items()), crops, ["where they differ most"])
+    return Picture("left-out", "A view that was left out", "And as the other views predict it.", close)
 
 
 def _left_out(count: int) -> int:
@@ -108,9 +109,17 @@ def _linear(values: NDArray[np.generic], light_field: LightField) -> NDArray[np.
     return picture if picture.ndim == 3 else picture[..., None]
 
 
-def _resampled(
+def resampled_view(
     kept: LightField, light_field: LightField, place: tuple[int, int], interpolation: str
 ) -> NDArray[np.float64]:
+    """A view as samples around it predict it, interpolated in all four dimensions.
+
+    Args:
+        kept: every second view each way.
+        light_field: of which they were kept.
+        place: (row, column) of the view in it.
+        interpolation: "nearest" or "linear".
+    """
     row, column = place
     frame = light_field.frame @ Affine.translation(column, row, 0, 0)
     # Only the neighbours matter, and a resampling holds all four dimensions in memory.
@@ -126,10 +135,10 @@ def _through_a_pinhole(kept: LightField, light_field: LightField, place: tuple[i
     row, column = place
     nt, ns = light_field.shape[2:4]
     u, v, s, t = light_field.frame([column, row, (ns - 1) / 2, (nt - 1) / 2])
-    return _pinhole_picture(kept, light_field, (float(u), float(v)), (float(s), float(t)), 0.0)
+    return pinhole_picture(kept, light_field, (float(u), float(v)), (float(s), float(t)), 0.0)
 
 
-def _pinhole_picture(
+def pinhole_picture(
     given: LightField, like: LightField, hole: tuple[float, float], middle: tuple[float, float], z: float
 ) -> NDArray[np.float64]:
     """A pinhole at (u, v), z behind the given light field, and a sensor that sees slopes as ``like`` does."""
@@ -169,14 +178,14 @@ def _from_elsewhere(
         progress(4 + done, 6)
         # Nearer to the scene: the light field flies back first, and the pinhole stands in its new plane.
         flown = light_field.transformed(Affine.propagation(way)) if way < 0 else light_field
-        picture = _pinhole_picture(flown, light_field, (u, v), (s, t), max(way, 0.0))
-        caption = f"{story.length(STEP)} from their plane, where no camera stood."
+        picture = pinhole_picture(flown, light_field, (u, v), (s, t), max(way, 0.0))
+        caption = f"{length(STEP)} from their plane, where no camera stood."
         if bench.scene is not None:
             closeness = _psnr(picture, _true_view(bench, (u, v), (s, t), way))
             caption += f" {closeness:.1f} dB against the scene’s closed form."
             numbers.append(
                 Finding(
-                    f"view from {story.length(STEP)} {name} the plane of cameras: PSNR",
+                    f"view from {length(STEP)} {name} the plane of cameras: PSNR",
                     "",
                     closeness,
                     "dB",
@@ -208,15 +217,14 @@ def _psnr(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
     """Peak signal-to-noise ratio in linear light inside the border, the peak being the truth's brightest."""
     rows, columns = (max(int(INNER * n), 1) for n in truth.shape[:2])
     inner = np.s_[rows:-rows, columns:-columns]
-    return psnr(picture[inner], truth[inner], float(truth[inner].max()))
+    return psnr(picture[inner], truth[inner])
 
 
 ENTRY = Entry(
     "light-field-rendering",
     "Light-field rendering by matrix optics",
-    "M. Levoy and P. Hanrahan, Light field rendering, SIGGRAPH 1996; L. Ahrenberg and M. Magnor, Light "
-    "field rendering "
-    "using matrix optics, WSCG 2006; T. Georgiev and C. Intwala, Adobe technical report, 2006",
+    "M. Levoy and P. Hanrahan, Light field rendering, SIGGRAPH 1996; L. Ahrenberg and M. Magnor, Light field "
+    "rendering using matrix optics, WSCG 2006; T. Georgiev and C. Intwala, Adobe technical report, 2006",
     "New views are slices of two-plane data, without depth or matching; moving through space is a matrix.",
     run,
 )

@@ -14,9 +14,8 @@ from vcc.base.errors import InputError
 from vcc.files.atomic import atomic_path
 from vcc.gallery.entry import Entry, Finding, Picture, Result
 from vcc.showcase.figures import write_figure
-from vcc.showcase.page import Panel, Section, write_page
+from vcc.showcase.words import write_page
 
-VERDICTS = {True: "reached", False: "not reached", None: "–"}
 JPEG_QUALITY = 88
 """Of photographs on Markdown pages: below it, noise and fine print begin to suffer."""
 PHOTOGRAPHS = 0.5
@@ -38,16 +37,11 @@ def write_entry(entry: Entry, result: Result, folder: Path) -> Path:
         InputError: the folder cannot be made.
     """
     folder = _made(folder)
-    rows = [[_written(picture, folder) for picture in row] for row in result.pictures]
-    introduction = f"<p><i>{escape(entry.citation)}</i></p><p>{escape(entry.claim)}</p>"
-    if result.assumed:
-        introduction += f"<p>{escape(result.assumed)}.</p>"
-    sections = [
-        Section("Measured in this run", numbers_table(result.numbers)),
-        Section("How", result.text, rows),
-    ]
+    for row in result.pictures:
+        for picture in row:
+            _write_png(picture, folder)
     page = folder / "index.html"
-    write_page(page, entry.title, introduction, sections)
+    write_page(page, "gallery/page.html", title=entry.title, entry=entry, result=result)
     return page
 
 
@@ -96,24 +90,9 @@ def numbers_markdown(numbers: Sequence[Finding]) -> str:
     """The numbers as a table in Markdown."""
     lines = ["| what | claim | measured | verdict | why |", "|---|---|---|---|---|"]
     for number in numbers:
-        cells = (number.what, number.claim or "–", number.measured, VERDICTS[number.reached], number.why)
+        cells = (number.what, number.claim or "–", number.measured, number.verdict, number.why)
         lines.append("| " + " | ".join(plain(cell) for cell in cells) + " |")
     return "\n".join(lines)
-
-
-def numbers_table(numbers: Sequence[Finding]) -> str:
-    """The numbers as an HTML table."""
-    rows = "\n".join(
-        f"<tr><td>{escape(number.what)}</td><td>{escape(number.claim) or '–'}</td>"
-        f"<td>{escape(number.measured)}</td>"
-        f"<td>{VERDICTS[number.reached]}</td><td class=note>{escape(number.why)}</td></tr>"
-        for number in numbers
-    )
-    return (
-        '<div class="wide"><table><thead><tr><th></th><th>claim</th><th>measured</th><th></th><th></th></tr>'
-        "</thead>"
-        f"<tbody>{rows}</tbody></table></div>"
-    )
 
 
 def plain(text: str) -> str:
@@ -145,16 +124,11 @@ def _compact(picture: Picture, folder: Path) -> str:
 
     Lines and even areas stay sharp as PNG; what is far smaller as JPEG is a photograph, or a figure made of some.
     """
-    from imagecodecs import jpeg8_encode, png_decode, png_encode
+    from imagecodecs import jpeg8_encode, png_decode
 
-    png = folder / f"{picture.name}.png"
-    if isinstance(picture.content, np.ndarray):
-        codes, share = _codes(picture.content), 1.0
-        with atomic_path(png) as temporary:
-            temporary.write_bytes(png_encode(codes, level=9))
-    else:
-        write_figure(picture.content, png)
-        codes, share = np.ascontiguousarray(png_decode(png.read_bytes())[..., :3]), PHOTOGRAPHS
+    png = _write_png(picture, folder, level=9)
+    share = 1.0 if isinstance(picture.content, np.ndarray) else PHOTOGRAPHS
+    codes = np.ascontiguousarray(png_decode(png.read_bytes())[..., :3])
     encoded = jpeg8_encode(codes, level=JPEG_QUALITY, subsampling="444")
     if len(encoded) > share * png.stat().st_size:
         return png.name
@@ -164,18 +138,15 @@ def _compact(picture: Picture, folder: Path) -> str:
     return f"{picture.name}.jpg"
 
 
-def _written(picture: Picture, folder: Path) -> Panel:
+def _write_png(picture: Picture, folder: Path, level: int | None = None) -> Path:
+    """Write a picture as PNG; the level of compression is for pictures that are no figures."""
     path = folder / f"{picture.name}.png"
-    if isinstance(picture.content, np.ndarray):
-        from imagecodecs import png_encode
-
-        with atomic_path(path) as temporary:
-            temporary.write_bytes(png_encode(_codes(picture.content)))
-    else:
+    if not isinstance(picture.content, np.ndarray):
         write_figure(picture.content, path)
-    return Panel(path.name, picture.title, picture.caption)
+        return path
+    from imagecodecs import png_encode
 
-
-def _codes(values: np.ndarray) -> np.ndarray:
-    """8-bit codes of what screens are to show."""
-    return np.ascontiguousarray(np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8))
+    codes = np.rint(255 * np.clip(picture.content, 0, 1)).astype(np.uint8)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(png_encode(np.ascontiguousarray(codes), level=level))
+    return path

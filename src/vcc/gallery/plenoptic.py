@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.analysis import Refocuser
+from vcc.base import measures
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import um
 from vcc.camera import Camera
-from vcc.demo import story
-from vcc.gallery import closeness, fringes
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, paragraphs
+from vcc.gallery import fringes
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, LensArray, PhasePlate
@@ -29,6 +29,7 @@ from vcc.shapes.patterns import Circle
 from vcc.shapes.surfaces import Surface, Zernike
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
+from vcc.showcase.words import away, length, paragraphs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,18 +40,17 @@ PITCH = 125 * um
 """Of the lenslets, their f-number, and the pixels of 9 µm behind each: the prototype (Ng et al. 2005)."""
 F_NUMBER = 4.0
 EACH = 14
+"""Pixels across a lenslet."""
 COARSEST, MOST = 2.0, 192
 """Where lenslets of that pitch hold fewer pixels of the light field, or are more across, they are made wider."""
 RAYS = 16
 """For each pixel: 150 pixels make one of a refocused picture, so that few will do."""
-DEPTHS = 7
-"""Over which depth of field is measured."""
 SPHERICAL, COMA = 1.8 * um, 1.2 * um
 """Root mean square optical path of the aberrations (Zernike terms 11 and 8)."""
 MARGIN = 8
 """Lenslets at each border that are not compared: refocusing there asks for light from beyond it."""
 NEEDED = 35.0
-PLACES = ("near", "middle", "far")
+"""Decibels of refocused pictures."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,7 @@ class Plenoptic:
         to_lenslets: d, from the main lens to the lenslets, metres.
         diameter: of the main lens, metres.
         lenslets: (rows, columns).
+        each: pixels across a lenslet.
     """
 
     bench: Bench
@@ -72,9 +73,10 @@ class Plenoptic:
     to_lenslets: float
     diameter: float
     lenslets: tuple[int, int]
+    each: int
 
     @classmethod
-    def built(cls, bench: Bench, pitch: float, gap: float, lenslets: tuple[int, int]) -> Plenoptic:
+    def built(cls, bench: Bench, pitch: float, gap: float, lenslets: tuple[int, int], each: int) -> Plenoptic:
         """Lenslets where the lens images the middle distance, the sensor a gap behind, micro-images that touch."""
         d = bench.image_distance(bench.middle)
         # A micro-image of the lens is D·b/d wide, and they stand p·(1 + b/d) apart.
@@ -83,10 +85,10 @@ class Plenoptic:
         # An even number of lenslets has its middle between two.
         down, across = (pitch / 2 if count % 2 == 0 else 0.0 for count in lenslets)
         array = LensArray(pitch, 1 / (1 / gap + 1 / d), offset=(across, down), z=d, name="lenslets")
-        shape = lenslets[0] * EACH, lenslets[1] * EACH
-        sensor = Sensor(d + gap, shape, pitch * growth / EACH, electronics=Electronics())
+        shape = lenslets[0] * each, lenslets[1] * each
+        sensor = Sensor(d + gap, shape, pitch * growth / each, electronics=Electronics())
         camera = Camera([Lens(bench.focal_length, diameter), array], sensor)
-        return cls(bench, camera, pitch, d, diameter, lenslets)
+        return cls(bench, camera, pitch, d, diameter, lenslets, each)
 
     @property
     def gap(self) -> float:
@@ -114,13 +116,14 @@ class Plenoptic:
         with warnings.catch_warnings():
             # The corners of micro-images lie outside of the round lens: their views are dark, and weigh nothing.
             warnings.filterwarnings("ignore", message=".*white image is dark.*", category=ResultWarning)
-            return decode_plenoptic(raw, grid, camera=self.camera, white=white, views=EACH)
+            return decode_plenoptic(raw, grid, camera=self.camera, white=white, views=self.each)
 
     def refocuser(self, decoded: LightField) -> Refocuser:
         """Sums of views, weighted by how much of their windows lies within the round lens."""
-        places = (np.arange(EACH) - (EACH - 1) / 2) * self.window
+        each = self.each
+        places = (np.arange(each) - (each - 1) / 2) * self.window
         open_shares = Circle(self.diameter).mean(places[None, :], places[:, None], self.window, self.window)
-        bright = np.asarray(decoded.values).reshape(EACH, EACH, -1).any(axis=2)
+        bright = np.asarray(decoded.values).reshape(each, each, -1).any(axis=2)
         return Refocuser(decoded, np.where(bright, open_shares, 0.0))
 
     def ideal(self, light_field: LightField, distance: float, samples: int = 256) -> Array:
@@ -142,112 +145,143 @@ def _captured(camera: Camera, light_field: LightField, samples: int) -> Image:
         return camera.capture(light_field, method="rays", samples=samples)
 
 
-def run(bench: Bench, progress: Progress) -> Result:
-    """One exposure, refocused near, in the middle and far; depth of field; aberrations undone."""
-    steps = 5
-    plenoptic = designed(bench)
-    raw, white = plenoptic.recorded(bench.light_field), plenoptic.white()
-    progress(1, steps)
-    decoded = plenoptic.decoded(raw, white)
-    refocuser = plenoptic.refocuser(decoded)
-    progress(2, steps)
-    distances = [float(getattr(bench, name)) for name in PLACES]
-    refocused = [_values(refocuser.at(distance)) for distance in distances]
-    ideal = [plenoptic.ideal(bench.light_field, distance) for distance in distances]
-    peak = 1.0 if bench.scene is not None else float(np.percentile(ideal[1], 99.5))
-    decibels = [psnr(one, other, peak) for one, other in zip(refocused, ideal, strict=True)]
-    progress(3, steps)
-    sharpness = depth_of_field(plenoptic)
-    progress(4, steps)
-    surface = Zernike.from_terms({11: SPHERICAL, 8: COMA}, plenoptic.diameter)
-    # What stands at the lens bends no light away from it: micro-images of white, and so the white image, stay.
-    spoilt = plenoptic.decoded(plenoptic.recorded(bench.light_field, surface), white)
-    put_right = without_aberration(spoilt, surface)
-    lens = [_values(plenoptic.refocuser(each).at(bench.middle)) for each in (spoilt, put_right)]
-    before, after = (psnr(picture, ideal[1], peak) for picture in lens)
-    numbers = [
-        Finding(
-            f"refocused {story.away(distance)}, against the ideal camera focused there: PSNR",
-            f"{NEEDED:g} dB or more",
-            value,
-            "dB",
-            value >= NEEDED,
-            "the ideal picture is a lens’s of the same opening, averaged over what a lenslet shows",
+@dataclass(frozen=True)
+class Run:
+    """One exposure, refocused near, in the middle and far; depth of field; aberrations undone.
+
+    Args:
+        each: pixels across a lenslet.
+        depths: over which depth of field is measured.
+    """
+
+    each: int = EACH
+    depths: int = 7
+
+    def __call__(self, bench: Bench, progress: Progress) -> Result:
+        """Record a light field once, and measure."""
+        steps = Steps(progress, 5)
+        plenoptic = designed(bench, self.each)
+        raw, white = plenoptic.recorded(bench.light_field), plenoptic.white()
+        steps()
+        decoded = plenoptic.decoded(raw, white)
+        steps()
+        refocused = Refocused.of(plenoptic, decoded)
+        steps()
+        sharpness = depth_of_field(plenoptic, self.depths)
+        steps()
+        aberrated = Aberrated.of(plenoptic, white, refocused)
+        numbers = (*refocused.findings(), *sharpness.findings(), *aberrated.findings(plenoptic))
+        pictures = _pictures(plenoptic, raw, decoded, refocused, sharpness, aberrated)
+        return Result(_text(plenoptic), tuple((each,) for each in pictures), numbers, bench.assumed)
+
+
+@dataclass(frozen=True, eq=False)
+class Refocused:
+    """Pictures refocused from one recording, beside those of ideal cameras focused there.
+
+    Args:
+        distances: by name, metres.
+        pictures: radiance, upright, in the same order.
+        ideal: likewise.
+        peak: the radiance that counts as white.
+    """
+
+    distances: dict[str, float]
+    pictures: tuple[Array, ...]
+    ideal: tuple[Array, ...]
+    peak: float
+
+    @classmethod
+    def of(cls, plenoptic: Plenoptic, decoded: LightField) -> Refocused:
+        """On the three distances of the bench."""
+        bench, refocuser = plenoptic.bench, plenoptic.refocuser(decoded)
+        pictures = tuple(_values(refocuser.at(distance)) for distance in bench.distances.values())
+        ideal = tuple(plenoptic.ideal(bench.light_field, distance) for distance in bench.distances.values())
+        peak = 1.0 if bench.scene is not None else float(np.percentile(ideal[1], 99.5))
+        return cls(bench.distances, pictures, ideal, peak)
+
+    @property
+    def decibels(self) -> list[float]:
+        """Of the pictures against the ideal ones."""
+        return [psnr(one, other, self.peak) for one, other in zip(self.pictures, self.ideal, strict=True)]
+
+    def findings(self) -> Iterator[Finding]:
+        """One for each distance."""
+        for distance, value in zip(self.distances.values(), self.decibels, strict=True):
+            yield Finding(
+                f"refocused {away(distance)}, against the ideal camera focused there: PSNR",
+                f"{NEEDED:g} dB or more",
+                value,
+                "dB",
+                value >= NEEDED,
+                "the ideal picture is a lens’s of the same opening, averaged over what a lenslet shows",
+            )
+
+    def rows(self) -> list[list[tuple[str, figures.Shown]]]:
+        """Titles and pictures, the ideal ones below."""
+        titles = [
+            f"refocused {name}, {away(at)}: {reached:.1f} dB"
+            for (name, at), reached in zip(self.distances.items(), self.decibels, strict=True)
+        ]
+        ideal = [f"ideal camera, {away(at)}" for at in self.distances.values()]
+        return [
+            [(title, self.shown(each)) for title, each in zip(titles, self.pictures, strict=True)],
+            [(title, self.shown(each)) for title, each in zip(ideal, self.ideal, strict=True)],
+        ]
+
+    def shown(self, picture: Array) -> figures.Shown:
+        """As screens want it."""
+        return figures.values_shown(picture, self.peak)
+
+
+@dataclass(frozen=True, eq=False)
+class Aberrated:
+    """The lens with aberrations, refocused in the middle, beside the ideal camera.
+
+    Args:
+        before: what refocusing makes of its recording, upright radiance.
+        after: the same with rays resorted by the known deflection.
+        ideal: the ideal camera's picture.
+        decibels: of the first two against it.
+    """
+
+    before: Array
+    after: Array
+    ideal: Array
+    decibels: tuple[float, float]
+
+    @classmethod
+    def of(cls, plenoptic: Plenoptic, white: Image, without: Refocused) -> Aberrated:
+        """Recorded anew, through a plate at the lens.
+
+        What stands at the lens bends no light away from it: micro-images of white, and so the white image, stay.
+        """
+        bench = plenoptic.bench
+        surface = Zernike.from_terms({11: SPHERICAL, 8: COMA}, plenoptic.diameter)
+        spoilt = plenoptic.decoded(plenoptic.recorded(bench.light_field, surface), white)
+        before, after = (
+            _values(plenoptic.refocuser(each).at(bench.middle))
+            for each in (spoilt, without_aberration(spoilt, surface))
         )
-        for distance, value in zip(distances, decibels, strict=True)
-    ]
-    numbers += sharpness.findings()
-    numbers += [
-        Finding("lens with aberrations, against the same without: PSNR", "", before, "dB"),
-        Finding(
+        ideal, peak = without.ideal[1], without.peak
+        return cls(before, after, ideal, (psnr(before, ideal, peak), psnr(after, ideal, peak)))
+
+    def findings(self, plenoptic: Plenoptic) -> Iterator[Finding]:
+        """How much of the aberrations is taken out."""
+        before, after = self.decibels
+        yield Finding("lens with aberrations, against the same without: PSNR", "", before, "dB")
+        yield Finding(
             "the same recording with rays resorted by the known deflection: PSNR",
             "better than without",
             after,
             "dB",
             after > before,
-            "what is left is how the deflection differs within the "
-            f"{story.length(plenoptic.window)} of the lens that a pixel sees, and stripes of two lenslets, which "
-            "interpolation cannot move",
-        ),
-    ]
-    size = max(min(plenoptic.lenslets) // 12, 12)
-    near, chart, _ = figures.detailed_crops([figures.values_shown(picture, peak) for picture in refocused], size)
-    wide = min(4 * size, min(plenoptic.lenslets))
-    closer = figures.Crop(chart.row + size // 2 - wide // 2, chart.column + size // 2 - wide // 2, wide)
-    lens_shown = {
-        f"aberrated: {before:.1f} dB": lens[0],
-        f"corrected: {after:.1f} dB": lens[1],
-        "ideal camera": ideal[1],
-    }
-    whole = [(title, figures.values_shown(picture, peak)) for title, picture in lens_shown.items()]
-    titles = [f"refocused {name}, {story.away(at)}" for name, at in zip(PLACES, distances, strict=True)]
-    pairs = [
-        [
-            (f"{t}: {c:.1f} dB", figures.values_shown(p, peak))
-            for t, p, c in zip(titles, refocused, decibels, strict=True)
-        ],
-        [
-            (f"ideal camera, {story.away(at)}", figures.values_shown(p, peak))
-            for at, p in zip(distances, ideal, strict=True)
-        ],
-    ]
-    drawn = (
-        Picture(
-            "raw",
-            "The raw recording, and a piece of it",
-            "Turned upright as a whole. Each lenslet shows the round main lens; where things are out of focus, "
-            "its parts differ.",
-            _raw_figure(plenoptic, raw, near, peak),
-        ),
-        Picture(
-            "views",
-            "Decoded views",
-            "The pixels at one place of all micro-images are the view from one place in the lens.",
-            figures.views_figure(decoded[1:-1, 1:-1].replaced(_inner(decoded) / np.float32(peak))),
-        ),
-        Picture(
-            "refocused",
-            "Refocused from that one recording",
-            "Below, ideal cameras of the same opening, focused there, at the resolution of the lenslets.",
-            _table(pairs),
-        ),
-        Picture(
-            "depth-of-field",
-            "Sharpness over depth",
-            f"Contrast of fringes of {fringes.PERIOD} lenslets, on a plane that comes nearer. Lines: closed form.",
-            sharpness.figure(),
-        ),
-        Picture(
-            "aberration",
-            "An aberrated lens, corrected",
-            "Spherical aberration and coma, focused in the middle; whole, and a piece.",
-            _table([whole, [("", closer.of(picture)) for _, picture in whole]]),
-        ),
-    )
-    return Result(_text(plenoptic), tuple((picture,) for picture in drawn), tuple(numbers), bench.assumed)
+            f"what is left is how the deflection differs within the {length(plenoptic.window)} of the lens that a "
+            "pixel sees, and stripes of two lenslets, which interpolation cannot move",
+        )
 
 
-def designed(bench: Bench) -> Plenoptic:
+def designed(bench: Bench, each: int = EACH) -> Plenoptic:
     """The published lenslets behind the bench's lens, focused in the middle, stopped down to their f-number.
 
     Raises:
@@ -265,18 +299,19 @@ def designed(bench: Bench) -> Plenoptic:
     d = bench.image_distance(bench.middle)
     # No wider than the light field's lens, whatever the f-number.
     gap = max(F_NUMBER * pitch, pitch * d / (bench.diameter - pitch))
-    return Plenoptic.built(bench, pitch, gap, (rows, columns))
+    return Plenoptic.built(bench, pitch, gap, (rows, columns), each)
 
 
-def depth_of_field(plenoptic: Plenoptic) -> fringes.Sharpness:
-    """Fringes across, on planes ever nearer than the focus, recorded by both cameras."""
-    blurs = np.linspace(0, 1.2 * fringes.HALF_OF_SQUARE * EACH * fringes.PERIOD, DEPTHS)
+def depth_of_field(plenoptic: Plenoptic, depths: int = 7) -> fringes.Sharpness:
+    """Fringes across, on so many planes ever nearer than the focus, recorded by both cameras."""
+    each = plenoptic.each
+    blurs = np.linspace(0, 1.2 * fringes.HALF_OF_SQUARE * each * fringes.PERIOD, depths)
     per_blur = plenoptic.pitch / (plenoptic.diameter * plenoptic.to_lenslets)
     vergences = 1 / plenoptic.bench.middle + blurs * per_blur
     distances = tuple(1 / float(vergence) if vergence > 0 else math.inf for vergence in vergences)
     # The outermost views are moved by half the blur; whole periods are left, and the fade to the opposite border.
     columns = 2 * math.ceil(blurs[-1] / 2) + 8 * fringes.PERIOD + 1
-    small = Plenoptic.built(plenoptic.bench, plenoptic.pitch, plenoptic.gap, (9, columns))
+    small = Plenoptic.built(plenoptic.bench, plenoptic.pitch, plenoptic.gap, (9, columns), each)
     white, slope = small.white(), small.pitch / small.to_lenslets
     refocused, conventional = [], []
     for distance in distances:
@@ -285,10 +320,7 @@ def depth_of_field(plenoptic: Plenoptic) -> fringes.Sharpness:
         refocused.append(fringes.contrast(_values(image)[4]))
         conventional.append(fringes.contrast(small.ideal(plane, small.bench.middle, 4096)[4]))
     number = small.to_lenslets / small.diameter
-    return fringes.Sharpness(distances, blurs, np.array(refocused), np.array(conventional), EACH, number)
-
-
-# --- aberrations ---
+    return fringes.Sharpness(distances, blurs, np.array(refocused), np.array(conventional), each, number)
 
 
 # --- what is shown ---
@@ -297,7 +329,60 @@ def depth_of_field(plenoptic: Plenoptic) -> fringes.Sharpness:
 def psnr(picture: Array, truth: Array, peak: float) -> float:
     """In decibels, `MARGIN` lenslets at each border left out."""
     inner = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
-    return closeness.psnr(picture[inner], truth[inner], peak)
+    return measures.psnr(picture[inner], truth[inner], peak)
+
+
+def _pictures(
+    plenoptic: Plenoptic,
+    raw: Image,
+    decoded: LightField,
+    refocused: Refocused,
+    sharpness: fringes.Sharpness,
+    aberrated: Aberrated,
+) -> tuple[Picture, ...]:
+    size = max(min(plenoptic.lenslets) // 12, 12)
+    near, chart, _ = figures.detailed_crops([refocused.shown(each) for each in refocused.pictures], size)
+    wide = min(4 * size, min(plenoptic.lenslets))
+    closer = figures.Crop(chart.row + size // 2 - wide // 2, chart.column + size // 2 - wide // 2, wide)
+    before, after = aberrated.decibels
+    lens = [
+        (f"aberrated: {before:.1f} dB", refocused.shown(aberrated.before)),
+        (f"corrected: {after:.1f} dB", refocused.shown(aberrated.after)),
+        ("ideal camera", refocused.shown(aberrated.ideal)),
+    ]
+    return (
+        Picture(
+            "raw",
+            "The raw recording, and a piece of it",
+            "Turned upright as a whole. Each lenslet shows the round main lens; where things are out of focus, "
+            "its parts differ.",
+            _raw_figure(plenoptic, raw, near, refocused.peak),
+        ),
+        Picture(
+            "views",
+            "Decoded views",
+            "The pixels at one place of all micro-images are the view from one place in the lens.",
+            figures.views_figure(decoded[1:-1, 1:-1].replaced(_inner(decoded) / np.float32(refocused.peak))),
+        ),
+        Picture(
+            "refocused",
+            "Refocused from that one recording",
+            "Below, ideal cameras of the same opening, focused there, at the resolution of the lenslets.",
+            _table(refocused.rows()),
+        ),
+        Picture(
+            "depth-of-field",
+            "Sharpness over depth",
+            f"Contrast of fringes of {fringes.PERIOD} lenslets, on a plane that comes nearer. Lines: closed form.",
+            sharpness.figure(),
+        ),
+        Picture(
+            "aberration",
+            "An aberrated lens, corrected",
+            "Spherical aberration and coma, focused in the middle; whole, and a piece.",
+            _table([lens, [("", closer.of(picture)) for _, picture in lens]]),
+        ),
+    )
 
 
 def _values(image: Image) -> Array:
@@ -312,9 +397,7 @@ def _table(rows: Sequence[Sequence[tuple[str, figures.Shown]]]) -> Figure:
     """Pictures in rows, each below its title."""
     ratios = [row[0][1].shape[0] / row[0][1].shape[1] for row in rows]
     figure = figures.new_figure(11.5, 0.7 + 3.8 * sum(ratios))
-    grid = figure.subplots(len(rows), len(rows[0]), height_ratios=ratios)
-    for axes, (title, picture) in zip(grid.ravel(), (each for row in rows for each in row), strict=True):
-        figures.put(axes, picture, title)
+    figures.fill(figure.subplots(len(rows), len(rows[0]), height_ratios=ratios), rows)
     return figure
 
 
@@ -323,11 +406,12 @@ def _raw_figure(plenoptic: Plenoptic, raw: Image, near: figures.Crop, peak: floa
     from matplotlib.patches import Rectangle
 
     upright = _values(raw.upright()) / (math.pi / 4 * (plenoptic.pitch / plenoptic.gap) ** 2)
-    piece = figures.Crop(near.row * EACH, near.column * EACH, near.size * EACH)
+    each = plenoptic.each
+    piece = figures.Crop(near.row * each, near.column * each, near.size * each)
     figure = figures.new_figure(11.5, 0.4 + 5.6 * upright.shape[0] / upright.shape[1])
     whole, part = figure.subplots(1, 2, width_ratios=(upright.shape[1] / upright.shape[0], 1))
     rows, columns = plenoptic.lenslets
-    title = f"whole: {rows}×{columns} lenslets, {EACH}×{EACH} pixels behind each"
+    title = f"whole: {rows}×{columns} lenslets, {each}×{each} pixels behind each"
     all_shown = figures.values_shown(upright, peak)
     figures.put(whole, all_shown, title).set_interpolation("antialiased")
     whole.add_patch(
@@ -338,36 +422,13 @@ def _raw_figure(plenoptic: Plenoptic, raw: Image, near: figures.Crop, peak: floa
 
 
 def _text(plenoptic: Plenoptic) -> str:
-    length = story.length
-    focal_length = 1 / (1 / plenoptic.gap + 1 / plenoptic.to_lenslets)
-    published = (
-        "Lenslets, pixels and f-number are the paper’s; its lens had 140 mm, and its pictures 292×292 pixels."
-        if math.isclose(plenoptic.pitch, PITCH) and math.isclose(plenoptic.gap, F_NUMBER * PITCH)
-        else "The paper’s lenslets, 125 µm wide and f/4, do not suit this light field."
-    )
     return paragraphs(
-        [
-            f"A lens of f = {length(plenoptic.bench.focal_length)} and {length(plenoptic.diameter)} opening is "
-            f"focused {story.away(plenoptic.bench.middle)}. Where a sensor would stand is a sheet of "
-            f"{plenoptic.lenslets[0]}×{plenoptic.lenslets[1]} lenslets, {length(plenoptic.pitch)} wide, of "
-            f"f = {length(focal_length)}; {length(plenoptic.gap)} behind it the sensor, {EACH}×{EACH} pixels of "
-            f"{length(plenoptic.camera.sensor.pitches[1])} for each. Lens and lenslets have one f-number, so that "
-            f"micro-images of the lens touch and do not overlap. {published}",
-            "The sensor has the noise of photons, reading and 12 bits (full well 10 000 e⁻). Its recording is "
-            "divided by one of something white; the pixels at one place of all micro-images, side by side, are a "
-            "view. Refocused pictures are sums of views, each moved by its parallax at the new distance, taken as "
-            "slices of the 4-D spectrum (Ng, Fourier slice photography, 2005): sharp, with faint ripples beside "
-            "hard edges.",
-            "They are compared with the same lens perfectly focused there, without noise, each pixel averaging "
-            "over what one lenslet shows. Rays through both cameras look at the same continuous light field. "
-            f"{MARGIN} lenslets at each border are left out.",
-            "For depth of field, fringes stand on a plane that comes nearer. A pixel’s window on the lens, "
-            f"1/{EACH} as wide, blurs {EACH} times less than the lens; refocusing undoes the rest.",
-            f"The aberrations are {SPHERICAL / um:g} µm (spherical) and {COMA / um:g} µm (coma) of optical path, "
-            "root mean square. They bend a ray by an amount that depends on its place in the lens alone, which "
-            "each view knows: it is moved back before summation (R. Ng and P. Hanrahan, Digital correction of "
-            "lens aberrations in light field photography, 2006).",
-        ]
+        "gallery/prose/plenoptic.txt",
+        camera=plenoptic,
+        published=math.isclose(plenoptic.pitch, PITCH) and math.isclose(plenoptic.gap, F_NUMBER * PITCH),
+        margin=MARGIN,
+        spherical=SPHERICAL / um,
+        coma=COMA / um,
     )
 
 
@@ -378,5 +439,5 @@ ENTRY = Entry(
     "plenoptic camera, Stanford CTSR 2005-02",
     "Lenslets before the sensor record from where in the lens light came: one exposure is refocused afterwards, "
     "as sharply as a lens stopped down by the number of pixels behind a lenslet, and aberrations are undone.",
-    run,
+    Run(),
 )

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcc.demo import story
 from vcc.gallery import extended_depth
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, paragraphs
-from vcc.gallery.extended_depth import ALIKE, PUPIL, WAVELENGTH, Comparison, Measured
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Sizes
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.shapes.patterns import Open
 from vcc.shapes.surfaces import Cubic
 from vcc.showcase.bench import Bench
+from vcc.showcase.words import away, paragraphs
 
 RATIO = 3.0
 """α over the largest misfocus ψ: the paper's example has α = 90, and ψ up to 30."""
@@ -34,62 +34,64 @@ class Pair:
     plain: tuple[Lens | Mask, ...]
 
 
-def run(bench: Bench, progress: Progress) -> Result:
-    """Point-spread functions over depth, a flat target restored by one filter at each depth, and the scene."""
-    pair = designed(bench)
-    comparison, depths = pair.comparison, pair.comparison.depths
-    advance = Steps(progress, 2 * len(depths) + 2)
-    progress(0, advance.total)
-    plain = comparison.measured(pair.plain, pair.plain, advance)
-    coded = comparison.measured(pair.coded, pair.plain, advance)
-    pictures = (
-        (
-            Picture(
-                "psf",
-                "Point-spread functions",
-                "From near to far, rays traced; above without the plate, below with it.",
-                extended_depth.spreads_figure({"no plate": plain, "cubic plate": coded}, depths),
-            ),
-        ),
-        (
-            Picture(
-                "target",
-                "A flat target near, in focus and far",
-                "Restored by one filter each.",
-                extended_depth.target_figure({"no plate": plain, "cubic plate, one filter": coded}, depths),
-            ),
-        ),
-        extended_depth.scene_pictures(
+@dataclass(frozen=True)
+class Run:
+    """Point-spread functions over depth, a flat target restored by one filter at each depth, and the scene.
+
+    Args:
+        sizes: how much work it is.
+    """
+
+    sizes: Sizes = FULL
+
+    def __call__(self, bench: Bench, progress: Progress) -> Result:
+        """Take a light field through both cameras, and measure."""
+        pair = designed(bench, self.sizes)
+        comparison, depths = pair.comparison, pair.comparison.depths
+        advance = Steps(progress, 2 * len(depths) + 2)
+        progress(0, advance.total)
+        plain = comparison.measured(pair.plain, pair.plain, advance)
+        coded = comparison.measured(pair.coded, pair.plain, advance)
+        scene = extended_depth.scene_pictures(
             comparison, ("No plate", pair.plain), ("With the plate", pair.coded), coded.spreads, advance
-        ),
-    )
-    text = paragraphs(
-        [
-            f"A lens of f = {story.length(bench.focal_length)} with a square opening of {story.length(PUPIL)}, "
-            f"focused {story.away(comparison.focus)}, and a plate of phase α·((x/R)³ + (y/R)³) in it. Over the "
-            f"range of depths the misfocus is ψ = ±{comparison.misfocus:.0f} rad, and α = {RATIO:g}·ψ = "
-            f"{pair.alpha:.0f} rad, the ratio of the paper’s example (α = 90, ψ up to 30).",
-            f"A flat target, the middle view of the light field, is recorded at {len(depths)} depths with noise "
-            f"of {extended_depth.NOISE:.1%} of white. One Wiener filter for all depths, made of all PSFs and a "
-            "1/f² prior, restores each. The camera without the plate has a filter made likewise, or none where "
-            "that is better. Decibels are against the sharp lens’s picture without noise. Rays, no diffraction: "
-            "the fringes of the true PSF are averaged by pixels as large as these.",
-        ]
-    )
-    return Result(text, pictures, _findings(plain, coded, depths), bench.assumed)
+        )
+        return Result(
+            _text(pair), (*_figures(plain, coded, depths), scene), _findings(plain, coded, depths), bench.assumed
+        )
 
 
-def designed(bench: Bench) -> Pair:
+def designed(bench: Bench, sizes: Sizes = FULL) -> Pair:
     """Focused in the middle of the range of 1/Z, with a plate for its ends.
 
     Raises:
         InputError: a range so small that nothing is out of focus.
     """
-    comparison = Comparison(bench)
+    comparison = Comparison(bench, sizes=sizes)
     alpha = RATIO * comparison.misfocus
     lens = Lens(bench.focal_length)
     plate = PhasePlate(Cubic.from_alpha(alpha, PUPIL / 2, WAVELENGTH), width=PUPIL)
     return Pair(comparison, alpha, (lens, plate), (lens, Mask(Open(), width=PUPIL)))
+
+
+def _text(pair: Pair) -> str:
+    return paragraphs(
+        "gallery/prose/wavefront-coding.txt",
+        comparison=pair.comparison,
+        alpha=pair.alpha,
+        pupil=PUPIL,
+        ratio=RATIO,
+        noise=NOISE,
+    )
+
+
+def _figures(plain: Measured, coded: Measured, depths: tuple[float, ...]) -> tuple[tuple[Picture, ...], ...]:
+    spreads = extended_depth.spreads_figure({"no plate": plain, "cubic plate": coded}, depths)
+    target = extended_depth.target_figure({"no plate": plain, "cubic plate, one filter": coded}, depths)
+    traced = "From near to far, rays traced; above without the plate, below with it."
+    return (
+        (Picture("psf", "Point-spread functions", traced, spreads),),
+        (Picture("target", "A flat target near, in focus and far", "Restored by one filter each.", target),),
+    )
 
 
 def _findings(plain: Measured, coded: Measured, depths: tuple[float, ...]) -> tuple[Finding, ...]:
@@ -108,7 +110,7 @@ def _findings(plain: Measured, coded: Measured, depths: tuple[float, ...]) -> tu
         gain = coded.decibels[end] - plain.decibels[end]
         numbers.append(
             Finding(
-                f"flat target {story.away(depths[end])}, one filter for all depths: gain over no plate",
+                f"flat target {away(depths[end])}, one filter for all depths: gain over no plate",
                 "5 dB or more",
                 gain,
                 "dB",
@@ -127,5 +129,5 @@ ENTRY = Entry(
     "Wavefront coding",
     "E. R. Dowski and W. T. Cathey, Extended depth of field through wave-front coding, Applied Optics 34, 1995",
     "A cubic phase plate makes the blur alike at all depths, so that one filter restores them all.",
-    run,
+    Run(),
 )

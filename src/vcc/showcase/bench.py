@@ -1,4 +1,4 @@
-"""The demo's optical bench: a light field, and the cameras that look at it."""
+"""An optical bench: a light field, and the cameras that look at it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import mm, um
 from vcc.camera import Camera
+from vcc.formats import open_light_field
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
 from vcc.optics.sensor import Sensor
@@ -56,6 +57,11 @@ class Bench:
     pitch: tuple[float, float]
     scale: float = 1.0
     assumed: str = ""
+
+    @property
+    def distances(self) -> dict[str, float]:
+        """The three to focus on, metres, by name, nearest first."""
+        return {"near": self.near, "middle": self.middle, "far": self.far}
 
     def image_distance(self, distance: float) -> float:
         """Where the lens makes a sharp image of what is ``distance`` metres away: 1/d = 1/f − 1/Z."""
@@ -177,8 +183,6 @@ def from_someone(
         InputError: what the reader refuses, views that are not on an upright grid or in a single row, or views
             without parallax.
     """
-    from vcc.formats import open_light_field
-
     light_field = given if isinstance(given, LightField) else open_light_field(given, progress=progress)
     if small:
         light_field = light_field[::2, ::2, ::2, ::2]

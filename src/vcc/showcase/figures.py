@@ -1,4 +1,4 @@
-"""The demo's drawings: close-ups side by side, phase space, cameras, the contact sheet."""
+"""Drawings: close-ups side by side, views, masks, a contact sheet."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from vcc.fields.sampled import to_numpy
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
+from vcc.files.pictures import read_picture
 from vcc.image import Image
 from vcc.light_field import LightField
+from vcc.optics.sensor import Sensor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,6 +51,22 @@ class Crop:
         return shown[row : row + self.size, column : column + self.size]
 
 
+def crop_around(sensor: Sensor, place: tuple[float, float, float], size: int) -> Crop:
+    """The square around a point of the scene, as it is seen through the middle of a lens at z = 0.
+
+    Args:
+        sensor: behind the lens.
+        place: (X, Y, distance) of the point, metres.
+        size: pixels a side.
+    """
+    # Upright, the picture runs the way the scene does.
+    row, column = (
+        (count - 1) / 2 + across / place[2] * sensor.z / pitch
+        for across, count, pitch in zip(place[1::-1], sensor.shape, sensor.pitches, strict=True)
+    )
+    return Crop(round(row) - size // 2, round(column) - size // 2, size)
+
+
 def shown(image: Image, exposure: float) -> Shown:
     """A picture as screens want it: upright, exposed, sRGB, (rows, columns, 3), 0 to 1."""
     return values_shown(image.upright().to_numpy(), 1 / exposure)
@@ -66,6 +84,11 @@ def values_shown(upright: NDArray[Any], white: float = 1.0) -> Shown:
     if coded.ndim == 2 or coded.shape[2] == 1:
         coded = np.repeat(coded.reshape(*coded.shape[:2], 1), 3, axis=2)
     return np.asarray(coded[..., :3], dtype=np.float32)
+
+
+def grey_shown(picture: NDArray[Any]) -> Shown:
+    """A grey picture as screens want it, by the plain power law of 2.2: (rows, columns), 0 to 1."""
+    return np.asarray(np.clip(picture, 0, 1).astype(np.float32) ** np.float32(1 / 2.2))
 
 
 def view_shown(light_field: LightField, row: int, column: int) -> Shown:
@@ -101,7 +124,7 @@ def _detail(picture: Shown, smooth: Any, size: int) -> Any:
     """How much fine structure the square around each pixel holds; none near the border."""
     grey = picture.mean(axis=2)
     fine = (grey - smooth(grey, 5)) ** 2
-    energy = np.sqrt(smooth(fine, size))
+    energy = np.sqrt(np.maximum(smooth(fine, size), 0))  # running sums leave rounding of either sign
     half = size // 2 + 1
     inside = np.zeros_like(energy)
     inside[half:-half, half:-half] = energy[half:-half, half:-half]
@@ -130,12 +153,30 @@ def close_ups(columns: Sequence[tuple[str, Shown]], crops: Sequence[Crop], rows:
         rows: what is to be seen at each.
     """
     figure = new_figure(2.3 * len(columns) + 0.3, 2.3 * len(crops) + 0.35)
-    grid = figure.subplots(len(crops), len(columns), squeeze=False)
-    for row, (crop, name) in enumerate(zip(crops, rows, strict=True)):
-        for axes, (title, picture) in zip(grid[row], columns, strict=True):
-            put(axes, crop.of(picture), title if row == 0 else "")
-        grid[row, 0].set_ylabel(name, fontsize=LABEL, color=INK)
+    pictures = [
+        [(title if row == 0 else "", crop.of(picture)) for title, picture in columns]
+        for row, crop in enumerate(crops)
+    ]
+    fill(figure.subplots(len(crops), len(columns), squeeze=False), pictures, rows)
     return figure
+
+
+def fill(grid: Any, rows: Sequence[Sequence[tuple[str, Any]]], labels: Sequence[str] = (), **options: Any) -> None:
+    """Pictures on a grid of axes, each below its title.
+
+    Args:
+        grid: of axes, (rows, columns).
+        rows: titles and pictures; a row that is shorter than the grid's leaves the last of its places empty.
+        labels: what stands to the left of the rows.
+        options: of `put`.
+    """
+    for line, row in zip(grid, rows, strict=True):
+        for axes, (title, picture) in zip(line, row, strict=False):
+            put(axes, picture, title, **options)
+        for axes in line[len(row) :]:
+            axes.set_axis_off()
+    for line, words in zip(grid, labels, strict=False):
+        line[0].set_ylabel(words, fontsize=LABEL, color=INK)
 
 
 def put(axes: Any, picture: Shown, title: str = "", **options: Any) -> Any:
@@ -259,7 +300,5 @@ def contact_sheet(title: str, rows: Sequence[SheetRow]) -> Figure:
 
 
 def _read(path: Path) -> Any:
-    from vcc.files.pictures import read_picture
-
     picture = read_picture(path)[0][..., :3]
     return np.repeat(picture[..., None], 3, axis=2) if picture.ndim == 2 else picture

@@ -19,6 +19,19 @@ from vcc.sources.textures import Array, Colour, Painting, soft
 NEAR, MIDDLE, FAR = 0.8, 1.3, 3.0
 """Distances of the leaves, the chart and the town, metres."""
 
+PLACES = {
+    "leaves before the chart": (-0.128, -0.085, MIDDLE),
+    "the chart's star": (-0.046, 0.030, MIDDLE),
+    "lamps of the town": (0.48, -0.335, FAR),
+}
+"""Places worth a close look: (X, Y, distance), metres."""
+CHECK_PLACES = {
+    "star": (-0.054, 0.026, MIDDLE),
+    "letters": (0.068, 0.120, MIDDLE),
+    "leaf": (-0.150, -0.020, NEAR),
+}
+"""Others, of fine print and fine edges."""
+
 
 def demo_scene() -> PlanesScene:
     """Leaves at 0.8 m, a test chart at 1.3 m and a town at dusk at 3 m; about 23° wide.

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import measures
 from vcc.camera import Camera
 from vcc.fields.sampled import to_numpy
 from vcc.image import Image
@@ -75,7 +76,7 @@ def _spline(light_field: LightField, view: tuple[int, int], s: NDArray[np.float6
 
 
 def psnr(picture: Image, truth: Image, white: float) -> float:
-    """The peak signal-to-noise ratio of a picture in linear light, decibels; its borders left out.
+    """How close a picture comes (`vcc.base.measures.psnr`), decibels; its borders left out.
 
     Args:
         picture: irradiance.
@@ -87,5 +88,5 @@ def psnr(picture: Image, truth: Image, white: float) -> float:
         slice(round(BORDER * rows), rows - round(BORDER * rows)),
         slice(round(BORDER * columns), columns - round(BORDER * columns)),
     )
-    difference = (picture.to_numpy()[inside] - truth.to_numpy()[inside]).astype(np.float64) / white
-    return float(-10 * np.log10(np.mean(difference**2)))
+    one, other = (image.to_numpy()[inside].astype(np.float64) / white for image in (picture, truth))
+    return measures.psnr(one, other, peak=1.0)
