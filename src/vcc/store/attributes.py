@@ -22,6 +22,8 @@ ARRAY = "samples"
 """The name of the array in the group."""
 AXES = ("v", "u", "t", "s", "channel")
 UNITS = {"u": "m", "v": "m", "s": "1", "t": "1"}
+PICTURES = "vcc.picture"
+"""How Zarr calls the codec of `vcc.store.picture_codec`."""
 DTYPES = ("uint8", "uint16", "float16", "float32")
 
 Transfer = Literal["linear", "srgb"]

@@ -10,9 +10,8 @@ import numpy as np
 
 from vcc.base import late
 from vcc.base.errors import InputError
+from vcc.store.attributes import PICTURES
 
-PICTURES = "vcc.picture"
-"""How Zarr calls the codec of `vcc.store.picture_codec`."""
 CHUNK_BYTES = 2**17
 """About how many bytes of samples an inner chunk holds: some rows of pixels of one view."""
 

@@ -16,7 +16,7 @@ from zarr.core.common import JSON
 from zarr.registry import register_codec
 
 from vcc.base.errors import InputError
-from vcc.store.compression import PICTURES
+from vcc.store.attributes import PICTURES
 
 
 @dataclass(frozen=True)
