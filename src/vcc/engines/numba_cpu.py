@@ -33,6 +33,8 @@ BAND = 64
 """Rows of the picture that a thread works on at once, at most."""
 BAND_BYTES = 3 * 2**17
 """Their sums stay in the second-level cache."""
+SMALL = 2**17
+"""Numbers of a picture below which filtering it takes less time than starting threads for it."""
 MASK_LINES = 64
 """Lines of a mask that a thread samples at once."""
 
@@ -98,8 +100,11 @@ def _in_one_pass(
     weights = along.down.astype(np.float32), along.across.astype(np.float32)
     filtering = tables.Finish(*weights, channels, on.guard, transmission)
     lines = raster.reshape(raster.shape[0], -1)
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda band: kernels.filter_rows(lines, filtering, band, picture), _bands(rows)))
+    if picture.size < SMALL:
+        kernels.filter_rows(lines, filtering, tables.Band(0, rows), picture)
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(lambda band: kernels.filter_rows(lines, filtering, band, picture), _bands(rows)))
     return picture.reshape(rows, columns, channels)
 
 
