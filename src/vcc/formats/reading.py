@@ -20,7 +20,7 @@ from vcc.fields.grid import Grid
 from vcc.fields.samples import check_samples
 from vcc.files.transfer import decode
 from vcc.formats import containers
-from vcc.formats.cameras import Cameras, Pair
+from vcc.formats.cameras import Cameras
 from vcc.formats.folder_info import FolderInfo, Given, cameras_for, info_of_file, info_of_grid
 from vcc.formats.folders import find_grid, towards_positions
 from vcc.formats.grid import Decoded, Geometry, ViewGrid
@@ -71,8 +71,8 @@ def open_light_field(
     path: str | PathLike[str],
     *,
     transfer: Transfer = "auto",
-    spacing: Pair | None = None,
-    slope_per_pixel: Pair | None = None,
+    spacing: float | tuple[float, float] | None = None,
+    slope_per_pixel: float | tuple[float, float] | None = None,
     focus_distance: float | None = None,
     orientation: OrientationChoice = "auto",
     views: tuple[int, int] | None = None,
@@ -139,8 +139,8 @@ def open_sparse_views(
     path: str | PathLike[str],
     *,
     transfer: Transfer = "auto",
-    spacing: Pair | None = None,
-    slope_per_pixel: Pair | None = None,
+    spacing: float | tuple[float, float] | None = None,
+    slope_per_pixel: float | tuple[float, float] | None = None,
     focus_distance: float | None = None,
     views: tuple[int, int] | None = None,
     order: Order | None = None,
@@ -227,20 +227,13 @@ def _decoded(
 
 def _opened_file(decoded: Decoded, path: Path, given: Given, transfer: Transfer) -> _Opened:
     info = info_of_file(decoded)
-    values, counted = decoded.values, decoded.values.dtype.kind == "u"
+    cameras = cameras_for(info, decoded.geometry, given, path)
+    values, truth = decoded.values, _middle(decoded.disparity)
+    counted = values.dtype.kind == "u"
     chosen = decoded.transfer if transfer == "auto" else transfer
     if chosen == "srgb" and values.dtype in (np.uint8, np.uint16):
         values = decode(values)
-    return _Opened(
-        info,
-        decoded.geometry,
-        cameras_for(info, decoded.geometry, given, path),
-        values,
-        counted,
-        _middle(decoded.disparity),
-        _Seen(),
-        "",
-    )
+    return _Opened(info, decoded.geometry, cameras, values, counted, truth, _Seen(), "")
 
 
 def _middle(maps: NDArray[Any] | None) -> NDArray[Any] | None:
