@@ -1,4 +1,4 @@
-"""Looking up a grid between its points, for all compiled kernels.
+"""Looking up a grid between its points, for all compiled kernels but `ray_kernels.add_view`, in single precision.
 
 Inlined before compiling: an array that is handed on has its references counted, by all threads at once.
 """
