@@ -1,4 +1,4 @@
-"""Affine maps of rays and indices: the public face of `vcc.base.affine`."""
+"""Affine maps of rays and of sample indices, as users import them: the whole of linear optics, and every frame."""
 
 from vcc.base.affine import (
     Affine,

@@ -1,4 +1,4 @@
-"""What goes wrong, as types: the public face of `vcc.base.errors`."""
+"""What goes wrong, as types: one error for bad input, one warning for a result to be read with care."""
 
 from vcc.base.errors import (
     InputError,

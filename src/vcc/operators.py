@@ -1,4 +1,10 @@
-"""The paper's operators on light fields themselves: the public face of `vcc.run.operators`."""
+"""The paper's operators on a light field itself, for those who want the field and not only the picture.
+
+𝕋 (`vcc.LightField.transformed`) is exact and lazy. The others here make new samples: `resampled` puts the field
+on another grid, `masked` is the dot product (·), `scattered` the convolution (⊗), `projected` the sensor (S). A
+camera's picture needs none of them; they cost what 4-D data cost, so the size is computed first and refused
+above a limit.
+"""
 
 from vcc.image import Image
 from vcc.light_field import LightField

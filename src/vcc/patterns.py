@@ -1,4 +1,10 @@
-"""What masks let through: the public face of `vcc.shapes.patterns`."""
+"""Transmission patterns, as users import them: what a mask lets through, as a function of position.
+
+A pattern is called with positions (x, y) in metres from its own middle (x right, y down) and returns the
+transmitted share, 0 to 1. Light fields are sampled in cells, so what a camera needs is a pattern's *mean* over
+a rectangle, never its value at a point: patterns with a closed form give it exactly, the others through a fine
+raster. Any function of (x, y) can be used as a pattern through `as_pattern`.
+"""
 
 from vcc.shapes.patterns import (
     Bounded,
