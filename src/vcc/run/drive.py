@@ -100,7 +100,7 @@ class Drive:
             self._make_views_between(samples)
         kind = to_dtype(samples.whole()) if self.in_memory else self.samples.grid.kind
         self.kind, factor = plan.kept_as(kind)
-        self.core = plan.core.scaled(factor)
+        self.core = plan.core.scaled(factor / self.samples.grid.full_scale)
         self.runner = plan.core.by(self.engine)
         self._ready: Any = None
 
