@@ -164,7 +164,6 @@ class Drive:
         while tolerance is not None and sampling_error(found) > tolerance * abs(_mean(found.values)):
             if found.samples * 2 > LARGEST_SAMPLES:
                 error = sampling_error(found) / abs(_mean(found.values))
-                error = sampling_error(found) / abs(_mean(found.values))
                 warnings.warn(
                     f"the sampling error is {error:.2g} of the picture's mean after {found.samples} rays a pixel, "
                     f"the most there are; {tolerance:g} was asked for",
