@@ -39,14 +39,14 @@ def plane(disparity, times=1, views=(3, 3), pixels=(40, 48)):
     return wave(grid[3], grid[2], grid[1], grid[0], disparity).astype(np.float32)
 
 
-def between(times, disparity, frame=FRAME, source="given", full_scale=1.0):
+def between(times, disparity, frame=FRAME, source="given"):
     shape = np.shape(disparity)
     maps = DisparityMaps(
         np.asarray(disparity, np.float32).reshape(-1, *shape[2:]),
         tuple((float(j), float(i)) for j, i in np.ndindex(*shape[:2])),
         source,
     )
-    return ViewsBetween(times, maps, Parallax.of(frame), full_scale)
+    return ViewsBetween(times, maps, Parallax.of(frame))
 
 
 def made(values, rule):
@@ -132,7 +132,7 @@ def test_it_is_linear_in_the_samples():
 def test_integers_stand_for_shares_of_full_scale():
     values, disparity, _ = two_planes()
     codes = np.round(values * 255).astype(np.uint8)
-    pictures, _ = made(codes, between((2, 2), disparity, full_scale=255.0))
+    pictures, _ = made(codes, between((2, 2), disparity))
     expected, _ = made(codes.astype(np.float32) / 255, between((2, 2), disparity))
     np.testing.assert_allclose(pictures, expected, atol=1e-6)
 

@@ -84,7 +84,8 @@ def expected(plan: Plan, values: np.ndarray) -> np.ndarray:
         raster += np.einsum("yl,xk,lkc->yxc", down, across, view, optimize=True)
     guard = (core.raster_shape[0] - plan.sensor_shape[0]) // 2
     down, across = (band_matrix(w, n, guard) for w, n in zip(filters(plan), plan.sensor_shape, strict=True))
-    picture = core.scale * np.einsum("py,qx,yxc->pqc", down, across, raster, optimize=True)
+    full = np.iinfo(values.dtype).max if values.dtype.kind == "u" else 1
+    picture = core.scale / full * np.einsum("py,qx,yxc->pqc", down, across, raster, optimize=True)
     return picture.reshape(*plan.sensor_shape, *values.shape[4:])
 
 

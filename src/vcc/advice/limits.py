@@ -100,11 +100,10 @@ def _reach(optics: Folded, stage: Stage) -> float | None:
 
 def _before_what_blocks(optics: Folded, wavelength: float) -> Items:
     """What is known of light field and sensor; or of a lens array, where that is the first to end matrices."""
-    if optics.gaps is not None:
-        gaps = optics.gaps
-        airy = _airy(optics, wavelength)
-        return _disparities(optics, gaps) | _view_counts(optics, gaps) | _samples(optics, gaps) | airy
-    array = optics.blocking
+    gaps, array = optics.gaps, optics.blocking
+    if gaps is not None:
+        of_views = _disparities(optics, gaps) | _view_counts(optics, gaps)
+        return of_views | _samples(optics, gaps) | _airy(optics, wavelength)
     if array is not None and isinstance(array.faces.bending, CellDeflection):
         return _lenslets(optics, array, array.faces.bending.lattice.pitch, wavelength)
     return {}

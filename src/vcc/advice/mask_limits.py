@@ -63,12 +63,12 @@ def mask_limits(optics: Folded, stage: Stage, wavelength: float) -> tuple[Items,
     try:
         detail = finest_detail(stage.faces.pattern)
     except InputError as error:
-        return {}, (f"detail of {label} is not given: {error}",)
+        return {}, (words.detail_unknown(label, error),)
     if detail is None:
         return {}, ()
     mask = _Mask(optics, stage, detail)
     if stage not in optics.reached:
-        return mask.fresnel(wavelength), (f"the footprints of samples at {label} are not given",)
+        return mask.fresnel(wavelength), (words.footprints_unknown(label),)
     if mask.in_aperture:
         return mask.cells() | mask.holes(wavelength), ()
     return mask.cells() | mask.shadow() | mask.fresnel(wavelength), ()

@@ -261,6 +261,16 @@ def within_facets(label: str) -> str:
     return f"{label} bends by plane facets: items hold within each, not across their edges"
 
 
+def detail_unknown(label: str, why: Exception) -> str:
+    """Of a mask that does not tell how fine it is."""
+    return f"detail of {label} is not given: {why}"
+
+
+def footprints_unknown(label: str) -> str:
+    """Of a mask behind what matrices end at."""
+    return f"the footprints of samples at {label} are not given"
+
+
 # --- all of it ---
 
 

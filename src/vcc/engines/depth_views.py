@@ -109,7 +109,7 @@ class DenserViews:
         j, i = row // down, column // across
         y, x = (row % down + 0.5) / down - 0.5, (column % across + 0.5) / across - 0.5
         channels = self._given[4:]
-        scale = np.float32(1 / self._between.full_scale)
+        scale = np.float32(1 / self._source.grid.full_scale)
         view = self._views(j, i)
         if x == 0 and y == 0:
             return np.asarray(view.samples[first:stop].reshape(stop - first, -1, *channels) * scale, np.float32)

@@ -81,13 +81,11 @@ class ViewsBetween(Value):
         times: into how many parts (down, across) the cell of each view is divided.
         maps: disparities of the light field that there is.
         parallax: what they mean.
-        full_scale: the stored value that stands for radiance 1; denser samples are radiance, float32.
     """
 
     times: tuple[int, int]
     maps: DisparityMaps
     parallax: Parallax
-    full_scale: float
 
     def shape(self, given: tuple[int, ...]) -> tuple[int, ...]:
         """The shape of the denser light field's samples."""
@@ -149,5 +147,5 @@ def denser(train: Train, grid: Grid) -> tuple[Grid, ViewsBetween | None, str]:
     if max(wanted) > MOST_TIMES:
         left = max(down / j, across / i)
         reason += f"; {max(wanted)} would be needed, and {left:.2g} pixels stay between their pictures"
-    between = ViewsBetween(times, maps, parallax, grid.full_scale)
+    between = ViewsBetween(times, maps, parallax)
     return made, between, reason

@@ -115,7 +115,7 @@ class Core(Protocol):
 
     @property
     def scale(self) -> float:
-        """Turns stored samples into radiance, or into irradiance times shares."""
+        """Turns samples, which are radiance, into it or into irradiance times shares; see `scaled`."""
         ...
 
     @property

@@ -101,7 +101,7 @@ class Drive:
             self._make_views_between(samples)
         kind = to_dtype(samples.whole()) if self.in_memory else self.samples.grid.kind
         self.kind, factor = plan.kept_as(kind)
-        self.core = plan.core.scaled(factor)
+        self.core = plan.core.scaled(factor / self.samples.grid.full_scale)
         self.runner = plan.core.by(self.engine)
         self._ready: Any = None
 
@@ -164,7 +164,6 @@ class Drive:
         tolerance = self.how.tolerance
         while tolerance is not None and sampling_error(found) > tolerance * abs(_mean(found.values)):
             if found.samples * 2 > LARGEST_SAMPLES:
-                error = sampling_error(found) / abs(_mean(found.values))
                 error = sampling_error(found) / abs(_mean(found.values))
                 warnings.warn(
                     f"the sampling error is {error:.2g} of the picture's mean after {found.samples} rays a pixel, "

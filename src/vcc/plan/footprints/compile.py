@@ -111,7 +111,7 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs) -> Plan
     core = Footprints(
         raster_shape=sensor.shape,
         interpolation=_sharp_footprint(step, fine) if sharp else how.interpolation,
-        scale=grid.sample_volume / grid.full_scale / (sensor.pitches[0] * sensor.pitches[1]),
+        scale=grid.sample_volume / (sensor.pitches[0] * sensor.pitches[1]),
         view_rows=rows[used_rows],
         view_columns=columns[used_columns],
         weights=weights,

@@ -81,7 +81,7 @@ class Footprints(Value):
     Args:
         raster_shape: (rows, columns) of pixels.
         interpolation: of footprints: ``"nearest"``, ``"linear"``, ``"cubic"`` or ``"spline"``.
-        scale: turns stored samples times shares into irradiance.
+        scale: turns radiance times shares into irradiance.
         view_rows: row of views that each row of taps reads.
         view_columns: column of views that each column of taps reads.
         weights: (rows of taps, columns of taps), the share of each tap's cell that apertures let pass.

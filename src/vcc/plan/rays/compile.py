@@ -84,7 +84,7 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         motion=motion,
         between_views=how.between_views == "auto",
         views=(nv, nu, nt, ns),
-        scale=1.0 / grid.full_scale,
+        scale=1.0,
         samples=samples,
         seed=how.seed,
         points=_table(how.seed, scatters, aimed.aim),

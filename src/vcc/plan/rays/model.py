@@ -215,7 +215,7 @@ class Rays(Value):
         motion: 2×2; a point of the scene is seen in view (i, j) at pixel (k, l) − motion · (i, j).
         between_views: interpolate between views along the motion; else each view is its cell.
         views: (v, u, t, s) of the light field.
-        scale: turns stored samples into radiance.
+        scale: the radiance that a sample of 1 stands for.
         samples: rays a pixel, a power of two (through an array: through each cell).
         seed: of the choice of points for each pixel.
         points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
