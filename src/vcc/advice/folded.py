@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.advice.view_gaps import ROUNDING, ViewGaps
+from vcc.advice.view_gaps import ROUNDING, ViewGaps, distance_of
 from vcc.base.affine import Affine
 from vcc.fields.grid import Grid
 from vcc.optics.deflections import CellDeflection, FacetDeflection
@@ -101,6 +101,12 @@ class Folded:
         vertical, horizontal = self.train.sensor.pitches
         per_pixel = np.diag([1 / horizontal, 1 / vertical])
         return ViewGaps(self.frame, per_pixel @ self.to_sensor.linear[:2], self.views_let_in)
+
+    @cached_property
+    def free_of_ghosts(self) -> tuple[float, float] | None:
+        """(near, far) before the entrance plane between which no gap is seen, metres; None where there is none."""
+        free = None if self.gaps is None else self.gaps.free_of_ghosts()
+        return None if free is None or free[1] <= 0 else (1 / free[1], distance_of(max(free[0], 0.0)))
 
     @cached_property
     def stop(self) -> float | None:

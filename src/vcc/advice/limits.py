@@ -66,7 +66,7 @@ def sampling_limits(
         wavelength=wavelength,
         focus_distance=None if gaps is None else _focus_distance(gaps),
         depths=None if vergences is None else (distance_of(vergences[1]), distance_of(vergences[0])),
-        free_of_ghosts=None if gaps is None else _free_of_ghosts(gaps),
+        free_of_ghosts=optics.free_of_ghosts,
         notes=notes,
         gaps=gaps,
         pixel=optics.pixel,
@@ -117,24 +117,17 @@ def _focus_distance(gaps: ViewGaps) -> float | None:
     return None if gaps.focus is None or gaps.focus < -ROUNDING else distance_of(gaps.focus)
 
 
-def _free_of_ghosts(gaps: ViewGaps) -> tuple[float, float] | None:
-    """(near, far), metres, of what lies before the entrance plane."""
-    free = gaps.free_of_ghosts()
-    return None if free is None or free[1] <= 0 else (1 / free[1], distance_of(max(free[0], 0.0)))
-
-
 def _disparities(optics: Folded, gaps: ViewGaps) -> Items:
     """Between neighbouring views' pictures of what is nearest, in focus and farthest."""
     if max(gaps.views) < 2:
         return {}
-    free = _free_of_ghosts(gaps)
     return {
         f"disparity {place}": words.disparity(
             ("in focus, " if place == "focus" else "") + words.distance_in_words(distance_of(vergence)),
             float(gaps.at(np.array([vergence]))[0]),
             gaps.limit,
             max(gaps.views),
-            free,
+            optics.free_of_ghosts,
         )
         for place, vergence in _places(optics, gaps)
     }
