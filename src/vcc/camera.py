@@ -15,7 +15,7 @@ from vcc.files.camera_writing import write_train
 from vcc.image import Image
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
-from vcc.plan.how import How, Options
+from vcc.plan.how import OF_THE_RUN, How, Options
 from vcc.plan.model import Plan
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
@@ -27,6 +27,16 @@ Field = TypeVar("Field", bound=InMemory)
 
 MUCH_MISSING = 0.01
 """Share of the rays asked for that may be missing without a warning."""
+
+
+def _check_of_the_run(options: Options) -> None:
+    """Refuse options that decide how a plan is made, where one is given."""
+    for name in options:
+        if name not in OF_THE_RUN:
+            raise InputError(
+                f"{name} is decided when a plan is made: leave it out, or pass it to camera.compile, and that plan "
+                "here"
+            )
 
 
 class Camera(Train):
@@ -81,7 +91,7 @@ class Camera(Train):
                 then read in pieces whose pictures are summed.
             how: all that may be chosen, in one record; None takes the defaults.
             plan: made before by `compile` for this light field, or for another of the same shape and frame; None
-                makes one.
+                makes one. What decides how it is made is then not to be given one by one.
             progress: called with (done, total) as the work advances.
             options: what is to be chosen otherwise than in ``how``, by name: ``method``, ``interpolation``,
                 ``between_views``, ``scene_distance``, ``refine``, ``samples``, ``tolerance``, ``seed``,
@@ -98,13 +108,14 @@ class Camera(Train):
         Raises:
             InputError: an option that does not exist or does not go with the method, an element that returns
                 what it must not; of a light field on disk, views that are missing or damaged, or a memory limit
-                that is too small; a plan for another sensor or another shape of light field.
+                that is too small; a plan for another camera, or for another shape or frame of light field.
         """
         chosen = How.of(how, options)
         if plan is None:
             plan = self.compile(light_field, chosen, progress=progress)
         else:
-            plan.check_fits(self.sensor.shape, light_field.grid)
+            plan.check_fits(self, light_field.grid)
+            _check_of_the_run(options)
         for caution in plan.cautions:
             warnings.warn(caution, ResultWarning, stacklevel=2)
         found = drive(plan, light_field, chosen, progress)

@@ -376,3 +376,14 @@ def test_a_plan_for_something_else_is_refused():
         larger.capture(lf, plan=plan)
     with pytest.raises(vcc.InputError, match=r"5×4×9×11 samples, not .*4×4×9×11: make it anew"):
         case.camera.capture(lf[1:], plan=plan)
+    further = vcc.Camera(case.camera.elements, replace(SENSOR, z=SENSOR.z * 1.01))
+    with pytest.raises(vcc.InputError, match=r"for another camera: make it anew"):
+        further.capture(lf, plan=plan)
+    with pytest.raises(vcc.InputError, match=r"for another frame of light field: make it anew"):
+        case.camera.capture(lf.scaled(1.01), plan=plan)
+    with pytest.raises(vcc.InputError, match="method is decided when a plan is made: leave it out"):
+        case.camera.capture(lf, plan=plan, method="rays")
+    with pytest.raises(vcc.InputError, match="tolerance is for pictures made by rays"):
+        case.camera.capture(lf, plan=plan, tolerance=0.01)
+    equal = vcc.Camera(list(case.camera.elements), replace(case.camera.sensor))
+    np.testing.assert_array_equal(equal.capture(lf, plan=plan).values, case.camera.capture(lf).values)

@@ -10,7 +10,7 @@ from vcc.optics.train import Train
 from vcc.plan.depth_rule import denser
 from vcc.plan.footprints.compile import blurs_or_why_not, compile_footprints
 from vcc.plan.how import How
-from vcc.plan.model import Plan
+from vcc.plan.model import MadeFor, Plan
 from vcc.plan.rays.compile import compile_rays
 
 
@@ -25,7 +25,11 @@ def compile_best(train: Train, grid: Grid, how: How | None = None) -> Plan:
     Raises:
         InputError: options that do not go with one another, an element that returns what it must not.
     """
-    how = how or How()
+    plan = _compiled(train, grid, how or How())
+    return replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame))
+
+
+def _compiled(train: Train, grid: Grid, how: How) -> Plan:
     by_footprints = "asked for" if how.method == "rays" else blurs_or_why_not(train, grid, how)
     if how.between_views == "depth":
         if isinstance(by_footprints, str):
@@ -34,8 +38,8 @@ def compile_best(train: Train, grid: Grid, how: How | None = None) -> Plan:
                 f"({by_footprints}): leave it out, and rays interpolate along the parallax of one depth"
             )
         made, between, why = denser(train, grid)
-        plan = compile_best(train, made, replace(how, between_views="auto"))
-        return replace(plan, grid_shape=grid.shape[:4], views_between=between, notes=(*plan.notes, why))
+        plan = _compiled(train, made, replace(how, between_views="auto"))
+        return replace(plan, views_between=between, notes=(*plan.notes, why))
     if not isinstance(by_footprints, str):
         for name, given in (("samples", how.samples), ("tolerance", how.tolerance)):
             if given is not None:

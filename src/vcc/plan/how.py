@@ -25,6 +25,10 @@ LARGEST_SAMPLES = 2**16
 """Rays a pixel: as many points as the table that all pixels share has."""
 
 
+OF_THE_RUN = ("tolerance", "engine", "threads", "memory_limit")
+"""What is chosen anew for each run of a plan; all else decides how the plan is made."""
+
+
 class Options(TypedDict, total=False):
     """The fields of `How`, for those who pass them one by one: ``camera.capture(lf, method="rays")``."""
 

@@ -7,17 +7,32 @@ Every step is linear in the samples, so the picture is the sum of the pictures o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.values import Value
 from vcc.fields.grid import Block, Grid
+from vcc.optics.train import Train
 from vcc.plan.depth_rule import ViewsBetween
 from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews
 from vcc.plan.protocol import Core
+
+
+@dataclass(frozen=True, eq=False)
+class MadeFor:
+    """What a plan was made for.
+
+    Args:
+        train: the optics.
+        frame: of the light field.
+    """
+
+    train: Train
+    frame: Affine
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,6 +55,7 @@ class Plan(Value):
             left unfilled.
         cautions: what a user should be warned of before a run, in words.
         notes: what was decided and why, in words.
+        made_for: the camera and the light field's place, by which `check_fits` tells; not part of what it is.
     """
 
     sensor_shape: tuple[int, int]
@@ -53,6 +69,7 @@ class Plan(Value):
     expected_ghosting: float = 0.0
     cautions: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    made_for: MadeFor | None = field(default=None, compare=False)
 
     @property
     def by_rays(self) -> bool:
@@ -100,18 +117,24 @@ class Plan(Value):
             factor *= one
         return (np.dtype(np.float32) if kind == np.float16 else kind), factor  # compiled code takes no half
 
-    def check_fits(self, sensor_shape: tuple[int, int], grid: Grid) -> None:
+    def check_fits(self, train: Train, grid: Grid) -> None:
         """Refuse a plan that was made for something else.
 
         Raises:
-            InputError: another size of sensor, or another shape of light field.
+            InputError: another camera, or another shape or frame of light field.
         """
+        sensor_shape = train.sensor.shape
         if self.sensor_shape != sensor_shape or self.grid_shape != grid.shape[:4]:
             raise InputError(
                 f"this plan is for a sensor of {_sizes(self.sensor_shape)} pixels and a light field of "
                 f"{_sizes(self.grid_shape)} samples, not {_sizes(sensor_shape)} and {_sizes(grid.shape[:4])}: "
                 "make it anew with camera.compile(light_field)"
             )
+        if self.made_for is not None and (
+            self.made_for.train != train or not self.made_for.frame.isclose(grid.frame)
+        ):
+            other = "frame of light field" if self.made_for.train == train else "camera"
+            raise InputError(f"this plan is for another {other}: make it anew with camera.compile(light_field)")
 
     def __repr__(self) -> str:
         rows, columns = self.sensor_shape

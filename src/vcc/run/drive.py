@@ -91,6 +91,8 @@ class Drive:
 
     def __init__(self, plan: Plan, samples: Samples, how: How) -> None:
         samples.check_complete()
+        if how.tolerance is not None and not plan.by_rays:
+            raise InputError("tolerance is for pictures made by rays; footprints have no sampling error")
         self.plan, self.how = plan, how
         self.name = chosen(how.engine, samples.whole())
         self.engine, self.threads = engine(self.name), how.workers
