@@ -37,7 +37,10 @@ from __future__ import annotations
 from os import PathLike
 
 from vcc.camera import Camera
-from vcc.files.camera_families import ELEMENT_KINDS, KERNEL_NAMES, PATTERN_NAMES, SURFACE_NAMES
+from vcc.files.camera_families import ELEMENT_KINDS as ELEMENT_KINDS
+from vcc.files.camera_families import KERNEL_NAMES as KERNEL_NAMES
+from vcc.files.camera_families import PATTERN_NAMES as PATTERN_NAMES
+from vcc.files.camera_families import SURFACE_NAMES as SURFACE_NAMES
 from vcc.files.camera_reading import read_train
 from vcc.files.camera_writing import write_train
 
@@ -73,6 +76,3 @@ def save_camera(camera: Camera, path: str | PathLike[str]) -> None:
             folder that cannot be written to.
     """
     write_train(camera, path)
-
-
-__all__ = ["ELEMENT_KINDS", "KERNEL_NAMES", "PATTERN_NAMES", "SURFACE_NAMES", "load_camera", "save_camera"]

@@ -98,5 +98,5 @@ def test_the_warm_up_runs_every_loop_that_is_timed_later() -> None:
     views = small.scene.light_field((20, 20), (16, 16), spacing=1e-3, slope_per_pixel=0.03, focus_distance=1.3)
     bench = replace(small, light_field=views)
     plans = [camera.compile(few_views(bench)) for camera in kinds_of_camera(bench)]
-    assert all(plan.taps_used > 0 for plan in plans)
-    assert {len(plan.masks) for plan in plans} == {0, 1}
+    assert all(plan.core.taps_used > 0 for plan in plans)
+    assert {len(plan.core.masks) for plan in plans} == {0, 1}

@@ -25,8 +25,9 @@ from vcc.optics.electronics import Electronics
 from vcc.optics.sensor import Sensor
 from vcc.recording import expose_image
 from vcc.recover import decode_heterodyne, heterodyne_calibration, refocused
-from vcc.recover.heterodyne import PINHOLE_SHARE, HeterodyneGeometry
+from vcc.recover.heterodyne import HeterodyneGeometry
 from vcc.recover.heterodyne_band import band_limited, places_on_sensor, true_views
+from vcc.recover.heterodyne_geometry import PINHOLE_SHARE
 from vcc.shapes.patterns import CosineSum, Open
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench

@@ -26,7 +26,7 @@ from vcc.recording import Recording
 from vcc.recover.heterodyne_geometry import PINHOLE_SHARE, HeterodyneGeometry, HeterodyneSetup
 from vcc.recover.recorded import grey, has_mosaic, numbers_of
 
-__all__ = ["PINHOLE_SHARE", "HeterodyneGeometry", "decode_heterodyne", "heterodyne_calibration"]
+__all__ = ["HeterodyneGeometry", "decode_heterodyne", "heterodyne_calibration"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
