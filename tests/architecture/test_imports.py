@@ -50,7 +50,17 @@ ROOMS = [
 FACADES = {"image", "recording", "camera", "camera_file", "light_field"}
 """The classes that users meet: verbs on data below. Nothing before them in `ROOMS` knows of them."""
 
-FACES = {"affine", "errors", "kernels", "operators", "patterns", "surfaces", "units"}
+FACES = {
+    "affine",
+    "demo.scene",
+    "errors",
+    "formats.pictures",
+    "kernels",
+    "operators",
+    "patterns",
+    "surfaces",
+    "units",
+}
 """Modules by which users import what stands in a folder: nothing of ours imports them."""
 
 BY_NAME = {
