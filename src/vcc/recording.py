@@ -16,6 +16,8 @@ from vcc.image import Image
 from vcc.optics.sensor import Sensor
 from vcc.run.demosaic import Demosaicing, demosaic
 from vcc.run.expose import Exposure, RawPicture, below_zero
+from vcc.run.photon_transfer import PhotonTransfer as PhotonTransfer
+from vcc.run.photon_transfer import photon_transfer as photon_transfer
 
 
 @dataclass(frozen=True, eq=False, repr=False)
