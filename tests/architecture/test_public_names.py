@@ -8,7 +8,7 @@ import pytest
 
 NAMES = {
     "vcc.affine": "Affine",
-    "vcc.analysis": "Refocuser expected_deblurring_error fft4 mask_spectrum mtf optimised_aperture psf sampling_advice",
+    "vcc.analysis": "Refocuser expected_deblurring_error fft4 ifft4 mask_spectrum mtf otf psf sampling_advice",
     "vcc.camera_file": "ELEMENT_KINDS KERNEL_NAMES PATTERN_NAMES SURFACE_NAMES load_camera save_camera",
     "vcc.demo": "run_demo",
     "vcc.demo.scene": "demo_scene",
