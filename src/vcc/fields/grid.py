@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from vcc.base.affine import Affine
+from vcc.base.checks import above_zero
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.base.values import Value
@@ -135,6 +136,26 @@ class Grid(Value):
         """The same samples after a map of rays."""
         return replace(self, frame=rays @ self.frame)
 
+    def scaled(self, factor: float) -> Grid:
+        """The same samples in a world ``factor`` times as large (slopes stay).
+
+        Raises:
+            InputError: a factor of zero or less, or not finite.
+        """
+        factor = above_zero("the factor by which a world is scaled", factor)
+        return self.moved(Affine.scaling(factor, factor, 1, 1))
+
+    def place_of(self, row: int, column: int) -> tuple[int, int]:
+        """(j, i) of a view, whose row and column may count from the end.
+
+        Raises:
+            InputError: there is no such view.
+        """
+        nv, nu = self.shape[:2]
+        if not (-nv <= row < nv and -nu <= column < nu):
+            raise InputError(f"there is no view ({row}, {column}) in a grid of {nv}×{nu} views")
+        return row % nv, column % nu
+
     def grown(self, rows: int, columns: int) -> Grid:
         """With so many more pixels on each side of every view."""
         nv, nu, nt, ns = self.shape[:4]
@@ -235,8 +256,7 @@ def camera_array_frame(
         ("slope_per_pixel", pt),
         ("focus_distance", focus_distance),
     ):
-        if not value > 0:
-            raise InputError(f"{name} must be greater than 0, not {value}")
+        above_zero(name, value, infinite=True)
     check_shape(shape)
     nv, nu, nt, ns = shape[:4]
     matrix = np.zeros((5, 5))
