@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError
 from vcc.camera import Camera
 from vcc.fields.grid import Sample, camera_array_frame
 from vcc.fields.sampled import to_numpy
@@ -86,30 +85,6 @@ class LightField(InMemory):
         return cls(values, frame, disparity_range, sample, disparity)
 
     @property
-    def channels(self) -> int | None:
-        """How many colour channels there are; None for a light field without a channel axis."""
-        return self.grid.channels
-
-    @property
-    def full_scale(self) -> float:
-        """The stored value that stands for radiance 1: the largest integer, or 1 for floating point."""
-        return self.grid.full_scale
-
-    @property
-    def whole_views(self) -> tuple[float, float]:
-        """(rows, columns) of views of the light field that this is a piece of, counted in this piece's steps.
-
-        What a camera decides by the extent of the views it decides for all pieces alike, so that the pictures
-        of the pieces add up to the picture of the whole.
-        """
-        return self.grid.extent
-
-    @property
-    def sample_volume(self) -> float:
-        """The phase-space volume du·dv·ds·dt of one sample's cell, m² (slopes have no unit)."""
-        return self.grid.sample_volume
-
-    @property
     def flux(self) -> float:
         """All the light that the samples stand for, per channel: Σ radiance × cell, m² × radiance."""
         total = float(np.sum(to_numpy(self.values), dtype=np.float64)) / self.full_scale
@@ -125,10 +100,7 @@ class LightField(InMemory):
         Raises:
             InputError: there is no such view.
         """
-        nv, nu = self.shape[:2]
-        if not (-nv <= row < nv and -nu <= column < nu):
-            raise InputError(f"there is no view ({row}, {column}) in a grid of {nv}×{nu} views")
-        j, i = row % nv, column % nu
+        j, i = self.grid.place_of(row, column)
         at_view = self.frame @ Affine.translation(i, j, 0, 0)
         # A ray through this view at slope s comes from −s on the plane 1 m before it.
         looks_at = Affine.from_parts(-at_view.linear[2:, 2:], -at_view.offset[2:])
@@ -144,9 +116,7 @@ class LightField(InMemory):
         Raises:
             InputError: a factor of zero or less.
         """
-        if not (factor > 0 and math.isfinite(factor)):
-            raise InputError(f"a world is scaled by a finite factor greater than 0, not {factor}")
-        return self.of(self.values, self.grid.moved(Affine.scaling(factor, factor, 1, 1)))
+        return self.of(self.values, self.grid.scaled(factor))
 
     def transformed(self, affine: Affine) -> LightField:
         """The light field after a linear element or flight: 𝕋 of the paper (section 3.2.1), exact, lazy.
@@ -225,31 +195,3 @@ class LightField(InMemory):
             sensor: its z is not looked at: it lies where the light field is.
         """
         return Camera([], replace(sensor, z=0.0)).capture(self)
-
-    def measured_disparity_range(self) -> tuple[float, float] | None:
-        """(lowest, highest) disparity in pixels per view along u, given or else measured from the pictures.
-
-        None where there is nothing to measure it from: one view, or pictures without texture.
-        Measured once and kept; pieces of a light field answer as the whole does.
-        """
-        return self.grid.measured_disparity_range()
-
-    def disparity_of(self, distance: float) -> float:
-        """The disparity, pixels per view along u, of a point ``distance`` metres before this plane (paper's Z).
-
-        The point is seen at pixel k − disparity·i in view i. For an array of cameras this is
-        du·(1/Z − 1/F)/ps, the formula of the HCI benchmark (Honauer et al. 2016).
-        """
-        return self.grid.disparity_of(distance)
-
-    def distance_of(self, disparity: float) -> float:
-        """The distance in metres of what shows ``disparity`` pixels per view along u: `disparity_of` undone."""
-        return self.grid.distance_of(disparity)
-
-    def replaced(self, values: Any) -> LightField:
-        """The same frame and scene with other samples, for instance on another array library.
-
-        Raises:
-            InputError: another grid of samples, or what `LightField` refuses.
-        """
-        return self.with_values(values)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 def bilinear(
     values: NDArray[Any], row: ArrayLike, column: ArrayLike, outside: Literal["edge", "zero"] = "edge"
-) -> NDArray[np.floating]:
+) -> NDArray[Any]:
     """What stands between the points of a grid, linear along rows and along columns.
 
     Args:

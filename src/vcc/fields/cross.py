@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.fields.grid import Block, Grid
+from vcc.fields.parallax import Axis
 from vcc.fields.sampled import to_numpy
 
 Array = NDArray[np.float32]
@@ -48,7 +49,7 @@ class Arm:
     """
 
     views: Array
-    along: str
+    along: Axis
 
     @property
     def middle(self) -> int:
@@ -61,66 +62,28 @@ class Arm:
         return 2 if self.along == "u" else 1
 
 
-@dataclass(frozen=True)
-class DisparityGeometry:
-    """What disparities mean: how they go over between u and v, and into metres.
+def check_axes(grid: Grid, fewest: int) -> None:
+    """Refuse a light field of which disparities cannot be found.
 
     Args:
-        position: rows u and v of the frame's linear part.
-        slope: rows s and t.
-        view: (row, column) of the middle view.
+        grid: its views' axes must lie along those of its pixels.
+        fewest: views that there must be in a row or column.
+
+    Raises:
+        InputError: too few views, or a frame that turns or mixes its axes.
     """
-
-    position: Doubles
-    slope: Doubles
-    view: tuple[int, int]
-
-    @classmethod
-    def of(cls, grid: Grid, fewest: int) -> DisparityGeometry:
-        """That of a light field.
-
-        Args:
-            grid: its views' axes along those of its pixels.
-            fewest: views that there must be in a row or column.
-
-        Raises:
-            InputError: too few views, or a frame that turns or mixes its axes.
-        """
-        rows, columns = grid.shape[:2]
-        if max(rows, columns) < fewest:
-            raise InputError(
-                f"depth needs {fewest} views or more in a row or column; this light field has {rows}×{columns}"
-            )
-        linear = grid.frame.linear
-        scale = np.abs(linear).max(axis=1, keepdims=True)
-        if not np.allclose(
-            linear[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]] / scale.repeat(2), 0, atol=1e-9
-        ):
-            raise InputError(
-                "depth needs a light field whose view axes are along those of its pixels; this frame turns or "
-                "mixes them. Resample it first (vcc.LightField.resampled)"
-            )
-        return cls(linear[:2], linear[2:], ((rows - 1) // 2, (columns - 1) // 2))
-
-    def along(self, disparity: ArrayLike, axis: str) -> Doubles:
-        """Disparities along u as those along the axis, ``"u"`` or ``"v"``."""
-        given = np.asarray(disparity, np.float64)
-        if axis == "u":
-            return given
-        # By way of the homogeneous distance, which is finite at infinity: Z = position part / slope part.
-        z, one = self._homogeneous(given)
-        numerator = self.slope[1, 1] * z - self.position[1, 1] * one
-        return np.asarray(numerator / (self.slope[1, 3] * z - self.position[1, 3] * one), np.float64)
-
-    def distance(self, disparity: Array) -> Array:
-        """`vcc.fields.grid.Grid.distance_of` of each, metres."""
-        z, one = self._homogeneous(disparity.astype(np.float64))
-        with np.errstate(divide="ignore"):
-            return np.where(one == 0, np.inf, z / np.where(one == 0, 1, one)).astype(np.float32)
-
-    def _homogeneous(self, disparity: Doubles) -> tuple[Doubles, Doubles]:
-        position, slope = self.position[0], self.slope[0]
-        return position[0] - disparity * position[2], slope[0] - disparity * slope[2]
+    rows, columns = grid.shape[:2]
+    if max(rows, columns) < fewest:
+        raise InputError(
+            f"depth needs {fewest} views or more in a row or column; this light field has {rows}×{columns}"
+        )
+    linear = grid.frame.linear
+    scale = np.abs(linear).max(axis=1, keepdims=True)
+    if not np.allclose(linear[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]] / scale.repeat(2), 0, atol=1e-9):
+        raise InputError(
+            "depth needs a light field whose view axes are along those of its pixels; this frame turns or "
+            "mixes them. Resample it first (vcc.LightField.resampled)"
+        )
 
 
 def arms(light_field: Views) -> list[Arm]:

@@ -7,13 +7,18 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.checks import above_zero
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.base.values import Value
 from vcc.fields.disparity import Disparities, scaled
+from vcc.fields.parallax import Axis
 from vcc.fields.sampled import LIGHT_FIELD_AXES, Index, indices
+
+Array = NDArray[np.float64]
 
 Sample = Literal["mean", "point"]
 """What a sample says of the scene: its mean over the cell of a pixel, or its value in the middle of the cell."""
@@ -135,6 +140,26 @@ class Grid(Value):
         """The same samples after a map of rays."""
         return replace(self, frame=rays @ self.frame)
 
+    def scaled(self, factor: float) -> Grid:
+        """The same samples in a world ``factor`` times as large (slopes stay).
+
+        Raises:
+            InputError: a factor of zero or less, or not finite.
+        """
+        factor = above_zero("the factor by which a world is scaled", factor)
+        return self.moved(Affine.scaling(factor, factor, 1, 1))
+
+    def place_of(self, row: int, column: int) -> tuple[int, int]:
+        """(j, i) of a view, whose row and column may count from the end.
+
+        Raises:
+            InputError: there is no such view.
+        """
+        nv, nu = self.shape[:2]
+        if not (-nv <= row < nv and -nu <= column < nu):
+            raise InputError(f"there is no view ({row}, {column}) in a grid of {nv}×{nu} views")
+        return row % nv, column % nu
+
     def grown(self, rows: int, columns: int) -> Grid:
         """With so many more pixels on each side of every view."""
         nv, nu, nt, ns = self.shape[:4]
@@ -151,17 +176,33 @@ class Grid(Value):
         The point is seen at pixel k − disparity·i in view i. For an array of cameras this is
         du·(1/Z − 1/F)/ps, the formula of the HCI benchmark (Honauer et al. 2016).
         """
-        position, slope = self.frame.linear[0], self.frame.linear[2]
-        vergence = 1.0 / distance
-        # A point at z = −Z sends rays with s − u/Z constant; follow that along i and k.
-        return float((slope[0] - position[0] * vergence) / (slope[2] - position[2] * vergence))
+        by_view, by_pixel = _shown(self.frame, 1.0, 1.0 / distance, "u")
+        return float(by_view / by_pixel)
 
     def distance_of(self, disparity: float) -> float:
         """The distance in metres of what shows ``disparity`` pixels per view along u: `disparity_of` undone."""
-        position, slope = self.frame.linear[0], self.frame.linear[2]
-        numerator = position[0] - disparity * position[2]
-        denominator = slope[0] - disparity * slope[2]
-        return math.inf if denominator == 0 else float(numerator / denominator)
+        return float(self.distances(disparity))
+
+    def distances(self, disparities: ArrayLike) -> Array:
+        """`distance_of` of each disparity, metres."""
+        z, one = self.homogeneous_distances(disparities)
+        return np.where(one == 0, np.inf, z / np.where(one == 0, 1, one))
+
+    def homogeneous_distances(self, disparities: ArrayLike) -> tuple[Array, Array]:
+        """(z, one) of each disparity along u: its distance is z / one, which is finite at infinity too."""
+        return _homogeneous(self.frame, disparities, "u")
+
+    def disparities_along(self, axis: Axis, disparities: ArrayLike) -> Array:
+        """Disparities along u as those along the axis, ``"u"`` or ``"v"``."""
+        if axis == "u":
+            return np.asarray(disparities, np.float64)
+        by_view, by_pixel = _shown(self.frame, *self.homogeneous_distances(disparities), "v")
+        return np.asarray(by_view / by_pixel)
+
+    @property
+    def middle_view(self) -> tuple[int, int]:
+        """(row, column) of the view in the middle, or of the one before it."""
+        return (self.shape[0] - 1) // 2, (self.shape[1] - 1) // 2
 
     @property
     def geometry(self) -> str:
@@ -235,8 +276,7 @@ def camera_array_frame(
         ("slope_per_pixel", pt),
         ("focus_distance", focus_distance),
     ):
-        if not value > 0:
-            raise InputError(f"{name} must be greater than 0, not {value}")
+        above_zero(name, value, infinite=True)
     check_shape(shape)
     nv, nu, nt, ns = shape[:4]
     matrix = np.zeros((5, 5))
@@ -257,13 +297,27 @@ def told_along_u(
         across: what is shown along u, pixels per view, or None.
         down: what is shown along v, or None.
     """
-    position, slope = frame.linear[1], frame.linear[3]
-    place, angle = frame.linear[0], frame.linear[2]
-    found = list(across or ())
-    for disparity in down or ():
-        numerator, denominator = slope[1] - disparity * slope[3], position[1] - disparity * position[3]
-        # 1/Z = numerator / denominator; as `Grid.disparity_of`, without the quotient, which may be infinite
-        moved = angle[2] * denominator - place[2] * numerator
-        if moved != 0:
-            found.append(float((angle[0] * denominator - place[0] * numerator) / moved))
-    return (min(found), max(found)) if found else None
+    by_view, by_pixel = _shown(frame, *_homogeneous(frame, down or (), "v"), "u")
+    found = [*(across or ()), *(by_view[by_pixel != 0] / by_pixel[by_pixel != 0])]
+    return (float(min(found)), float(max(found))) if found else None
+
+
+def _homogeneous(frame: Affine, disparities: ArrayLike, axis: Axis) -> tuple[Array, Array]:
+    """(z, one) of what shows disparities along an axis: its distance is z / one."""
+    given = np.asarray(disparities, np.float64)
+    (place, place_per_pixel), (slope, slope_per_pixel) = _plane(frame, axis)
+    return place - given * place_per_pixel, slope - given * slope_per_pixel
+
+
+def _shown(frame: Affine, z: ArrayLike, one: ArrayLike, axis: Axis) -> tuple[Array, Array]:
+    """Disparities along an axis of what is z / one metres away, as (numerator, denominator)."""
+    # A point at z = −Z sends rays with s − u/Z constant; follow that along i and k.
+    place, slope = _plane(frame, axis)
+    by_view, by_pixel = np.multiply.outer(slope, z) - np.multiply.outer(place, one)
+    return by_view, by_pixel
+
+
+def _plane(frame: Affine, axis: Axis) -> Array:
+    """Place and slope along an axis (rows) by a step of views and by one of pixels (columns), 2×2."""
+    n = 0 if axis == "u" else 1
+    return frame.linear[n::2, n::2]

@@ -21,7 +21,7 @@ from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
 from vcc.base.progress import Progress
 from vcc.base.version import VERSION
-from vcc.fields.cross import Arm, Array, DisparityGeometry, Views, arms, cubic_weights, moved, range_to_search
+from vcc.fields.cross import Arm, Array, Views, arms, check_axes, cubic_weights, moved, range_to_search
 from vcc.fields.disparity import DisparityMaps
 
 NOISE = 0.006
@@ -43,12 +43,10 @@ class Swept:
     Args:
         disparity: pixels per view along u, of the middle view, shape (t, s).
         confidence: 0 to 1, likewise: how much better that disparity is than any that is not its neighbour.
-        geometry: of the light field.
     """
 
     disparity: Array
     confidence: Array
-    geometry: DisparityGeometry
 
 
 def plane_sweep(
@@ -76,12 +74,13 @@ def plane_sweep(
     step = above_zero("step", step)
     if not (window >= 1 and window % 2 == 1):
         raise InputError(f"window is an odd number of pixels, 1 or more, not {window}")
-    geometry = DisparityGeometry.of(light_field.grid, fewest=2)
-    low, high = range_to_search(light_field.grid, disparity_range)
+    grid = light_field.grid
+    check_axes(grid, fewest=2)
+    low, high = range_to_search(grid, disparity_range)
     # Three steps at the least: a parabola needs neighbours.
     tried = np.linspace(low, high, max(3, math.ceil((high - low) / step) + 1))
     cross = arms(light_field)
-    rows, columns = light_field.grid.shape[2:4]
+    rows, columns = grid.shape[2:4]
     needed = 4 * (rows * columns * (len(tried) + 24) + 3 * sum(arm.views.size for arm in cross))
     what = f"a sweep of {len(tried)} disparities over {rows}×{columns} pixels"
     check_memory(needed, memory_limit, what, "give a part of the light field")
@@ -89,14 +88,16 @@ def plane_sweep(
     gather = _GuidedFilter(cross[0].views[cross[0].middle].mean(axis=0), window)
     costs = np.empty((len(tried), rows, columns), np.float32)
     for n, disparity in enumerate(tried):
-        disagreement = [row.disagreement(geometry.along(disparity, row.arm.along)) for row in rows_of_views]
+        disagreement = [
+            row.disagreement(grid.disparities_along(row.arm.along, disparity)) for row in rows_of_views
+        ]
         costs[n] = gather(np.sum(disagreement, axis=0))
         if progress is not None:
             progress(n + 1, len(tried))
     best = costs.argmin(axis=0)
     offset, lowest = _parabola(costs, best)
     found = tried[best] + offset * (tried[1] - tried[0])
-    return Swept(found.astype(np.float32), _clarity(costs, best, lowest, float(tried[1] - tried[0])), geometry)
+    return Swept(found.astype(np.float32), _clarity(costs, best, lowest, float(tried[1] - tried[0])))
 
 
 def disparity_maps(
@@ -125,7 +126,7 @@ def disparity_maps(
             f"disparities between views cannot be found: {error}. Or give them: vcc.LightField(…, disparity=maps)"
         ) from error
     source = f"found for the middle view by vcc.recover.depth_by_plane_sweep, steps of {step:.2g}, vcc {VERSION}"
-    return DisparityMaps(found.disparity[None], (found.geometry.view,), source)
+    return DisparityMaps(found.disparity[None], (light_field.grid.middle_view,), source)
 
 
 class _RowOfViews:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, Protocol, Self, get_args
@@ -44,35 +45,64 @@ class Samples(Protocol):
         ...
 
 
+class OnGrid(ABC):
+    """What a light field says of itself by its grid, wherever its samples are."""
+
+    @property
+    @abstractmethod
+    def grid(self) -> Grid:
+        """The light field without its samples."""
+
+    @property
+    def channels(self) -> int | None:
+        """How many colour channels there are; None for a light field without a channel axis."""
+        return self.grid.channels
+
+    @property
+    def full_scale(self) -> float:
+        """The stored value that stands for radiance 1: the largest integer, or 1 for floating point."""
+        return self.grid.full_scale
+
+    @property
+    def whole_views(self) -> tuple[float, float]:
+        """(rows, columns) of views of the light field that this is a piece of, counted in this piece's steps.
+
+        What a camera decides by the extent of the views it decides for all pieces alike, so that the pictures
+        of the pieces add up to the picture of the whole.
+        """
+        return self.grid.extent
+
+    @property
+    def sample_volume(self) -> float:
+        """The phase-space volume du·dv·ds·dt of one sample's cell, m² (slopes have no unit)."""
+        return self.grid.sample_volume
+
+    def measured_disparity_range(self) -> tuple[float, float] | None:
+        """(lowest, highest) disparity in pixels per view along u, given or else measured from the pictures.
+
+        None where there is nothing to measure it from: one view, or pictures without texture. Measured once and
+        kept, in a store from up to seven views in the middle; pieces of a light field answer as the whole does.
+        """
+        return self.grid.measured_disparity_range()
+
+    def disparity_of(self, distance: float) -> float:
+        """The disparity, pixels per view along u, of a point ``distance`` metres before this plane (paper's Z).
+
+        The point is seen at pixel k − disparity·i in view i. For an array of cameras this is
+        du·(1/Z − 1/F)/ps, the formula of the HCI benchmark (Honauer et al. 2016).
+        """
+        return self.grid.disparity_of(distance)
+
+    def distance_of(self, disparity: float) -> float:
+        """The distance in metres of what shows ``disparity`` pixels per view along u: `disparity_of` undone."""
+        return self.grid.distance_of(disparity)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class InMemory:
+class InMemory(OnGrid):
     """Radiance samples in memory and the frame that says which ray each of them is.
 
-    Args:
-        values: radiance, shape (v, u, t, s) or (v, u, t, s, channels): rows of views, columns of views,
-            rows of pixels, columns of pixels. A NumPy array, or one of PyTorch, JAX or another array-API
-            library. Floating-point values are radiance in any unit; unsigned integers are fractions of
-            their largest value (8-bit 255 is radiance 1). Linear in light, not display-referred.
-        frame: maps (i, j, k, l, 1) to the ray (u, v, s, t, 1) in metres and slopes at the plane where the
-            light field is given; i counts along u (axis 1), j along v (axis 0), k along s (axis 3), l along
-            t (axis 2). A camera takes this plane to be its entrance plane z = 0.
-        disparity_range: (lowest, highest) disparity of the scene in pixels per view along u, positive =
-            nearer than the plane on which the views converge, where known. It decides how views are
-            interpolated under strong defocus; unknown, it is measured from the pictures when needed.
-        sample: what a sample says of the scene: ``"mean"``, the mean radiance over the cell of its pixel, as
-            cameras and renderers give it; ``"point"``, the radiance of the ray in the middle of the cell, as a
-            formula evaluated there gives it. A camera undoes what the samples' own averaging took from sharpness.
-        disparity: pixels per view along u of each pixel, (v, u, t, s) for all views or (t, s) for the middle one,
-            which is ((rows − 1) // 2, (columns − 1) // 2), where known: what ``between_views="depth"`` of
-            `vcc.Camera.capture` goes by. None finds it when it is first asked for. The attribute is a
-            `vcc.fields.disparity.Disparities`.
-        extent: (rows, columns) of views of the light field that this is a piece of, counted in this piece's steps;
-            None for a whole one.
-
-    Raises:
-        InputError: not 4-D or 5-D, an empty axis, a dtype that is not unsigned integer or floating point,
-            samples that are NaN, infinite or negative, a frame that is not 5×5 and invertible, another word for
-            ``sample``, or a disparity of another shape or that is not finite.
+    See `vcc.LightField`, which adds verbs, for the arguments and what is refused.
     """
 
     values: Any
@@ -164,8 +194,8 @@ class InMemory:
         grid, ranges = self.grid.piece(index)
         return self.of(taken(self.values, ranges), grid)
 
-    def with_values(self, values: Any) -> Self:
-        """Other samples of the same scene on the same views and pixels, checked.
+    def replaced(self, values: Any) -> Self:
+        """The same frame and scene with other samples, for instance on another array library.
 
         Raises:
             InputError: another grid of samples, or what `vcc.LightField` refuses.

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.lookup import bilinear
 from vcc.base.values import Value
 from vcc.shapes.kernels import SUM_TOLERANCE, Kernel
 
@@ -52,14 +53,7 @@ class SheetMap(Value):
         rows, columns = self.values.shape[-2:]
         column = np.asarray(x, dtype=np.float64) * (columns / self.width) + (columns - 1) / 2
         row = np.asarray(y, dtype=np.float64) * (rows / self.height) + (rows - 1) / 2
-        row, column = np.broadcast_arrays(np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1))
-        top, left = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
-        bottom, right = np.minimum(top + 1, rows - 1), np.minimum(left + 1, columns - 1)
-        down, across = row - top, column - left
-        above = self.values[..., top, left] * (1 - across) + self.values[..., top, right] * across
-        below = self.values[..., bottom, left] * (1 - across) + self.values[..., bottom, right] * across
-        mixed = above * (1 - down) + below * down
-        return np.asarray(np.moveaxis(mixed, 0, -1) if self.values.ndim == 3 else mixed)
+        return bilinear(np.moveaxis(self.values, 0, -1) if self.values.ndim == 3 else self.values, row, column)
 
     def __repr__(self) -> str:
         cells = "×".join(map(str, self.values.shape))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError
+from vcc.base.checks import above_zero
 from vcc.fields.grid import Grid
 
 Array = NDArray[np.float64]
@@ -127,19 +127,15 @@ def vergences(grid: Grid, scene_distance: float | None) -> Array | None:
         InputError: a distance of 0 or less.
     """
     if scene_distance is not None:
-        if not scene_distance > 0:
-            raise InputError(f"scene_distance must be greater than 0 m, not {scene_distance}")
-        return np.array([1.0 / scene_distance])
+        return np.array([1.0 / above_zero("scene_distance", scene_distance, unit="m", infinite=True)])
     disparities = grid.measured_disparity_range()
     if disparities is None:
         return None
-    # distance_of, kept as 1/Z so that infinity needs no special case; by disparity rather than by distance,
+    # Kept as 1/Z so that infinity needs no special case; by disparity rather than by distance,
     # since behind a lens the scene's images may lie on both sides of infinity
-    disparity = np.linspace(*disparities, 33)
-    position, slope = grid.frame.linear[0], grid.frame.linear[2]
-    numerator, denominator = slope[0] - disparity * slope[2], position[0] - disparity * position[2]
-    apart = denominator != 0  # else the scene's image lies in this very plane
-    return np.asarray(numerator[apart] / denominator[apart]) if apart.any() else None
+    z, one = grid.homogeneous_distances(np.linspace(*disparities, 33))
+    apart = z != 0  # else the scene's image lies in this very plane
+    return np.asarray(one[apart] / z[apart]) if apart.any() else None
 
 
 def _in_focus(on_sensor: Array) -> Array:

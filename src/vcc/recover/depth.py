@@ -23,7 +23,8 @@ from vcc.base.checks import above_zero
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
 from vcc.base.progress import Progress
-from vcc.fields.cross import Arm, DisparityGeometry, arms, moved, range_to_search
+from vcc.fields.cross import Arm, arms, check_axes, moved, range_to_search
+from vcc.fields.grid import Grid
 from vcc.fields.plane_sweep import FINEST_STEP, NOISE, WINDOW, disparity_maps, plane_sweep
 from vcc.light_field import LightField
 from vcc.store import StoredLightField
@@ -158,19 +159,20 @@ def depth_by_structure_tensor(
     """
     for name, scale in (("inner_scale", inner_scale), ("outer_scale", outer_scale)):
         above_zero(name, scale)
-    geometry = DisparityGeometry.of(light_field.grid, fewest=3)
-    low, high = range_to_search(light_field.grid, disparity_range)
+    grid = light_field.grid
+    check_axes(grid, fewest=3)
+    low, high = range_to_search(grid, disparity_range)
     cross = arms(light_field)
     samples = max(arm.views.size for arm in cross)
     # Beside the samples of one arm: its shear, two derivatives, a product and its smoothed copy.
     check_memory(6 * 4 * samples, memory_limit, "depth by the structure tensor", "give a part of the light field")
     disparity, confidence = np.zeros((2, *light_field.shape[2:4]), np.float32)
     for arm in cross:
-        found, clarity = _best_shear(arm, geometry, (low, high), inner_scale, outer_scale)
+        found, clarity = _best_shear(arm, grid, (low, high), inner_scale, outer_scale)
         clearer = clarity >= confidence
         disparity[clearer], confidence[clearer] = found[clearer], clarity[clearer]
     disparity = np.clip(disparity, low, high)
-    return DepthMap(disparity, geometry.distance(disparity), confidence, geometry.view)
+    return _depth(grid, disparity, confidence)
 
 
 def depth_by_plane_sweep(
@@ -210,17 +212,21 @@ def depth_by_plane_sweep(
     found = plane_sweep(
         light_field, disparity_range, step=step, window=window, memory_limit=memory_limit, progress=progress
     )
-    distance = found.geometry.distance(found.disparity)
-    return DepthMap(found.disparity, distance, found.confidence, found.geometry.view)
+    return _depth(light_field.grid, found.disparity, found.confidence)
+
+
+def _depth(grid: Grid, disparity: Array, confidence: Array) -> DepthMap:
+    """What was found of the middle view."""
+    return DepthMap(disparity, grid.distances(disparity).astype(np.float32), confidence, grid.middle_view)
 
 
 def _best_shear(
-    arm: Arm, geometry: DisparityGeometry, ends: tuple[float, float], inner: float, outer: float
+    arm: Arm, grid: Grid, ends: tuple[float, float], inner: float, outer: float
 ) -> tuple[Array, Array]:
     """Disparity along u and its clarity, by the shear that leaves a pixel's lines most upright; each (t, s)."""
     disparity, clarity, left = np.full((3, *arm.views.shape[2:4]), np.inf, np.float32)
     for shear in range(math.floor(ends[0] + 0.5), math.ceil(ends[1] - 0.5) + 1):
-        tilt, coherence, unexplained = _orientation(_tensor(arm, geometry, shear, inner, outer))
+        tilt, coherence, unexplained = _orientation(_tensor(arm, grid, shear, inner, outer))
         # What moves too far for this shear is aliased in it, however clear it looks.
         aliased = np.abs(tilt) > _FARTHEST_TILT
         unexplained = np.where(aliased, _ALIASED + unexplained, unexplained)
@@ -239,12 +245,12 @@ def _sheared(arm: Arm, shear: float) -> Array:
     return np.stack([moved(view, -shear * (n - arm.middle), arm.axis) for n, view in enumerate(arm.views)])
 
 
-def _tensor(arm: Arm, geometry: DisparityGeometry, shear: float, inner: float, outer: float) -> Array:
+def _tensor(arm: Arm, grid: Grid, shear: float, inner: float, outer: float) -> Array:
     """The structure tensor (J_ii, J_kk, J_ik) at the middle view, sheared, k in steps of disparity along u."""
     from scipy.ndimage import correlate1d, gaussian_filter1d
 
     axis = arm.axis + 1
-    own, beyond = geometry.along((shear, shear + 1e-3), arm.along)
+    own, beyond = grid.disparities_along(arm.along, (shear, shear + 1e-3))
     per_u = np.float32((beyond - own) / 1e-3)  # disparity along this axis for one along u
     # Along pixels alone: over views it would reach beyond the first and last, and flatten the lines.
     views = gaussian_filter1d(_sheared(arm, float(own)), inner, axis=axis, mode="nearest", truncate=3)

@@ -67,7 +67,7 @@ def masked_at(
         if values.ndim == 5 and np.ndim(weight):
             weight = weight[..., None]
         result[j, i] = values[j, i] * weight
-    return light_field.with_values(result)
+    return light_field.replaced(result)
 
 
 def carried_to(

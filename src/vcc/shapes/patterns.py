@@ -21,6 +21,7 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
+from vcc.base.lookup import bilinear
 from vcc.base.units import text
 from vcc.base.values import Value
 
@@ -363,17 +364,11 @@ class Cells(Value, Pattern):
         return csr_array((share[keep] / reach, (row[keep], index[keep])), shape=(len(centres), cells))
 
     def _integral(self, x: Array, y: Array) -> Array:
-        from scipy.ndimage import map_coordinates
-
         rows, columns = self.values.shape
         total = np.zeros((rows + 1, columns + 1))
         total[1:, 1:] = self.values.cumsum(0).cumsum(1)
-        row, column = self._index(x, y)
-        row, column = np.broadcast_arrays(np.clip(row, 0, rows), np.clip(column, 0, columns))
-        shape = row.shape
-        content = map_coordinates(total, [np.ravel(row), np.ravel(column)], order=1, mode="nearest").reshape(shape)
         assert self.height is not None
-        return np.asarray(content * (self.width / columns) * (self.height / rows))
+        return np.asarray(bilinear(total, *self._index(x, y)) * (self.width / columns) * (self.height / rows))
 
     def described(self) -> str:
         """The number of cells and the size of the array in words."""

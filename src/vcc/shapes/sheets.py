@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.lookup import bilinear
 from vcc.shapes.patterns import (
     FEWEST_PER_CELL,
     Bounded,
@@ -128,7 +129,8 @@ class Tiles(Pattern):
             across = _between(self._integral, right, axis=1) - _between(self._integral, left, axis=1)
             content = _between(across, bottom, axis=0) - _between(across, top, axis=0)
         else:
-            content = self._at(bottom, right) - self._at(bottom, left) - self._at(top, right) + self._at(top, left)
+            at = partial(bilinear, self._integral)
+            content = at(bottom, right) - at(bottom, left) - at(top, right) + at(top, left)
         return np.clip(content / (width * height), 0.0, None)
 
     @cached_property
@@ -143,16 +145,6 @@ class Tiles(Pattern):
     def _place(borders: Array, at: Array) -> Array:
         """Places as numbers of borders, fractions between them."""
         return np.asarray(np.interp(at, borders, np.arange(len(borders), dtype=np.float64)))
-
-    def _at(self, row: Array, column: Array) -> Array:
-        row, column = np.broadcast_arrays(row, column)
-        r = np.minimum(row.astype(int), len(self.rows) - 2)
-        c = np.minimum(column.astype(int), len(self.columns) - 2)
-        down, right = row - r, column - c
-        total = self._integral
-        above = total[r, c] * (1 - right) + total[r, c + 1] * right
-        below = total[r + 1, c] * (1 - right) + total[r + 1, c + 1] * right
-        return np.asarray(above * (1 - down) + below * down)
 
 
 def _between(table: Array, place: Array, axis: int) -> Array:

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.lookup import bilinear
 from vcc.files.pictures import read_picture
 from vcc.files.transfer import decode
 
@@ -251,14 +252,11 @@ class Picture:
         return kept[times]
 
     def _interpolated(self, values: Array, x: Array, y: Array) -> Array:
-        from scipy.ndimage import map_coordinates
-
         rows, columns = values.shape[:2]
         across, down = np.broadcast_arrays(np.asarray(x, float) / self.width, np.asarray(y, float) / self.height)
         inside = (np.abs(across) <= 0.5) & (np.abs(down) <= 0.5)
-        places = [(down.ravel() + 0.5) * rows - 0.5, (across.ravel() + 0.5) * columns - 0.5]
-        channels = [map_coordinates(values[..., c], places, order=1, mode="nearest") for c in range(4)]
-        return np.asarray(np.stack(channels, axis=-1).reshape(*across.shape, 4) * inside[..., None])
+        found = bilinear(values, (down + 0.5) * rows - 0.5, (across + 0.5) * columns - 0.5)
+        return np.asarray(found * inside[..., None])
 
 
 def _averaged(values: Array, axis: int, count: int) -> Array:

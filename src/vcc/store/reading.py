@@ -23,6 +23,7 @@ from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, told_along_u
 from vcc.fields.parallax import Axis, disparity_range
 from vcc.fields.plane_sweep import disparity_maps
 from vcc.fields.sampled import Index, as_slice
+from vcc.fields.samples import OnGrid
 from vcc.files.transfer import decode
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -39,7 +40,7 @@ NOT_THERE = 2**64 - 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StoredLightField:
+class StoredLightField(OnGrid):
     """A light field on disk: a part of it is read when it is asked for, and no other.
 
     ``stored[2:4, :, 100:200]`` reads a part and gives a `vcc.LightField` in its place. Cameras take a stored light
@@ -92,11 +93,6 @@ class StoredLightField:
     def transfer(self) -> Transfer:
         """``"linear"`` or ``"srgb"``: how stored numbers stand for light. What is read is linear always."""
         return self.attributes.transfer
-
-    @property
-    def channels(self) -> int | None:
-        """How many colour channels there are; None for a light field without a channel axis."""
-        return self.shape[4] if len(self.shape) == 5 else None
 
     @property
     def channel_names(self) -> tuple[str, ...] | None:
@@ -181,27 +177,12 @@ class StoredLightField:
         Raises:
             InputError: there is no such view, or it cannot be read.
         """
-        nv, nu = self.shape[:2]
-        if not (-nv <= row < nv and -nu <= column < nu):
-            raise InputError(f"there is no view ({row}, {column}) in a grid of {nv}×{nu} views")
-        j, i = row % nv, column % nu
+        j, i = self.grid.place_of(row, column)
         return self[j : j + 1, i : i + 1].view(0, 0)
 
     def scaled(self, factor: float) -> StoredLightField:
         """The light field of the same scene in a larger world; nothing is read. See `vcc.LightField.scaled`."""
-        return replace(self, attributes=replace(self.attributes, frame=self._scaled(factor)))
-
-    def measured_disparity_range(self) -> tuple[float, float] | None:
-        """As stated, or else measured from up to seven views in the middle. See `vcc.LightField`."""
-        return self.grid.measured_disparity_range()
-
-    def disparity_of(self, distance: float) -> float:
-        """See `vcc.LightField.disparity_of`."""
-        return self.grid.disparity_of(distance)
-
-    def distance_of(self, disparity: float) -> float:
-        """See `vcc.LightField.distance_of`."""
-        return self.grid.distance_of(disparity)
+        return replace(self, attributes=replace(self.attributes, frame=self.grid.scaled(factor).frame))
 
     def missing(self) -> list[tuple[int, int]]:
         """(row, column) of the views that are not there."""
@@ -322,11 +303,6 @@ class StoredLightField:
             if progress is not None:
                 progress(done, total)
         return values
-
-    def _scaled(self, factor: float) -> Affine:
-        if not (factor > 0 and math.isfinite(factor)):
-            raise InputError(f"a world is scaled by a finite factor greater than 0, not {factor}")
-        return Affine.scaling(factor, factor, 1, 1) @ self.frame
 
     def _kept_or_found(self, progress: Progress | None) -> DisparityMaps:
         kept = read_maps(self.path, self.shape)

@@ -15,6 +15,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.lookup import bilinear
 from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.plan.footprints.shares import Division
@@ -48,14 +49,7 @@ class MaskLookup(Value):
         """T at the samples with column indices k and row indices l of view tap (b, a): shape (l, k)."""
         column = self.column[b, a] + self.step[0, 0] * k[None, :] + self.step[0, 1] * l[:, None]
         row = self.row[b, a] + self.step[1, 0] * k[None, :] + self.step[1, 1] * l[:, None]
-        rows, columns = self.texture.shape
-        dark_border = np.pad(self.texture.astype(np.float64), (1, 2))
-        column, row = np.clip(column + 1, 0, columns + 1), np.clip(row + 1, 0, rows + 1)
-        c, r = np.floor(column).astype(int), np.floor(row).astype(int)
-        after_c, after_r = column - c, row - r
-        above = dark_border[r, c] * (1 - after_c) + dark_border[r, c + 1] * after_c
-        below = dark_border[r + 1, c] * (1 - after_c) + dark_border[r + 1, c + 1] * after_c
-        return np.asarray(above * (1 - after_r) + below * after_r)
+        return bilinear(self.texture.astype(np.float64), row, column, outside="zero")
 
     def moved(self, k: int, l: int) -> MaskLookup:
         """Looked up by samples that begin at sample (k, l) of those that it was made for."""

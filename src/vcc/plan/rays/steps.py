@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.lookup import bilinear
 from vcc.shapes.lattice import Lattice
 
 Array = NDArray[np.float64]
@@ -251,16 +252,8 @@ class Texture:
 
     def __call__(self, x: Array, y: Array) -> Array:
         """The numbers at places x, y: (..., numbers)."""
-        rows, columns = self.values.shape[:2]
-        column = np.clip((x - self.start[0]) / self.spacing[0], 0, columns - 1)
-        row = np.clip((y - self.start[1]) / self.spacing[1], 0, rows - 1)
-        c = np.minimum(column.astype(np.int64), max(columns - 2, 0))
-        r = np.minimum(row.astype(np.int64), max(rows - 2, 0))
-        c1, r1 = np.minimum(c + 1, columns - 1), np.minimum(r + 1, rows - 1)
-        fc, fr = (column - c)[..., None], (row - r)[..., None]
-        above = self.values[r, c] * (1 - fc) + self.values[r, c1] * fc
-        below = self.values[r1, c] * (1 - fc) + self.values[r1, c1] * fc
-        return np.asarray(above * (1 - fr) + below * fr, dtype=np.float64)
+        row, column = ((at - self.start[n]) / self.spacing[n] for n, at in ((1, y), (0, x)))
+        return bilinear(self.values.astype(np.float64, copy=False), row, column)
 
     @property
     def whole(self) -> list[int]:
