@@ -104,7 +104,7 @@ class Window(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Where to aim through the cells of an array, see `vcc.plan.rays.model.CellWindows`, whose names these are.
+    """Where to aim through the cells of an array, see `vcc.plan.rays.model.CellWindows`, whose parts' names these are.
 
     Args:
         layout: 0 square, 1 hexagonal.

@@ -21,8 +21,10 @@ from vcc.plan.model import Plan
 from vcc.plan.operators import Before, SharpenViews
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import steps
-from vcc.plan.rays.aim import Aimed, Leg, Path, columns_of
+from vcc.plan.rays.aim import Aimed, aimed
+from vcc.plan.rays.beam import footprint
 from vcc.plan.rays.model import DIGITS, FIRST_COLUMNS, TABLE, Aim, CellWindows, Rays, Window
+from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.sharpening import sharpening
 from vcc.plan.rays.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
 from vcc.shapes.lattice import CellApertures, CellBlock
@@ -56,15 +58,15 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         motion = np.zeros((2, 2))
         followed = "each view stands for its cell of the aperture; views are not interpolated, as asked"
     path = Path(train, grid, motion, samples)
-    aimed, asked = path.aimed()
-    notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {aimed.aim.words}"]
-    made, index_from_ray, scatters = _steps(path, aimed, notes)
+    taken, asked = aimed(path)
+    notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {taken.aim.words}"]
+    made, index_from_ray, scatters = _steps(path, taken, notes)
     vertical, horizontal = train.sensor.pitches
     high, wide = train.sensor.sensitive_pitches
     first = train.sensor.frame(np.zeros((1, 2)))[0]
     notes.append(followed)
-    if isinstance(aimed.aim, CellWindows):
-        samples >>= aimed.aim.halvings
+    if isinstance(taken.aim, CellWindows):
+        samples >>= taken.aim.halvings
     before: tuple[Before, ...] = ()
     if how.interpolation == "sharp":
         before = (SharpenViews(sharpening(grid.sample)),)
@@ -78,7 +80,7 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         first_pixel=(float(first[0]), float(first[1])),
         pitch=(horizontal, vertical),
         sensitive=(wide, high),
-        aim=aimed.aim,
+        aim=taken.aim,
         steps=tuple(made),
         index_from_ray=index_from_ray,
         motion=motion,
@@ -87,7 +89,7 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         scale=1.0,
         samples=samples,
         seed=how.seed,
-        points=_table(how.seed, scatters, aimed.aim),
+        points=_table(how.seed, scatters, taken.aim),
         views_may_end=path.stop_at_views,
     )
     plan = Plan(
@@ -168,7 +170,7 @@ class _Met:
 
 
 def _steps(
-    path: Path, aimed: Aimed, notes: list[str], coarse: bool = False
+    path: Path, taken: Aimed, notes: list[str], coarse: bool = False
 ) -> tuple[list[steps.Step], Affine, list[Scatter]]:
     """What rays meet, the map to the light field's indices, and the scatterers in the order of the table.
 
@@ -177,25 +179,24 @@ def _steps(
     sizes = (COARSE_SIZES[:1], SIZES[:1]) if coarse else (COARSE_SIZES, SIZES)
     made: list[steps.Step] = []
     scatters: list[Scatter] = []
-    pending, column = Affine.identity(), FIRST_COLUMNS
-    for leg, region in zip(path.legs, aimed.regions, strict=True):
+    pending = Affine.identity()
+    for leg, region in zip(path.legs, taken.regions, strict=True):
         pending = leg.undone @ pending
         stage, faces = leg.stage, leg.stage.faces
-        met = _Met(stage, region, path.footprint(aimed.aim, leg), path.index_from_slope(leg), sizes)
+        met = _Met(stage, region, footprint(path, taken.aim, leg), path.index_from_slope(leg), sizes)
         here: list[steps.Step] = []
         with stage.named():
-            if faces.pattern is not None and not _is_aimed_at(aimed.aim, leg):
+            if faces.pattern is not None and not _is_aimed_at(taken.aim, leg):
                 here += _transmission(faces.pattern, met, notes)
             if faces.bending is not None:
                 here.append(_deflection(met, notes))
             if faces.spread is not None:
-                here.append(_scatter(faces.spread, column, met))
-                column += columns_of(faces.spread)
+                here.append(_scatter(faces.spread, leg.column, met))
                 scatters.append(faces.spread)
         if here:
             made += [steps.Move(pending), *here]
             pending = Affine.identity()
-    index = path.index_from_entrance @ path.last @ pending
+    index = path.index_from_entrance @ path.entrance_from_last @ pending
     return made, index, scatters
 
 

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.values import Value
 from vcc.fields.grid import Block
+from vcc.optics.deflections import CellDeflection
 from vcc.plan.protocol import Engine, Runner
 from vcc.plan.rays.steps import Bundle, Move, Packer, Step
-from vcc.shapes.lattice import Lattice
 
 Array = NDArray[np.float64]
 
@@ -79,66 +79,108 @@ class Window:
 
 
 @dataclass(frozen=True, eq=False)
-class CellWindows:
-    """Where to aim in front of a lens array: in each cell only at the part whose light comes from the stop beyond.
+class Sight:
+    """How a place on the sensor, a place on a lens array and one at the stop beyond it hang together.
 
-    A ray that passes a cell with centre c and power P at place a meets the plane of the stop at gain·a + rest,
-    with gain = beyond + P·beyond_from_slope, one for each axis. Only cells where that falls into the stop for some
-    a are aimed at, and of these only the places a where it does: the stop's image in the plane of the array, cut
-    by the borders of the cell's opening. Rays take x evenly from where both lie, and then y evenly from what of
-    them lies there: their weight is the width times the height, and what is seen jumps at no border.
+    All are along (x, y), which do not mix. A ray that passes a cell with centre c and power P at place a meets the
+    plane of the stop at gain·a + rest, with gain = beyond + P·beyond_from_slope.
 
     Args:
-        place_from_sensor: place on the array from place on the sensor, factors (x, y).
-        place_from_slope: place on the array from slope at the sensor, factors (x, y).
+        place_from_sensor: place on the array from place on the sensor, factors.
+        place_from_slope: place on the array from slope at the sensor, factors.
         offset: of the place on the array.
-        lattice: of the array's cells, offset counted from the axis of the camera.
-        powers: 1/f of the kinds of cells (rows, columns).
-        slopes: (δs, δt) of the kinds of cells.
         beyond: place at the stop from place on the array, the slope at the sensor's side being that from the
-            sensor: factors (x, y).
+            sensor: factors.
         beyond_from_sensor: place at the stop from place on the sensor.
         beyond_from_slope: place at the stop from slope before the array.
         beyond_offset: of the place at the stop.
-        middle: of the stop, (x, y).
-        half: half the (width, height) of the stop.
-        disc: whether the stop is the ellipse in that rectangle, not all of it.
-        cell_half: half the (width, height) of the rectangle around a cell's opening.
-        borders: (slope, half height) of the strips that cut out the opening, (strips, 2): from the cell's centre,
-            y is within slope·x ± half height.
-        opening_radius: of round openings, infinite for others.
-        reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are looked at.
-        words: what is aimed at.
-        halvings: how many times a pixel's rays are halved for each of the cells that it sees.
     """
 
     place_from_sensor: Array
     place_from_slope: Array
     offset: Array
-    lattice: Lattice
-    powers: Array
-    slopes: Array
     beyond: Array
     beyond_from_sensor: Array
     beyond_from_slope: Array
     beyond_offset: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """What a lens array's cells look at: a rectangle, or the ellipse in it.
+
+    Args:
+        middle: (x, y).
+        half: half the (width, height).
+        disc: whether it is the ellipse.
+    """
+
     middle: Array
     half: Array
     disc: bool
-    cell_half: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CellOpening:
+    """What of each cell of a lens array is open.
+
+    Args:
+        half: half the (width, height) of the rectangle around it.
+        borders: (slope, half height) of the strips that cut it out, (strips, 2): from the cell's centre, y is
+            within slope·x ± half height.
+        radius: of round openings, infinite for others.
+    """
+
+    half: Array
     borders: Array
-    opening_radius: float
+    radius: float
+
+    def rows(self, away: Array) -> tuple[Array, Array]:
+        """The lowest and the highest y in it, from the cell's centre, at x = ``away`` from there."""
+        low, high = np.full(away.shape, -np.inf), np.full(away.shape, np.inf)
+        for slope, half in self.borders:
+            low, high = np.maximum(low, slope * away - half), np.minimum(high, slope * away + half)
+        if np.isfinite(self.radius):
+            chord = np.sqrt(np.maximum(self.radius**2 - away**2, 0.0))
+            low, high = np.maximum(low, -chord), np.minimum(high, chord)
+        return low, high
+
+
+@dataclass(frozen=True, eq=False)
+class CellWindows:
+    """Where to aim in front of a lens array: in each cell only at the part whose light comes from the stop beyond.
+
+    Only cells where places lead into the stop are aimed at, and of these only those places: the stop's image in
+    the plane of the array, cut by the borders of the cell's opening. Rays take x evenly from where both lie, and
+    then y evenly from what of them lies there: their weight is the width times the height, and what is seen jumps
+    at no border.
+
+    Args:
+        cells: of the array, their lattice's offset counted from the axis of the camera.
+        opening: what of each of them is open.
+        sight: how the stop is seen through them.
+        stop: what is beyond.
+        reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are looked at.
+        words: what is aimed at.
+        halvings: how many times a pixel's rays are halved for each of the cells that it sees.
+    """
+
+    cells: CellDeflection
+    opening: CellOpening
+    sight: Sight
+    stop: Stop
     reach: tuple[int, int]
     words: str
     halvings: int = 0
 
     def nearest(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(row, column) of the cell through whose centre the middle of the stop is seen from x, y, nearly."""
+        sight = self.sight
         centre = [
-            (self.middle[n] - self.beyond_offset[n] - self.beyond_from_sensor[n] * place) / self.beyond[n]
+            (self.stop.middle[n] - sight.beyond_offset[n] - sight.beyond_from_sensor[n] * place) / sight.beyond[n]
             for n, place in enumerate((x, y))
         ]
-        return self.lattice.cell_of(*centre)
+        return self.cells.lattice.cell_of(*centre)
 
     def around(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(row, column) of all cells that are looked at from places x, y: (..., cells) each."""
@@ -151,9 +193,10 @@ class CellWindows:
     ) -> tuple[Array, Array, Array]:
         """Slopes s, t of rays from places x, y through cells, and the solid angle that they stand for."""
         a, b, area = self.aimed(x, y, row, column, points)
-        s = (a - self.place_from_sensor[0] * x - self.offset[0]) / self.place_from_slope[0]
-        t = (b - self.place_from_sensor[1] * y - self.offset[1]) / self.place_from_slope[1]
-        return s, t, area / abs(self.place_from_slope[0] * self.place_from_slope[1])
+        sight = self.sight
+        s = (a - sight.place_from_sensor[0] * x - sight.offset[0]) / sight.place_from_slope[0]
+        t = (b - sight.place_from_sensor[1] * y - sight.offset[1]) / sight.place_from_slope[1]
+        return s, t, area / abs(sight.place_from_slope[0] * sight.place_from_slope[1])
 
     def aimed(
         self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64], points: Array
@@ -162,36 +205,36 @@ class CellWindows:
 
         ``points`` are (..., 2) of numbers −1 … 1.
         """
-        kind = row % self.powers.shape[0], column % self.powers.shape[1]
-        power = self.powers[kind]
-        centres = self.lattice.centre_of(row, column)
-        middles, halves = [], []  # of the stop's image
-        for n, (place, centre) in enumerate(zip((x, y), centres, strict=True)):
-            gain = self.beyond[n] + power * self.beyond_from_slope[n]
-            gain = np.where(np.abs(gain) < SMALLEST_GAIN, SMALLEST_GAIN, gain)
-            rest = (
-                self.beyond_from_sensor[n] * place
-                - self.beyond_from_slope[n] * (power * centre + self.slopes[(*kind, n)])
-                + self.beyond_offset[n]
-            )
-            middles.append((self.middle[n] - rest) / gain)
-            halves.append(self.half[n] / np.abs(gain))
-        low = np.maximum(middles[0] - halves[0], centres[0] - self.cell_half[0])
-        wide = np.maximum(np.minimum(middles[0] + halves[0], centres[0] + self.cell_half[0]) - low, 0.0)
+        kind = row % self.cells.powers.shape[0], column % self.cells.powers.shape[1]
+        centres = self.cells.lattice.centre_of(row, column)
+        (middle, half), (middle_y, half_y) = (
+            self._image(n, place, centre, kind)
+            for n, (place, centre) in enumerate(zip((x, y), centres, strict=True))
+        )
+        low = np.maximum(middle - half, centres[0] - self.opening.half[0])
+        wide = np.maximum(np.minimum(middle + half, centres[0] + self.opening.half[0]) - low, 0.0)
         a = low + wide * (0.5 + 0.5 * points[..., 0])
-        chord = halves[1]
-        if self.disc:
-            chord = chord * np.sqrt(np.maximum(1 - ((a - middles[0]) / halves[0]) ** 2, 0.0))
-        low, high = middles[1] - chord, middles[1] + chord
-        away = a - centres[0]
-        for slope, half in self.borders:
-            border = centres[1] + slope * away
-            low, high = np.maximum(low, border - half), np.minimum(high, border + half)
-        if np.isfinite(self.opening_radius):
-            chord = np.sqrt(np.maximum(self.opening_radius**2 - away**2, 0.0))
-            low, high = np.maximum(low, centres[1] - chord), np.minimum(high, centres[1] + chord)
-        tall = np.maximum(high - low, 0.0)
+        chord = half_y
+        if self.stop.disc:
+            chord = chord * np.sqrt(np.maximum(1 - ((a - middle) / half) ** 2, 0.0))
+        lowest, highest = self.opening.rows(a - centres[0])
+        low = np.maximum(middle_y - chord, centres[1] + lowest)
+        tall = np.maximum(np.minimum(middle_y + chord, centres[1] + highest) - low, 0.0)
         return a, low + tall * (0.5 + 0.5 * points[..., 1]), wide * tall
+
+    def _image(
+        self, n: int, place: Array, centre: Array, kind: tuple[NDArray[np.int64], NDArray[np.int64]]
+    ) -> tuple[Array, Array]:
+        """Middle and half size along axis n of the stop's image in cells, seen from places on the sensor."""
+        sight, power = self.sight, self.cells.powers[kind]
+        gain = sight.beyond[n] + power * sight.beyond_from_slope[n]
+        gain = np.where(np.abs(gain) < SMALLEST_GAIN, SMALLEST_GAIN, gain)
+        rest = (
+            sight.beyond_from_sensor[n] * place
+            - sight.beyond_from_slope[n] * (power * centre + self.cells.slopes[(*kind, n)])
+            + sight.beyond_offset[n]
+        )
+        return (self.stop.middle[n] - rest) / gain, self.stop.half[n] / np.abs(gain)
 
 
 SMALLEST_GAIN = 1e-12
