@@ -13,7 +13,8 @@ from vcc.base.progress import Progress
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
 from vcc.plan.protocol import Partial
-from vcc.plan.rays.model import CellWindows, Rays, Window
+from vcc.plan.rays.model import Rays
+from vcc.plan.rays.windows import Aim, CellWindows, Window
 
 TILE = 32
 """Pixels a side that a thread works on at once: what they look up in the light field stays in its cache."""
@@ -79,7 +80,7 @@ def _steps(core: Rays) -> tables.Steps:
     return tables.Steps(*core.packed().arrays())
 
 
-def _aim(aim: Window | CellWindows) -> tables.Aim:
+def _aim(aim: Aim) -> tables.Aim:
     if isinstance(aim, Window):
         return tables.Aim(False, _window(aim), NO_CELLS)
     return tables.Aim(True, NO_WINDOW, _cells(aim))

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.plan.rays import cell_windows
-from vcc.plan.rays.model import Aim, CellWindows, Window
 from vcc.plan.rays.path import Path
 from vcc.plan.rays.slack import Slack, strayed
 from vcc.plan.rays.strips import UNBOUNDED, windows
+from vcc.plan.rays.windows import Aim, CellWindows, Window
 
 Array = NDArray[np.float64]
 

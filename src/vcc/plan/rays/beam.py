@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.plan.rays.model import Aim, CellWindows
 from vcc.plan.rays.path import Leg, Path
+from vcc.plan.rays.windows import Aim, CellWindows
 
 Array = NDArray[np.float64]
 
@@ -76,8 +76,7 @@ def beam_towards(path: Path, aim: Aim, half: Array | None = None) -> Beam:
     if isinstance(aim, CellWindows):
         return _through_cells(aim, middle, half)
     beam = Beam.between(middle, half, np.column_stack([aim.slope_from_point, aim.offset]), aim.slope_from_sensor)
-    spreads = [leg.stage.faces.spread for leg in path.legs]
-    uniform = [spread for spread in spreads if spread is not None and spread.uniform]
+    uniform = [scatter for scatter in path.scatters if scatter.uniform]
     # Those beyond the window are not made up for: there are as many terms as diffusers before it.
     for scatter, (_, slope_from_scatter) in zip(uniform, aim.slope_from_scatter, strict=False):
         s, t = np.abs(slope_from_scatter) @ np.array(scatter.reach)

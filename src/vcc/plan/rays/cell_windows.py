@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.optics.deflections import CellDeflection
 from vcc.optics.sensor import Sensor
-from vcc.plan.rays.model import CellOpening, CellWindows, Sight, Stop
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.strips import Bound, bounds
+from vcc.plan.rays.windows import CellOpening, CellWindows, Sight, Stop
 from vcc.shapes.lattice import CellApertures, Lattice
 from vcc.shapes.patterns import Bounded, Pattern
 

@@ -12,7 +12,7 @@ from vcc.base.affine import Affine
 from vcc.fields.grid import Grid
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
-from vcc.plan.rays.model import FIRST_COLUMNS
+from vcc.plan.rays.points import FIRST_COLUMNS, columns_of
 
 Array = NDArray[np.float64]
 
@@ -72,6 +72,12 @@ class Path:
             undone = _undone(stage)
             column += 0 if stage.faces.spread is None else columns_of(stage.faces.spread)
         return tuple(legs)
+
+    @cached_property
+    def scatters(self) -> tuple[Scatter, ...]:
+        """All that scatters rays, in the order in which they meet it."""
+        met = (stage.faces.spread for stage in reversed(self.train.stages))
+        return tuple(spread for spread in met if spread is not None)
 
     @cached_property
     def _entrance_from_sensor(self) -> Affine:
@@ -146,11 +152,6 @@ def _undone(stage: Stage) -> Affine:
     """Rays just behind the stage before from rays just behind this one, its lens or prism undone."""
     approach = stage.approach.inverse()
     return approach if stage.centred is None else approach @ stage.centred.inverse()
-
-
-def columns_of(scatter: Scatter) -> int:
-    """How many columns of the table of points a scatterer needs."""
-    return 2 * len(scatter.kernels) + (scatter.weights is not None)
 
 
 def _stops(stages: tuple[Stage, ...]) -> list[tuple[Array, Array]]:

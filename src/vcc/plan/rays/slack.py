@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.plan.rays.beam import Beam, beam_towards
-from vcc.plan.rays.model import Aim
 from vcc.plan.rays.path import Leg, Path
+from vcc.plan.rays.windows import Aim
 
 Array = NDArray[np.float64]
 

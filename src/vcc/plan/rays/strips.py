@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.plan.rays.model import Window
 from vcc.plan.rays.path import Leg, Path
+from vcc.plan.rays.windows import Window
 from vcc.shapes.patterns import Circle
 
 Array = NDArray[np.float64]
