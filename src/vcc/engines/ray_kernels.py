@@ -15,7 +15,7 @@ from numba import njit
 from vcc.engines.bilinear import around, bilinear
 from vcc.engines.ray_tables import Drawn, Packet
 from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add_views_of_4
-from vcc.plan.rays.model import DIGITS
+from vcc.plan.rays.points import DIGITS
 
 PACKET = 256
 """Rays at a time: six numbers each, which stay in the first-level cache."""
@@ -391,7 +391,7 @@ def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def hashed(number, seed):  # type: ignore[no-untyped-def]
-    """See `vcc.plan.rays.model.hashed`."""
+    """See `vcc.plan.rays.points.hashed`."""
     h = np.uint32(number & 0xFFFFFFFF) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
     h = np.uint32(np.uint32(h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B))
     h = np.uint32(np.uint32(h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35))
@@ -453,7 +453,7 @@ def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
 
 @njit(**INLINED)
 def unit(point, flipped):  # type: ignore[no-untyped-def]
-    """A number 0 … 1 of `DIGITS` binary digits, some of them flipped; see `vcc.plan.rays.model.RayPlan._moved`."""
+    """A number 0 … 1 of `DIGITS` binary digits, some of them flipped; see `vcc.plan.rays.model.Rays._moved`."""
     return (np.float64(np.int32(point * DIGITS_ABOVE) ^ flipped) + 0.5) * DIGITS_BELOW
 
 
@@ -471,7 +471,7 @@ def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
 
 @njit(**INLINED)
 def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
-    """Slopes and weights of rays towards a window, making up for diffusers; see `vcc.plan.rays.model.Window`."""
+    """Slopes and weights of rays towards a window, making up for diffusers; see `vcc.plan.rays.windows.Window`."""
     points, start, n, flipped = drawn
     from_point, from_sensor, (f4, g4), solid_angle, disc, scatter = window
     x, y, s, t, share = rays

@@ -71,7 +71,7 @@ class Points(NamedTuple):
     """The points that all pixels share, and which of them a pixel takes.
 
     Args:
-        table: (columns, points) float32, see `vcc.plan.rays.model.RayPlan`.
+        table: (columns, points) float32, see `vcc.plan.rays.model.Rays.points`.
         samples: rays a pixel, a power of two.
         beside: which block beside the hashed one is taken.
         seed: of the hash, 32 bits.
@@ -84,7 +84,7 @@ class Points(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Where to aim through affine optics, see `vcc.plan.rays.model.Window`.
+    """Where to aim through affine optics, see `vcc.plan.rays.windows.Window`.
 
     Args:
         from_point: 2×2, slopes from the window's point.
@@ -104,7 +104,7 @@ class Window(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Where to aim through the cells of an array, see `vcc.plan.rays.model.CellWindows`, whose names these are.
+    """Where to aim through the cells of an array: see `vcc.plan.rays.windows.CellWindows`, whose names these are.
 
     Args:
         layout: 0 square, 1 hexagonal.

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from vcc.base.progress import Progress
 from vcc.fields.sampled import to_dtype
 from vcc.plan.protocol import Partial
-from vcc.plan.rays.model import CellWindows, Rays
+from vcc.plan.rays.model import Rays
+from vcc.plan.rays.windows import CellWindows
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,8 @@ from vcc.base.progress import Progress
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
 from vcc.plan.protocol import Partial
-from vcc.plan.rays.model import CellWindows, Rays, Window
+from vcc.plan.rays.model import Rays
+from vcc.plan.rays.windows import Aim, CellWindows, Window
 
 TILE = 32
 """Pixels a side that a thread works on at once: what they look up in the light field stays in its cache."""
@@ -79,7 +80,7 @@ def _steps(core: Rays) -> tables.Steps:
     return tables.Steps(*core.packed().arrays())
 
 
-def _aim(aim: Window | CellWindows) -> tables.Aim:
+def _aim(aim: Aim) -> tables.Aim:
     if isinstance(aim, Window):
         return tables.Aim(False, _window(aim), NO_CELLS)
     return tables.Aim(True, NO_WINDOW, _cells(aim))
@@ -98,26 +99,26 @@ def _window(aim: Window) -> tables.Window:
 
 
 def _cells(aim: CellWindows) -> tables.Cells:
-    lattice = aim.lattice
+    lattice, opening, stop, sight = aim.cells.lattice, aim.opening, aim.stop, aim.sight
     turned = np.cos(lattice.rotation), np.sin(lattice.rotation)
     return tables.Cells(
         layout=int(lattice.layout == "hexagonal"),
         turn=np.array([*turned, *lattice.offset, lattice.pitch, lattice.row_height]),
-        kinds=np.concatenate([aim.powers[..., None], aim.slopes], axis=-1),
+        kinds=np.concatenate([aim.cells.powers[..., None], aim.cells.slopes], axis=-1),
         reach=(int(aim.reach[0]), int(aim.reach[1])),
-        borders=np.ascontiguousarray(aim.borders),
-        opening_radius=float(aim.opening_radius),
-        disc=bool(aim.disc),
-        place_from_sensor=_pair(aim.place_from_sensor),
-        place_from_slope=_pair(aim.place_from_slope),
-        offset=_pair(aim.offset),
-        beyond=_pair(aim.beyond),
-        beyond_from_sensor=_pair(aim.beyond_from_sensor),
-        beyond_from_slope=_pair(aim.beyond_from_slope),
-        beyond_offset=_pair(aim.beyond_offset),
-        middle=_pair(aim.middle),
-        half=_pair(aim.half),
-        cell_half=_pair(aim.cell_half),
+        borders=np.ascontiguousarray(opening.borders),
+        opening_radius=float(opening.radius),
+        disc=bool(stop.disc),
+        place_from_sensor=_pair(sight.place_from_sensor),
+        place_from_slope=_pair(sight.place_from_slope),
+        offset=_pair(sight.offset),
+        beyond=_pair(sight.beyond),
+        beyond_from_sensor=_pair(sight.beyond_from_sensor),
+        beyond_from_slope=_pair(sight.beyond_from_slope),
+        beyond_offset=_pair(sight.beyond_offset),
+        middle=_pair(stop.middle),
+        half=_pair(stop.half),
+        cell_half=_pair(opening.half),
     )
 
 

@@ -1,13 +1,16 @@
-"""How far rays can stray: bounds of places and slopes on the way back from the sensor."""
+"""Beams: bounds of the places and slopes of all rays that an aim asks for, on their way back from the sensor."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.plan.rays.path import Leg, Path
+from vcc.plan.rays.windows import Aim, CellWindows
 
 Array = NDArray[np.float64]
 
@@ -63,3 +66,43 @@ class Beam:
     def half(self) -> Array:
         """Half the extent of (x, y, s, t)."""
         return np.asarray(np.abs(self.basis).sum(axis=1) + np.abs(self.loose).sum(axis=1))
+
+
+def beam_towards(path: Path, aim: Aim, half: Array | None = None) -> Beam:
+    """All rays that an aim asks for, at the sensor; from all of it, or a rectangle of half sizes (x, y)."""
+    sensor = path.train.sensor
+    middle = np.array(sensor.decentre)
+    half = np.array(sensor.size[::-1]) / 2 if half is None else half
+    if isinstance(aim, CellWindows):
+        return _through_cells(aim, middle, half)
+    beam = Beam.between(middle, half, np.column_stack([aim.slope_from_point, aim.offset]), aim.slope_from_sensor)
+    uniform = [scatter for scatter in path.scatters if scatter.uniform]
+    # Those beyond the window are not made up for: there are as many terms as diffusers before it.
+    for scatter, (_, slope_from_scatter) in zip(uniform, aim.slope_from_scatter, strict=False):
+        s, t = np.abs(slope_from_scatter) @ np.array(scatter.reach)
+        beam = beam.loosened((float(s), float(t)))
+    return beam
+
+
+def _through_cells(aim: CellWindows, middle: Array, half: Array) -> Beam:
+    """Rays through all the cells that are looked at: those around (stop − offset − factor·x) / beyond."""
+    sight = aim.sight
+    pitch = np.full(2, aim.cells.lattice.pitch)
+    reach = np.array(aim.reach[::-1]) * pitch * math.sqrt(2) + 2 * pitch
+    slope = 1 / sight.place_from_slope
+    from_sensor = slope * (-sight.beyond_from_sensor / sight.beyond - sight.place_from_sensor)
+    at_origin = slope * ((aim.stop.middle - sight.beyond_offset) / sight.beyond - sight.offset)
+    slopes = np.column_stack([np.diag(slope * reach), at_origin])
+    return Beam.between(middle, half, slopes, np.diag(from_sensor))
+
+
+def footprint(path: Path, aim: Aim, leg: Leg) -> Array | None:
+    """(width, height) in metres over which the rays of one pixel spread on a leg, by pixel or by window.
+
+    None where that is not known: where something on the way bends otherwise than lenses and prisms do.
+    """
+    nearer = path.legs[: leg.number]
+    if isinstance(aim, CellWindows) or any(other.stage.faces.bending is not None for other in nearer):
+        return None
+    beam = beam_towards(path, aim, path.pixel / 2).moved(leg.from_sensor)
+    return np.asarray(2 * np.abs(beam.basis[:2]).max(axis=1))

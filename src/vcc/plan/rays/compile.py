@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +20,14 @@ from vcc.plan.model import Plan
 from vcc.plan.operators import Before, SharpenViews
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import steps
-from vcc.plan.rays.aim import Aimed, Leg, Path, columns_of
-from vcc.plan.rays.model import DIGITS, FIRST_COLUMNS, TABLE, Aim, CellWindows, Rays, Window
+from vcc.plan.rays.aim import Aimed, aimed
+from vcc.plan.rays.beam import footprint
+from vcc.plan.rays.model import Rays
+from vcc.plan.rays.path import Leg, Path
+from vcc.plan.rays.points import table
 from vcc.plan.rays.sharpening import sharpening
 from vcc.plan.rays.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
+from vcc.plan.rays.windows import Aim, CellWindows, Window
 from vcc.shapes.lattice import CellApertures, CellBlock
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
 from vcc.shapes.sheets import Product
@@ -56,15 +59,15 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         motion = np.zeros((2, 2))
         followed = "each view stands for its cell of the aperture; views are not interpolated, as asked"
     path = Path(train, grid, motion, samples)
-    aimed, asked = path.aimed()
-    notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {aimed.aim.words}"]
-    made, index_from_ray, scatters = _steps(path, aimed, notes)
+    taken, asked = aimed(path)
+    notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {taken.aim.words}"]
+    made, index_from_ray = _steps(path, taken, notes)
     vertical, horizontal = train.sensor.pitches
     high, wide = train.sensor.sensitive_pitches
     first = train.sensor.frame(np.zeros((1, 2)))[0]
     notes.append(followed)
-    if isinstance(aimed.aim, CellWindows):
-        samples >>= aimed.aim.halvings
+    if isinstance(taken.aim, CellWindows):
+        samples >>= taken.aim.halvings
     before: tuple[Before, ...] = ()
     if how.interpolation == "sharp":
         before = (SharpenViews(sharpening(grid.sample)),)
@@ -78,7 +81,7 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         first_pixel=(float(first[0]), float(first[1])),
         pitch=(horizontal, vertical),
         sensitive=(wide, high),
-        aim=aimed.aim,
+        aim=taken.aim,
         steps=tuple(made),
         index_from_ray=index_from_ray,
         motion=motion,
@@ -87,7 +90,7 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         scale=1.0,
         samples=samples,
         seed=how.seed,
-        points=_table(how.seed, scatters, aimed.aim),
+        points=table(how.seed, path.scatters, taken.aim.on_disc),
         views_may_end=path.stop_at_views,
     )
     plan = Plan(
@@ -111,7 +114,7 @@ def _missing(core: Rays, path: Path, asked: Aimed) -> float:
 
     By rays to all that is asked for, from pixels all over the sensor.
     """
-    made, index_from_ray, scatters = _steps(path, asked, [], coarse=True)
+    made, index_from_ray = _steps(path, asked, [], coarse=True)
     rows, columns = (np.unique(np.arange(ASKING_PIXELS) * n // ASKING_PIXELS) for n in core.raster_shape)
     pixel = (rows[:, None] * core.raster_shape[1] + columns).reshape(-1)
     wide = replace(
@@ -119,7 +122,7 @@ def _missing(core: Rays, path: Path, asked: Aimed) -> float:
         aim=asked.aim,
         steps=tuple(made),
         index_from_ray=index_from_ray,
-        points=_table(core.seed, scatters, asked.aim),
+        points=table(core.seed, path.scatters, asked.aim.on_disc),
         samples=2 ** int(math.log2(ASKING_RAYS // len(pixel))),
     )
     index, share = wide.looked_up(pixel, wide.block(pixel))
@@ -167,36 +170,31 @@ class _Met:
         return self.stage.element.label
 
 
-def _steps(
-    path: Path, aimed: Aimed, notes: list[str], coarse: bool = False
-) -> tuple[list[steps.Step], Affine, list[Scatter]]:
-    """What rays meet, the map to the light field's indices, and the scatterers in the order of the table.
+def _steps(path: Path, taken: Aimed, notes: list[str], coarse: bool = False) -> tuple[list[steps.Step], Affine]:
+    """What rays meet, and the map from rays behind all that to the light field's indices.
 
     ``coarse`` takes the coarsest textures, for a share of light rather than for a picture.
     """
     sizes = (COARSE_SIZES[:1], SIZES[:1]) if coarse else (COARSE_SIZES, SIZES)
     made: list[steps.Step] = []
-    scatters: list[Scatter] = []
-    pending, column = Affine.identity(), FIRST_COLUMNS
-    for leg, region in zip(path.legs, aimed.regions, strict=True):
+    pending = Affine.identity()
+    for leg, region in zip(path.legs, taken.regions, strict=True):
         pending = leg.undone @ pending
         stage, faces = leg.stage, leg.stage.faces
-        met = _Met(stage, region, path.footprint(aimed.aim, leg), path.index_from_slope(leg), sizes)
+        met = _Met(stage, region, footprint(path, taken.aim, leg), path.index_from_slope(leg), sizes)
         here: list[steps.Step] = []
         with stage.named():
-            if faces.pattern is not None and not _is_aimed_at(aimed.aim, leg):
+            if faces.pattern is not None and not _is_aimed_at(taken.aim, leg):
                 here += _transmission(faces.pattern, met, notes)
             if faces.bending is not None:
                 here.append(_deflection(met, notes))
             if faces.spread is not None:
-                here.append(_scatter(faces.spread, column, met))
-                column += columns_of(faces.spread)
-                scatters.append(faces.spread)
+                here.append(_scatter(faces.spread, leg.column, met))
         if here:
             made += [steps.Move(pending), *here]
             pending = Affine.identity()
-    index = path.index_from_entrance @ path.last @ pending
-    return made, index, scatters
+    index = path.index_from_entrance @ path.entrance_from_last @ pending
+    return made, index
 
 
 def _is_aimed_at(aim: Aim, leg: Leg) -> bool:
@@ -313,68 +311,6 @@ def _sheet(given: object, met: _Met) -> steps.Texture:
         return values[..., None] if values.shape == shape else values
 
     return textured(sampled, met.region, met.sizes[1])[0]
-
-
-# --- points ---
-
-
-def _table(seed: int, scatters: list[Scatter], aim: Aim) -> NDArray[np.float32]:
-    """The points that all pixels share; see `Rays.points`."""
-    dimensions = FIRST_COLUMNS + sum(2 + (scatter.weights is not None) for scatter in scatters)
-    even = _sobol(dimensions, seed)
-    disc = isinstance(aim, Window) and aim.disc
-    columns = [even[:, 0], even[:, 1], *(_on_disc(even[:, 2], even[:, 3]) if disc else even[:, 2:4].T)]
-    next_one = FIRST_COLUMNS
-    for scatter in scatters:
-        xi, eta = (even[:, next_one + n] + 2.0 ** -(DIGITS + 1) for n in range(2))  # neither 0 nor 1
-        next_one += 2
-        for kernel in scatter.kernels:
-            columns += list(kernel.deflections(xi, eta))
-        if scatter.weights is not None:
-            columns.append(even[:, next_one])
-            next_one += 1
-    return np.stack(columns, axis=1).astype(np.float32)
-
-
-@lru_cache(maxsize=4)
-def _sobol(dimensions: int, seed: int) -> Array:
-    """`TABLE` points of a scrambled Sobol' sequence: any aligned block of 2ⁿ of them is evenly spread.
-
-    (`TABLE`, dimensions) of numbers 0 … 1 of `DIGITS` binary digits. Each digit is flipped or not by chance, by
-    all digits before it (Owen 1995). A linear scrambling would make all blocks alike but for a shift, and pixels
-    would err alike.
-    """
-    from scipy.stats import qmc
-
-    depth = TABLE.bit_length() - 1  # digits in which the first points of the sequence differ
-    plain = (qmc.Sobol(dimensions, scramble=False).random(TABLE) * TABLE).astype(np.int64)
-    generator = np.random.default_rng(seed)
-    points = np.empty((TABLE, dimensions))
-    for column in range(dimensions):
-        number = plain[:, column]
-        scrambled = np.zeros(TABLE, dtype=np.int64)
-        for before in range(depth):
-            flips = generator.integers(0, 2, 2**before)
-            digit = (number >> (depth - 1 - before)) & 1
-            scrambled = 2 * scrambled + (digit ^ flips[number >> (depth - before)])
-        rest = DIGITS - depth  # no two points share all digits so far
-        points[:, column] = (scrambled * 2**rest + generator.integers(0, 2**rest, TABLE)) * 2.0**-DIGITS
-    points.flags.writeable = False
-    return points
-
-
-def _on_disc(xi: Array, eta: Array) -> list[Array]:
-    """Points of the unit square on the unit disc, equal areas to equal areas, neighbours to neighbours.
-
-    The concentric map of Shirley and Chiu (1997).
-    """
-    a, b = 2 * xi - 1, 2 * eta - 1
-    wide = np.abs(a) > np.abs(b)
-    radius = np.where(wide, a, b)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        angle = np.where(wide, np.pi / 4 * b / a, np.pi / 2 - np.pi / 4 * a / b)
-    angle = np.where(radius == 0, 0.0, angle)
-    return [radius * np.cos(angle), radius * np.sin(angle)]
 
 
 # --- between views ---

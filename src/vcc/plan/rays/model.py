@@ -22,182 +22,11 @@ from vcc.base.affine import Affine
 from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.plan.protocol import Engine, Runner
+from vcc.plan.rays.points import DIGITS, TABLE, hashed
 from vcc.plan.rays.steps import Bundle, Move, Packer, Step
-from vcc.shapes.lattice import Lattice
+from vcc.plan.rays.windows import Aim, CellWindows
 
 Array = NDArray[np.float64]
-
-TABLE = 2**16
-"""Points of the sequence that all pixels share; a pixel takes an aligned block of them."""
-FIRST_COLUMNS = 4
-"""Columns of the table that every plan has: place in the pixel (x, y), place in the aim (x, y)."""
-DIGITS = 24
-"""Binary digits of a point: as many as float32 holds of numbers below 1."""
-
-
-@dataclass(frozen=True, eq=False)
-class Window:
-    """Where to aim: a rectangle or a disc in a plane that the sensor's rays reach through affine optics.
-
-    A ray from (x, y) on the sensor towards the window's point (a, b), −1 … 1 each, has the slopes
-    (s, t) = slope_from_point · (a, b) + slope_from_sensor · (x, y) + offset + Σ slope_from_scatter · (δs, δt).
-
-    The last term makes up for what diffusers on the way will take from the ray's slope: which of its ways a ray
-    goes is drawn beforehand, so that it hits the window whatever the kernel.
-
-    Args:
-        slope_from_point: 2×2.
-        slope_from_sensor: 2×2, 1/m.
-        offset: (s, t).
-        disc: whether the window is the disc a² + b² ≤ 1, not the whole square.
-        words: what is aimed at.
-        slope_from_scatter: (column of the table, 2×2) of each uniform diffuser before the window.
-    """
-
-    slope_from_point: Array
-    slope_from_sensor: Array
-    offset: Array
-    disc: bool
-    words: str
-    slope_from_scatter: tuple[tuple[int, Array], ...] = ()
-
-    @property
-    def solid_angle(self) -> float:
-        """∫∫ ds dt over the window, the same seen from any place on the sensor."""
-        return (np.pi if self.disc else 4.0) * abs(float(np.linalg.det(self.slope_from_point)))
-
-    def slopes(self, x: Array, y: Array, points: Array) -> tuple[Array, Array, Array]:
-        """Slopes s, t of rays from places x, y towards the window, and the solid angle that they stand for."""
-        a, b = points[..., 2], points[..., 3]
-        p, q = self.slope_from_point, self.slope_from_sensor
-        s = p[0, 0] * a + p[0, 1] * b + q[0, 0] * x + q[0, 1] * y + self.offset[0]
-        t = p[1, 0] * a + p[1, 1] * b + q[1, 0] * x + q[1, 1] * y + self.offset[1]
-        for column, matrix in self.slope_from_scatter:
-            ds, dt = points[..., column], points[..., column + 1]
-            s, t = s + matrix[0, 0] * ds + matrix[0, 1] * dt, t + matrix[1, 0] * ds + matrix[1, 1] * dt
-        return s, t, np.full(s.shape, self.solid_angle)
-
-
-@dataclass(frozen=True, eq=False)
-class CellWindows:
-    """Where to aim in front of a lens array: in each cell only at the part whose light comes from the stop beyond.
-
-    A ray that passes a cell with centre c and power P at place a meets the plane of the stop at gain·a + rest,
-    with gain = beyond + P·beyond_from_slope, one for each axis. Only cells where that falls into the stop for some
-    a are aimed at, and of these only the places a where it does: the stop's image in the plane of the array, cut
-    by the borders of the cell's opening. Rays take x evenly from where both lie, and then y evenly from what of
-    them lies there: their weight is the width times the height, and what is seen jumps at no border.
-
-    Args:
-        place_from_sensor: place on the array from place on the sensor, factors (x, y).
-        place_from_slope: place on the array from slope at the sensor, factors (x, y).
-        offset: of the place on the array.
-        lattice: of the array's cells, offset counted from the axis of the camera.
-        powers: 1/f of the kinds of cells (rows, columns).
-        slopes: (δs, δt) of the kinds of cells.
-        beyond: place at the stop from place on the array, the slope at the sensor's side being that from the
-            sensor: factors (x, y).
-        beyond_from_sensor: place at the stop from place on the sensor.
-        beyond_from_slope: place at the stop from slope before the array.
-        beyond_offset: of the place at the stop.
-        middle: of the stop, (x, y).
-        half: half the (width, height) of the stop.
-        disc: whether the stop is the ellipse in that rectangle, not all of it.
-        cell_half: half the (width, height) of the rectangle around a cell's opening.
-        borders: (slope, half height) of the strips that cut out the opening, (strips, 2): from the cell's centre,
-            y is within slope·x ± half height.
-        opening_radius: of round openings, infinite for others.
-        reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are looked at.
-        words: what is aimed at.
-        halvings: how many times a pixel's rays are halved for each of the cells that it sees.
-    """
-
-    place_from_sensor: Array
-    place_from_slope: Array
-    offset: Array
-    lattice: Lattice
-    powers: Array
-    slopes: Array
-    beyond: Array
-    beyond_from_sensor: Array
-    beyond_from_slope: Array
-    beyond_offset: Array
-    middle: Array
-    half: Array
-    disc: bool
-    cell_half: Array
-    borders: Array
-    opening_radius: float
-    reach: tuple[int, int]
-    words: str
-    halvings: int = 0
-
-    def nearest(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(row, column) of the cell through whose centre the middle of the stop is seen from x, y, nearly."""
-        centre = [
-            (self.middle[n] - self.beyond_offset[n] - self.beyond_from_sensor[n] * place) / self.beyond[n]
-            for n, place in enumerate((x, y))
-        ]
-        return self.lattice.cell_of(*centre)
-
-    def around(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(row, column) of all cells that are looked at from places x, y: (..., cells) each."""
-        row, column = self.nearest(x, y)
-        down, across = np.meshgrid(*(np.arange(-reach, reach + 1) for reach in self.reach), indexing="ij")
-        return row[..., None] + down.reshape(-1), column[..., None] + across.reshape(-1)
-
-    def rays_through(
-        self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64], points: Array
-    ) -> tuple[Array, Array, Array]:
-        """Slopes s, t of rays from places x, y through cells, and the solid angle that they stand for."""
-        a, b, area = self.aimed(x, y, row, column, points)
-        s = (a - self.place_from_sensor[0] * x - self.offset[0]) / self.place_from_slope[0]
-        t = (b - self.place_from_sensor[1] * y - self.offset[1]) / self.place_from_slope[1]
-        return s, t, area / abs(self.place_from_slope[0] * self.place_from_slope[1])
-
-    def aimed(
-        self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64], points: Array
-    ) -> tuple[Array, Array, Array]:
-        """Places (a, b) in the cells that light from x, y can come through, and the area that each stands for.
-
-        ``points`` are (..., 2) of numbers −1 … 1.
-        """
-        kind = row % self.powers.shape[0], column % self.powers.shape[1]
-        power = self.powers[kind]
-        centres = self.lattice.centre_of(row, column)
-        middles, halves = [], []  # of the stop's image
-        for n, (place, centre) in enumerate(zip((x, y), centres, strict=True)):
-            gain = self.beyond[n] + power * self.beyond_from_slope[n]
-            gain = np.where(np.abs(gain) < SMALLEST_GAIN, SMALLEST_GAIN, gain)
-            rest = (
-                self.beyond_from_sensor[n] * place
-                - self.beyond_from_slope[n] * (power * centre + self.slopes[(*kind, n)])
-                + self.beyond_offset[n]
-            )
-            middles.append((self.middle[n] - rest) / gain)
-            halves.append(self.half[n] / np.abs(gain))
-        low = np.maximum(middles[0] - halves[0], centres[0] - self.cell_half[0])
-        wide = np.maximum(np.minimum(middles[0] + halves[0], centres[0] + self.cell_half[0]) - low, 0.0)
-        a = low + wide * (0.5 + 0.5 * points[..., 0])
-        chord = halves[1]
-        if self.disc:
-            chord = chord * np.sqrt(np.maximum(1 - ((a - middles[0]) / halves[0]) ** 2, 0.0))
-        low, high = middles[1] - chord, middles[1] + chord
-        away = a - centres[0]
-        for slope, half in self.borders:
-            border = centres[1] + slope * away
-            low, high = np.maximum(low, border - half), np.minimum(high, border + half)
-        if np.isfinite(self.opening_radius):
-            chord = np.sqrt(np.maximum(self.opening_radius**2 - away**2, 0.0))
-            low, high = np.maximum(low, centres[1] - chord), np.minimum(high, centres[1] + chord)
-        tall = np.maximum(high - low, 0.0)
-        return a, low + tall * (0.5 + 0.5 * points[..., 1]), wide * tall
-
-
-SMALLEST_GAIN = 1e-12
-"""Gains of cells are kept from 0, where a whole cell looks at one place: its bounds are then far outside."""
-
-Aim = Window | CellWindows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -362,7 +191,7 @@ class Rays(Value):
         points = np.broadcast_to(points, (*number.shape, *points.shape[2:]))
         moved = points.astype(np.float64)
         flipped = np.stack([hashed(number, self.seed + 1 + n) >> (32 - DIGITS) for n in range(4)], axis=-1)
-        disc = isinstance(self.aim, Window) and self.aim.disc
+        disc = self.aim.on_disc
         columns = 2 if disc else 4
         digits = (points[..., :columns] * 2**DIGITS).astype(np.uint32) ^ flipped[..., None, :columns]
         places = (digits + 0.5) * 2.0**-DIGITS
@@ -391,11 +220,3 @@ class Rays(Value):
 
     def __repr__(self) -> str:
         return f"{self.samples} rays a pixel\n  aimed at {self.aim.words}\n  met on the way back: {self.met}"
-
-
-def hashed(number: NDArray[np.int64], seed: int) -> NDArray[np.uint32]:
-    """A 32-bit hash of whole numbers and a seed (the finaliser of MurmurHash3, by Austin Appleby)."""
-    h = (number & 0xFFFFFFFF).astype(np.uint32) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
-    h = (h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B)
-    h = (h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35)
-    return np.asarray(h ^ (h >> np.uint32(16)), dtype=np.uint32)

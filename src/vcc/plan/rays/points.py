@@ -1,0 +1,97 @@
+"""The points that all pixels share: an evenly spread table of what is drawn for each ray."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.optics.scatter import Scatter
+
+Array = NDArray[np.float64]
+
+TABLE = 2**16
+"""Points of the sequence that all pixels share; a pixel takes an aligned block of them."""
+FIRST_COLUMNS = 4
+"""Columns of the table that every plan has: place in the pixel (x, y), place in the aim (x, y)."""
+DIGITS = 24
+"""Binary digits of a point: as many as float32 holds of numbers below 1."""
+
+
+def columns_of(scatter: Scatter) -> int:
+    """How many columns of the table of points a scatterer needs."""
+    return 2 * len(scatter.kernels) + (scatter.weights is not None)
+
+
+def table(seed: int, scatters: Sequence[Scatter], disc: bool) -> NDArray[np.float32]:
+    """The points that all pixels share; see `vcc.plan.rays.model.Rays.points`.
+
+    Args:
+        seed: of their scrambling.
+        scatters: the diffusers, the one nearest to the sensor first.
+        disc: whether rays are aimed at a disc.
+    """
+    dimensions = FIRST_COLUMNS + sum(2 + (scatter.weights is not None) for scatter in scatters)
+    even = _sobol(dimensions, seed)
+    columns = [even[:, 0], even[:, 1], *(_on_disc(even[:, 2], even[:, 3]) if disc else even[:, 2:4].T)]
+    next_one = FIRST_COLUMNS
+    for scatter in scatters:
+        xi, eta = (even[:, next_one + n] + 2.0 ** -(DIGITS + 1) for n in range(2))  # neither 0 nor 1
+        next_one += 2
+        for kernel in scatter.kernels:
+            columns += list(kernel.deflections(xi, eta))
+        if scatter.weights is not None:
+            columns.append(even[:, next_one])
+            next_one += 1
+    return np.stack(columns, axis=1).astype(np.float32)
+
+
+@lru_cache(maxsize=4)
+def _sobol(dimensions: int, seed: int) -> Array:
+    """`TABLE` points of a scrambled Sobol' sequence: any aligned block of 2ⁿ of them is evenly spread.
+
+    (`TABLE`, dimensions) of numbers 0 … 1 of `DIGITS` binary digits. Each digit is flipped or not by chance, by
+    all digits before it (Owen 1995). A linear scrambling would make all blocks alike but for a shift, and pixels
+    would err alike.
+    """
+    from scipy.stats import qmc
+
+    depth = TABLE.bit_length() - 1  # digits in which the first points of the sequence differ
+    plain = (qmc.Sobol(dimensions, scramble=False).random(TABLE) * TABLE).astype(np.int64)
+    generator = np.random.default_rng(seed)
+    points = np.empty((TABLE, dimensions))
+    for column in range(dimensions):
+        number = plain[:, column]
+        scrambled = np.zeros(TABLE, dtype=np.int64)
+        for before in range(depth):
+            flips = generator.integers(0, 2, 2**before)
+            digit = (number >> (depth - 1 - before)) & 1
+            scrambled = 2 * scrambled + (digit ^ flips[number >> (depth - before)])
+        rest = DIGITS - depth  # no two points share all digits so far
+        points[:, column] = (scrambled * 2**rest + generator.integers(0, 2**rest, TABLE)) * 2.0**-DIGITS
+    points.flags.writeable = False
+    return points
+
+
+def _on_disc(xi: Array, eta: Array) -> list[Array]:
+    """Points of the unit square on the unit disc, equal areas to equal areas, neighbours to neighbours.
+
+    The concentric map of Shirley and Chiu (1997).
+    """
+    a, b = 2 * xi - 1, 2 * eta - 1
+    wide = np.abs(a) > np.abs(b)
+    radius = np.where(wide, a, b)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = np.where(wide, np.pi / 4 * b / a, np.pi / 2 - np.pi / 4 * a / b)
+    angle = np.where(radius == 0, 0.0, angle)
+    return [radius * np.cos(angle), radius * np.sin(angle)]
+
+
+def hashed(number: NDArray[np.int64], seed: int) -> NDArray[np.uint32]:
+    """A 32-bit hash of whole numbers and a seed (the finaliser of MurmurHash3, by Austin Appleby)."""
+    h = (number & 0xFFFFFFFF).astype(np.uint32) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
+    h = (h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B)
+    h = (h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35)
+    return np.asarray(h ^ (h >> np.uint32(16)), dtype=np.uint32)

@@ -1,0 +1,208 @@
+"""What rays must pass, as strips of slopes, and the windows that two strips cut out.
+
+What rays must pass (a stop, a cell of a view, a pixel of a view's picture) bounds one coordinate of a plane, which
+is affine in a ray's place and slopes at the sensor: a strip of slopes. Two strips that are not parallel make a
+parallelogram. Elements that are not affine widen the strips beyond them by as much as they can bend.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.plan.rays.path import Leg, Path
+from vcc.plan.rays.windows import Window
+from vcc.shapes.patterns import Circle
+
+Array = NDArray[np.float64]
+
+GRID_OF_VIEWS, PICTURES = "the grid of views", "the views' pictures"
+"""What the light field bounds rays by: its indices (i, j), and (k, l)."""
+UNBOUNDED = 1e6
+"""Metres, or slopes, by which no ray of a camera strays."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """What rays must pass in one plane: |two coordinates − middle| ≤ half, and by how much more they can stray.
+
+    Args:
+        number: of the leg, or one more than the last for the light field.
+        from_sensor: the plane's coordinates, of which these are two, from rays on the sensor, through affine
+            optics.
+        axes: which two.
+        middle: of what passes.
+        half: half the size of what passes.
+        loose: by how much rays can stray there from where affine optics lead.
+        circle: whether it is a round hole.
+        words: what it is.
+    """
+
+    number: int
+    from_sensor: Affine
+    axes: slice
+    middle: Array
+    half: Array
+    loose: Array
+    circle: bool
+    words: str
+
+    def widened(self, known: Array | float = 0.0) -> tuple[Array, bool]:
+        """Half the size by which rays are bound, straying included, and whether that is a disc.
+
+        A round hole widened is round where that is smaller than the rectangle around it: rays stray in any
+        direction.
+
+        Args:
+            known: the part of how rays stray that is known, and need not be added.
+        """
+        loose = self.loose - known
+        if self.circle:
+            radius = self.half + np.linalg.norm(loose)
+            if np.pi * np.prod(radius) < 4 * np.prod(self.half + loose):
+                return radius, True
+        return self.half + loose, False
+
+    def strips(self) -> list[Strip]:
+        """One for each coordinate that is bounded."""
+        half, disc = self.widened()
+        coordinates = self.from_sensor.linear[self.axes]
+        middle = self.middle - self.from_sensor.offset[self.axes]
+        return [
+            Strip(coordinates[axis], float(middle[axis]), float(half[axis]), self.number, disc, self.words)
+            for axis in (0, 1)
+            if np.isfinite(half[axis])
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """A bound of rays along one coordinate of one plane: |from_sensor · (x, y, s, t) − middle| ≤ half.
+
+    Args:
+        from_sensor: (4,), the coordinate from rays on the sensor, through affine optics.
+        middle: of what passes.
+        half: half the width of what passes, and by how much rays can stray there from where affine optics lead.
+        number: of the leg, or one more than the last for the light field.
+        disc: whether it is one axis of a round hole, and of what it becomes widened.
+        words: what it is.
+    """
+
+    from_sensor: Array
+    middle: float
+    half: float
+    number: int
+    disc: bool
+    words: str
+
+    @property
+    def bounds_slopes(self) -> bool:
+        """Whether a ray that keeps to it has a slope that is bounded at all."""
+        return bool(self.half < UNBOUNDED * np.linalg.norm(self.from_sensor[2:]))
+
+
+def bounds(path: Path, slack: list[Array], everything: bool) -> list[Bound]:
+    """What bounds the rays that a camera asks for, or all that bounds those that the light field holds.
+
+    A camera asks for what its stops let through, and the grid of views where no stop stands at the views.
+
+    Args:
+        path: from the sensor.
+        slack: how far rays can stray, see `vcc.plan.rays.slack.Slack`.
+        everything: the views' pictures too, and the grid of views anyway.
+    """
+    found = [_stop(leg, slack[leg.number]) for leg in path.legs]
+    if everything or not path.stop_at_views:
+        found.append(_of_light_field(path, slack, slice(0, 2), GRID_OF_VIEWS))
+    if everything:
+        found.append(pictures(path, slack))
+    return found
+
+
+def pictures(path: Path, slack: list[Array]) -> Bound:
+    """The views' pictures."""
+    return _of_light_field(path, slack, slice(2, 4), PICTURES)
+
+
+def _stop(leg: Leg, slack: Array) -> Bound:
+    pattern, (low, high) = leg.stage.faces.pattern, leg.stop
+    half = np.asarray((high - low) / 2)
+    circle = isinstance(pattern, Circle) and np.allclose(half, pattern.diameter / 2, rtol=1e-12, atol=0)
+    return Bound(
+        number=leg.number,
+        from_sensor=leg.from_sensor,
+        axes=slice(0, 2),
+        middle=np.add(low, high, out=np.zeros(2), where=np.isfinite(half)) / 2,  # of no meaning where unbounded
+        half=half,
+        loose=np.abs(slack[:2]).sum(axis=1),
+        circle=circle,
+        words=leg.stage.element.label,
+    )
+
+
+def _of_light_field(path: Path, slack: list[Array], axes: slice, words: str) -> Bound:
+    loose = np.abs(path.index_from_entrance.linear[axes] @ slack[-1]).sum(axis=1)
+    return Bound(
+        number=len(path.legs),
+        from_sensor=path.index_from_sensor,
+        axes=axes,
+        middle=(path.size[axes] - 1) / 2,
+        half=path.finds[axes],
+        loose=loose,
+        circle=False,
+        words=words,
+    )
+
+
+def windows(path: Path, slack: list[Array], everything: bool) -> list[Window]:
+    """The parallelograms, and discs, of slopes that pairs of strips cut out.
+
+    Where the sensor shows each view as a point, what a camera asks for has no bound but the views' pictures.
+
+    Args:
+        path: from the sensor.
+        slack: how far rays can stray, but for what windows make up for.
+        everything: see `bounds`.
+    """
+    strips = [strip for bound in bounds(path, slack, everything) for strip in bound.strips()]
+    found = list(_cut_out(path, strips))
+    return found or list(_cut_out(path, [*strips, *pictures(path, slack).strips()]))
+
+
+def _cut_out(path: Path, strips: list[Strip]) -> Iterator[Window]:
+    for pair in itertools.combinations([strip for strip in strips if strip.bounds_slopes], 2):
+        rows = np.stack([strip.from_sensor for strip in pair])
+        if abs(rows[0, 2] * rows[1, 3]) < abs(rows[0, 3] * rows[1, 2]):  # s along the window's first axis
+            pair, rows = pair[::-1], rows[::-1]
+        parallel = abs(np.linalg.det(rows[:, 2:])) <= 1e-9 * np.prod(np.linalg.norm(rows[:, 2:], axis=1))
+        if not parallel:
+            yield _window(path, pair, rows)
+
+
+def _window(path: Path, pair: tuple[Strip, ...], rows: Array) -> Window:
+    """The slopes within two strips, whose coordinates from rays on the sensor are the rows, (2, 4)."""
+    slope_from_place = np.asarray(np.linalg.inv(rows[:, 2:]), dtype=np.float64)
+    return Window(
+        slope_from_point=slope_from_place @ np.diag([strip.half for strip in pair]),
+        slope_from_sensor=-slope_from_place @ rows[:, :2],
+        offset=slope_from_place @ np.array([strip.middle for strip in pair]),
+        disc=pair[0].number == pair[1].number and pair[0].disc,
+        words=" and ".join(dict.fromkeys(strip.words for strip in pair)),
+        slope_from_scatter=tuple(_made_up(path, pair, slope_from_place)),
+    )
+
+
+def _made_up(path: Path, pair: tuple[Strip, ...], slope_from_place: Array) -> Iterator[tuple[int, Array]]:
+    """How slopes make up for the uniform diffusers before the planes of the strips; see `Window`."""
+    for leg in path.legs[: max(strip.number for strip in pair)]:
+        spread = leg.stage.faces.spread
+        if spread is not None and spread.uniform:
+            sensor_from_slope = leg.from_sensor.inverse().linear[:, 2:]
+            # A diffuser in the plane of a strip or beyond it changes nothing there.
+            onward = [strip.from_sensor @ sensor_from_slope * (leg.number < strip.number) for strip in pair]
+            yield leg.column, slope_from_place @ np.stack(onward)
