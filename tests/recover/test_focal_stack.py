@@ -172,7 +172,7 @@ STACK = halves()
         (lambda: FocalStack(STACK.pictures, (1.0,), STACK.frame), "2 pictures have 1 distances"),
         (lambda: FocalStack(STACK.pictures[0], (1.0,), STACK.frame), "has the axes"),
         (lambda: FocalStack(STACK.pictures * np.float32(np.nan), (1.0, 2.0), STACK.frame), "finite samples"),
-        (lambda: STACK.all_in_focus(window=0), "window must be above 0"),
+        (lambda: STACK.all_in_focus(window=0), "window must be greater than 0 pixels"),
         (lambda: STACK.all_in_focus(selectivity=-1), "selectivity is 0 or more"),
         (lambda: STACK.all_in_focus(memory_limit=10), "10 bytes are allowed.*memory_limit"),
         (lambda: STACK.save("stack.avi"), "ends in .mp4 or .gif"),

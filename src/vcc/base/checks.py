@@ -80,6 +80,26 @@ def whole_number_between(
     return number
 
 
+def counts(name: str, value: Any, *axes: str) -> tuple[int, ...]:
+    """Whole numbers of 1 or more, one for each axis: a shape, how many views.
+
+    Args:
+        name: what to call them in an error.
+        value: the numbers; floating-point numbers are none.
+        axes: what is counted, such as "rows" and "columns".
+
+    Raises:
+        InputError: anything else.
+    """
+    try:
+        numbers = tuple(whole_number(number) or 0 for number in value)
+    except TypeError:
+        numbers = ()
+    if len(numbers) != len(axes) or min(numbers) < 1:
+        raise InputError(f"{name} is ({', '.join(axes)}), whole numbers of 1 or more, not {_told(value)}")
+    return numbers
+
+
 def seed(value: object, name: str = "seed") -> int:
     """A seed of random numbers as an int.
 

@@ -4,7 +4,6 @@ for people.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from fractions import Fraction
 from os import PathLike
@@ -154,10 +153,8 @@ def save(
     grid = light_field.grid
     if grid.channels not in (None, 1, 3):
         raise InputError(f"a video has 1 or 3 channels, and this light field has {grid.channels}")
-    if not (frames_per_second > 0 and math.isfinite(frames_per_second)):
-        raise InputError(f"frames_per_second is a number above 0, not {frames_per_second}")
-    if not 0 <= quality <= 51:
-        raise InputError(f"quality is libx264's constant rate factor, 0 to 51, not {quality}")
+    checks.above_zero("frames_per_second", frames_per_second)
+    checks.zero_or_more("quality (libx264's constant rate factor)", quality, most=51)
     rows, columns, height, width = grid.shape[:4]
     way = _way(rows, columns, flight)
     numbers = Codes(light_field, 8, "srgb", exposure)
@@ -195,8 +192,8 @@ def library() -> Any:
 def _check_selection(every: int, first: int, last: int | None, moves: str) -> None:
     checks.one_of("moves", moves, get_args(Movement))
     for name, value, least in (("every", every, 1), ("first", first, 0), ("last", last, first)):
-        if value is not None and (not isinstance(value, int | np.integer) or value < least):
-            raise InputError(f"{name} is a whole number of {least} or more, not {value!r}")
+        if value is not None:
+            checks.whole_number_between(name, value, least)
 
 
 def _picture(frame: Any, path: Path) -> NDArray[Any]:

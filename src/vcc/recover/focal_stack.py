@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory, check_samples
@@ -110,8 +111,7 @@ class FocalStack:
         """
         from scipy import ndimage
 
-        if not (window > 0 and math.isfinite(window)):
-            raise InputError(f"the window must be above 0 pixels, not {window}")
+        checks.above_zero("the window", window, unit="pixels")
         if not selectivity >= 0:
             raise InputError(f"the selectivity is 0 or more, not {selectivity}")
         count, rows, columns = self.pictures.shape[:3]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.checks import above_zero
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress
 from vcc.camera import Camera
@@ -62,8 +63,8 @@ def ideal_camera(
             the plane of that distance, where all pixels of a view show the same place.
     """
     check_distance(distance, "distance")
-    if diameter is not None and not diameter > 0:
-        raise InputError(f"the diameter of the aperture must be greater than 0 m, not {diameter}")
+    if diameter is not None:
+        above_zero("the diameter of the aperture", diameter, unit="m", infinite=True)
     if diameter is None and tuple(centre) != (0.0, 0.0):
         raise InputError(f"centre = {centre} m is the middle of a round aperture: give its diameter too")
     d = IMAGE_DISTANCE
@@ -373,5 +374,4 @@ def check_distance(distance: float, name: str) -> None:
     Raises:
         InputError: zero or less, or NaN.
     """
-    if not distance > 0:  # NaN too
-        raise InputError(f"{name} must be greater than 0 m (infinite is allowed), not {distance}")
+    above_zero(name, distance, unit="m", infinite=True, way_out="it may be infinite")

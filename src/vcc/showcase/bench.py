@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.base.units import mm, um
 from vcc.camera import Camera
 from vcc.formats import open_light_field
@@ -138,7 +138,7 @@ class Bench:
         return camera.sensor.z**2 / (math.pi / 4 * diameter**2 * transmitted)
 
 
-def built_in(small: bool, progress: Callable[[int, int], None] | None = None) -> Bench:
+def built_in(small: bool, progress: Progress | None = None) -> Bench:
     """The bench with the demo's own scene.
 
     20×20 views 1 mm apart converge at 1.3 m; a view is 500×500 pixels of 50 um at a distance of 52 mm, a
@@ -163,9 +163,7 @@ def built_in(small: bool, progress: Callable[[int, int], None] | None = None) ->
     return Bench(light_field, scene, NEAR, MIDDLE, FAR, FOCAL_LENGTH, RIM * APERTURE, (pitch, pitch))
 
 
-def from_someone(
-    given: Path | LightField, small: bool, progress: Callable[[int, int], None] | None = None
-) -> Bench:
+def from_someone(given: Path | LightField, small: bool, progress: Progress | None = None) -> Bench:
     """The bench with someone's own light field.
 
     Its world is scaled so that the grid of views is 20 mm wide, a lens's width. The lens has f = 50 mm, or less

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from vcc.base import checks, late
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.light_field import LightField
 from vcc.plan.how import cores
 from vcc.shapes.patterns import overlap_share
@@ -320,7 +321,7 @@ class PlanesScene:
         focus_distance: float = math.inf,
         dtype: DTypeLike = np.uint8,
         threads: int | None = None,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Progress | None = None,
     ) -> LightField:
         """What a planar array of parallel pinhole cameras sees of the scene.
 
@@ -449,7 +450,7 @@ def _fill(
     grid: _Grid,
     rasters: NDArray[np.float32],
     pool: ThreadPoolExecutor,
-    progress: Callable[[int, int], None] | None,
+    progress: Progress | None,
 ) -> None:
     down, across = (_starts(planes, grid, axis) for axis in (0, 1))
     whole = values.dtype.kind == "u"
@@ -471,7 +472,7 @@ def _fill_view_by_view(
     values: Array,
     cameras: CameraArray,
     threads: int | None,
-    progress: Callable[[int, int], None] | None,
+    progress: Progress | None,
 ) -> None:
     whole = values.dtype.kind == "u"
     top = float(np.iinfo(values.dtype).max) if whole else 1.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import asdict
 from os import PathLike, fspath
 from pathlib import Path
@@ -14,14 +13,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from vcc import __version__
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress
 from vcc.light_field import LightField
 from vcc.sources.views import CameraArray, ViewCamera
 from vcc.store import StoredLightField, create_store
 
 DTYPES = ("float16", "float32", "uint8", "uint16")
 """What the samples of a synthesized light field may be kept as."""
-
-Progress = Callable[[int, int], None]
 
 
 class Renderer(Protocol):

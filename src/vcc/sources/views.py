@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.grid import Sample
@@ -69,9 +70,8 @@ class CameraArray:
     focus_distance: float = field(default=math.inf, metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        for name, pair in (("views", self.views), ("pixels", self.pixels)):
-            if len(pair) != 2 or any(not isinstance(n, int | np.integer) or n < 1 for n in pair):
-                raise InputError(f"{name} are (rows, columns), whole numbers of 1 or more, not {pair}")
+        checks.counts("views", self.views, "rows", "columns")
+        checks.counts("pixels", self.pixels, "rows", "columns")
         self.light_field(np.zeros((1, 1, 1, 1), dtype=np.uint8))  # refuses what is impossible
 
     @classmethod
