@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.analysis.deblurring import checked_power, expected_deblurring_error
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 
 Array = NDArray[np.float64]
 
@@ -107,8 +107,7 @@ def optimised_aperture(
         history.append(float(errors[0]))
         typical.append(float(np.median(errors)))
         done = len(history) - 1
-        if progress is not None:
-            progress(done, generations)
+        tell(progress, done, generations)
         converged = patience is not None and waited >= patience
         if converged or done >= generations:
             break

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
 from vcc.files.pictures import Exposure
@@ -89,8 +89,7 @@ def read(
                         remarks = _remarks(frame, stream)
                 decoded += 1
                 end = frame.time or 0.0
-                if progress is not None:
-                    progress(decoded, stream.frames)
+                tell(progress, decoded, stream.frames)
             else:
                 _check_complete(stream, decoded, end, path)
     except av.error.FFmpegError as error:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.recover.blur import Blur, Borders, channels_first, channels_last
 from vcc.recover.recorded import numbers_of
 
@@ -226,8 +226,7 @@ def richardson_lucy(
         size = float(sum((blur.seen(each) ** 2).sum() for each in picture))
         change = math.sqrt(moved / size) if size > 0 else 0.0
         objective.append(sum(_divergence(c, blur.apply(e)) for c, e in zip(channels, picture, strict=True)))
-        if progress is not None:
-            progress(done, iterations)
+        tell(progress, done, iterations)
     converged = change <= tolerance
     found = np.stack([blur.seen(each) for each in picture])
     message = _ended(converged, done, change) + ("" if converged else f", more than the tolerance {tolerance:g}")
@@ -313,8 +312,7 @@ def sparse_gradients(
         change = float(np.linalg.norm(new - latest) / max(float(np.linalg.norm(new)), 1e-300))
         latest = new.copy()
         objective.append(float(intermediate_result.fun))
-        if progress is not None:
-            progress(min(len(objective), iterations), iterations)
+        tell(progress, min(len(objective), iterations), iterations)
 
     found = optimize.minimize(
         _Surprise(channels, blur, noise, exponent, scale),

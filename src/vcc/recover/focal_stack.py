@@ -16,7 +16,7 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory, check_samples
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
 from vcc.files.pictures import auto_exposure, checked_exposure
@@ -252,8 +252,7 @@ def focal_stack(
     for number, distance in enumerate(distances):
         image = refocused(light_field, distance, **options)
         pictures[number], frame = image.values, image.frame
-        if progress is not None:
-            progress(number + 1, len(distances))
+        tell(progress, number + 1, len(distances))
     return FocalStack(pictures, distances, frame)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.checks import above_zero
 from vcc.base.errors import InputError, ResultWarning
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.camera import Camera
 from vcc.fields.grid import Grid
 from vcc.image import Image
@@ -243,8 +243,7 @@ def novel_view(
             better = cost < best
             best = np.where(better, cost, best)
             picture[better] = mean[better]
-        if progress is not None:
-            progress(done + 1, len(vergences))
+        tell(progress, done + 1, len(vergences))
     at_view = light_field.frame @ Affine.translation(i, j, 0, 0)
     looks_at = Affine.from_parts(-at_view.linear[2:, 2:], -at_view.offset[2:])
     if light_field.channels is None:

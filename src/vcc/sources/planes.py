@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from vcc.base import checks, late
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.light_field import LightField
 from vcc.plan.how import cores
 from vcc.shapes.patterns import overlap_share
@@ -463,8 +463,7 @@ def _fill(
     tasks = [pool.submit(views, j) for j in range(grid.views[0])]
     for done, task in enumerate(as_completed(tasks), 1):
         task.result()
-        if progress is not None:
-            progress(done, grid.views[0])
+        tell(progress, done, grid.views[0])
 
 
 def _fill_view_by_view(
@@ -486,8 +485,7 @@ def _fill_view_by_view(
         for row in range(rows):
             for task in [pool.submit(view, row, column) for column in range(columns)]:
                 task.result()
-            if progress is not None:
-                progress(row + 1, rows)
+            tell(progress, row + 1, rows)
 
 
 def _starts(planes: tuple[TexturedPlane, ...], grid: _Grid, axis: int) -> tuple[Array, NDArray[np.float32]]:

@@ -19,7 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.base.version import VERSION
 from vcc.base.words import first_few
 from vcc.fields.arrays import one_view
@@ -335,8 +335,7 @@ def write_views(
             total = shape[0] * shape[1]
             for done, (j, i) in enumerate(np.ndindex(*shape[:2]), start=1):
                 writer.write_view(j, i, view(j, i))
-                if progress is not None:
-                    progress(done, total)
+                tell(progress, done, total)
             writer.finish()
             if disparity is not None:
                 _keep(part, disparity)
