@@ -184,7 +184,7 @@ def test_what_is_too_bright_is_counted(tmp_path, light_field):
         ("a.mp4", {"quality": 99}, "0 to 51, not 99"),
         ("a.mp4", {"exposure": "bright"}, "exposure is"),
         ("a.mp4", {"exposure": -1}, "exposure is"),
-        ("a.avi", {}, r"ends in \.mp4"),
+        ("a.avi", {}, r"end its name in \.mp4"),
         ("lost/a.mp4", {}, "does not exist"),
     ],
 )

@@ -175,7 +175,7 @@ STACK = halves()
         (lambda: STACK.all_in_focus(window=0), "window must be greater than 0 pixels"),
         (lambda: STACK.all_in_focus(selectivity=-1), "selectivity is 0 or more"),
         (lambda: STACK.all_in_focus(memory_limit=10), "10 bytes are allowed.*memory_limit"),
-        (lambda: STACK.save("stack.avi"), "ends in .mp4 or .gif"),
+        (lambda: STACK.save("stack.avi"), "end its name in .mp4, .gif"),
         (lambda: STACK.save("stack.gif", frames_per_second=60), "up to 50, not 60"),
         (lambda: STACK.save("stack.mp4", frames_per_second=0), "above 0, not 0"),
     ],

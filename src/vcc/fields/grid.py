@@ -287,6 +287,13 @@ def camera_array_frame(
     return Affine(matrix) @ Affine.translation(-(nu - 1) / 2, -(nv - 1) / 2, -(ns - 1) / 2, -(nt - 1) / 2)
 
 
+def axes_agree(frame: Affine) -> bool:
+    """Whether the axes of views lie along those of pixels: nothing is turned or mixed."""
+    linear = frame.linear
+    across, within = [0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]
+    return bool((np.abs(linear[across, within]) <= 1e-9 * np.abs(linear).max(axis=1)[across]).all())
+
+
 def told_along_u(
     frame: Affine, across: tuple[float, float] | None, down: tuple[float, float] | None
 ) -> tuple[float, float] | None:

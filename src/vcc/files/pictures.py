@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
@@ -154,11 +155,7 @@ def save_picture(
         InputError: see there.
     """
     path = Path(path)
-    ending = path.suffix.lower()
-    if ending not in WRITE_ENDINGS:
-        raise InputError(
-            f'a picture cannot be written as "{path.name}": end the name in {", ".join(WRITE_ENDINGS)}'
-        )
+    ending = checks.ending("a picture", path, *WRITE_ENDINGS)
     save = _save_linear if ending in (".exr", ".npy") else _save_display
     return save(_grey_if_one(values), path, exposure, bits)
 
@@ -180,11 +177,7 @@ def save_numbers(
             written to.
     """
     path = Path(path)
-    ending = path.suffix.lower()
-    if ending not in RAW_ENDINGS:
-        raise InputError(
-            f'raw numbers cannot be written as "{path.name}": end the name in {", ".join(RAW_ENDINGS)}'
-        )
+    ending = checks.ending("raw numbers", path, *RAW_ENDINGS)
     values = _grey_if_one(values)
     if ending != ".npy" and values.ndim == 3 and values.shape[2] != 3:
         raise InputError(

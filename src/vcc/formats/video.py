@@ -147,8 +147,7 @@ def save(
             quality, or a place that cannot be written to.
     """
     path = Path(path).expanduser()
-    if path.suffix.lower() != ".mp4":
-        raise InputError(f'a flight is written to a name that ends in .mp4, not "{path.name}"')
+    checks.ending("a flight", path, ".mp4")
     grid = light_field.grid
     if grid.channels not in (None, 1, 3):
         raise InputError(f"a video has 1 or 3 channels, and this light field has {grid.channels}")
@@ -181,11 +180,10 @@ def library() -> Any:
     Raises:
         InputError: it is not installed.
     """
-    try:
+    with checks.package("reading and writing videos", "av", "video"):
         import av
-    except ImportError:
-        raise InputError('videos need the package av: pip install "virtual-computational-camera[video]"') from None
-    return av
+
+        return av
 
 
 def _check_selection(every: int, first: int, last: int | None, moves: str) -> None:

@@ -257,9 +257,7 @@ def focal_stack(
 
 
 def _check_film(path: Path, frames_per_second: float) -> None:
-    ending = path.suffix.lower()
-    if ending not in ENDINGS:
-        raise InputError(f'a focal stack is written to a name that ends in .mp4 or .gif, not "{path.name}"')
+    ending = checks.ending("a focal stack", path, *ENDINGS)
     if not 0 < frames_per_second <= (50 if ending == ".gif" else math.inf) or math.isinf(frames_per_second):
         raise InputError(
             f"frames_per_second is a number above 0{' and up to 50' if ending == '.gif' else ''}, not "
