@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress
 from vcc.files.atomic import atomic_path
@@ -100,7 +99,8 @@ def check_output(path: Path, endings: tuple[str, ...]) -> Path:
             that is a folder itself.
     """
     path = path.expanduser()
-    checks.ending("the output", path, *endings)
+    if path.suffix.lower() not in endings:
+        raise InputError(f'"{path.name}" cannot be written: end its name in {", ".join(endings)}')
     folder = path.parent
     if not folder.is_dir():
         raise InputError(f"{path} cannot be written: there is no folder {folder}; make it first")

@@ -379,8 +379,6 @@ def _read_tiff(path: Path) -> NDArray[Any]:
             samples = np.moveaxis(np.asarray(page.colormap)[:, samples], 0, -1)
         if samples.ndim == 3 and page.planarconfig == tifffile.PLANARCONFIG.SEPARATE:
             samples = np.moveaxis(samples, 0, -1)
-    if samples.dtype == np.bool_:
-        samples = samples.astype(np.uint8) * np.uint8(255)
     return samples
 
 
@@ -416,8 +414,6 @@ def _read_exr(path: Path) -> NDArray[Any]:
 
 def _read_npy(path: Path) -> NDArray[Any]:
     samples: NDArray[Any] = np.load(path, allow_pickle=False)
-    if samples.dtype == np.bool_:
-        samples = samples.astype(np.uint8) * np.uint8(255)
     return samples
 
 
@@ -441,6 +437,8 @@ _READERS: dict[str, Callable[[Path], NDArray[Any]]] = {
 
 def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
     """Samples of a type and shape that everything behind can rely on, and their bits."""
+    if samples.dtype == np.bool_:
+        samples = samples.astype(np.uint8) * np.uint8(255)
     if samples.dtype.kind == "f":
         samples = samples.astype(np.float32, copy=False)
     if samples.dtype not in (np.uint8, np.uint16, np.float32):

@@ -15,7 +15,7 @@ from vcc.base.checks import above_zero
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress, tell
 from vcc.camera import Camera
-from vcc.fields.grid import Grid
+from vcc.fields.grid import Grid, skew
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Element, Lens, Mask
@@ -340,11 +340,7 @@ def _sweep(light_field: LightField) -> NDArray[np.float64]:
 def _view_index(light_field: LightField, u: float, v: float) -> tuple[float, float]:
     """(i, j) of a place on the grid of views."""
     linear, offset = light_field.frame.linear, light_field.frame.offset
-    mixed = [
-        linear[a, b] for a, b in ((0, 1), (1, 0), (0, 2), (0, 3), (1, 2), (1, 3), (2, 1), (3, 0), (2, 3), (3, 2))
-    ]
-    size = np.abs(linear).max(axis=1)
-    if np.abs(mixed).max() > 1e-9 * size.min():
+    if np.abs(skew(light_field.frame)).max() > 1e-9 * np.abs(linear).max(axis=1).min():
         raise InputError(
             "views are interpolated in light fields of parallel cameras, whose frame does not mix its axes; this "
             f"one's does:\n{light_field.frame!r}\nResample it first (LightField.resampled)"
