@@ -87,7 +87,7 @@ def _in_memory(
     for done, (row, column) in enumerate(order):
         tell(progress, done, len(order))
         hint = "Give store=… (a folder) to keep the views that are done and to go on where it stopped"
-        values[row, column] = _rendered(renderer, cameras, row, column, kind, done, cut, hint)
+        values[row, column] = _rendered(renderer, cameras, row, column, done, cut, hint)
     tell(progress, len(order), len(order))
     cut.warn()
     return cameras.light_field(values)
@@ -114,7 +114,7 @@ def _in_store(
         for done, (row, column) in enumerate(missing, total - len(missing)):
             tell(progress, done, total)
             hint = f"{done} of {total} views are kept in {path}: the same call goes on with this one"
-            writer.write_view(row, column, _rendered(renderer, cameras, row, column, kind, done, cut, hint))
+            writer.write_view(row, column, _rendered(renderer, cameras, row, column, done, cut, hint))
         tell(progress, total, total)
         cut.warn()
         return writer.finish()
@@ -125,7 +125,6 @@ def _rendered(
     cameras: CameraArray,
     row: int,
     column: int,
-    kind: np.dtype[Any],
     done: int,
     cut: _Cut,
     hint: str,

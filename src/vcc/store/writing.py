@@ -19,6 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.measures import decibels
 from vcc.base.progress import Progress, tell
 from vcc.base.version import VERSION
 from vcc.base.words import first_few
@@ -174,7 +175,7 @@ class StoreWriter:
 
     def _decibels(self, mean_square: float) -> float:
         peak = float(np.iinfo(self.dtype).max)
-        return math.inf if mean_square == 0 else 10 * math.log10(peak * peak / mean_square)
+        return math.inf if mean_square == 0 else decibels(mean_square, peak)
 
 
 def create_store(
