@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vcc
+from vcc.base.measures import psnr
 from vcc.sources import CameraArray
 from vcc.store import open_store
 from vcc.units import mm
@@ -271,11 +272,6 @@ def _open_share(u: float, v: float, du: float, dv: float) -> float:
     """The share of a view's cell that lies within the round stop."""
     fine = (np.arange(64) + 0.5) / 64 - 0.5
     return float(((u + du * fine) ** 2 + (v + dv * fine[:, None]) ** 2 <= (STOP / 2) ** 2).mean())
-
-
-def psnr(picture: Array, truth: Array) -> float:
-    """dB, the peak being the truth's largest value."""
-    return float(10 * np.log10(truth.max() ** 2 / np.mean((picture - truth) ** 2)))
 
 
 def compared(folder: Path, every: int) -> list[tuple[float, float, float, float]]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from panels import new_figure
 
 import vcc
+from vcc.base.measures import psnr
 from vcc.plot.style import BLUE, INK, ORANGE, QUIET, SMALL, TEXT, TITLE
 from vcc.units import mm
 
@@ -76,7 +77,7 @@ def profile(axes: Axes, count: int, title: str) -> None:
     for interpolation, colour, marker in (("linear", ORANGE, "s"), ("sharp", BLUE, "D")):
         found = picture(views(count), interpolation)
         over = (found[6:-6, 6:-6].max() - BRIGHT) / (BRIGHT - DARK)
-        error = 20 * np.log10(BRIGHT / np.sqrt(np.mean((found - truth)[6:-6, 6:-6] ** 2)))
+        error = psnr(found[6:-6, 6:-6], truth[6:-6, 6:-6], BRIGHT)
         print(f"{count}×{count} views, {interpolation}: {error:.1f} dB, overshoot {over:.1%} of the step")
         label = f'"{interpolation}": {error:.1f} dB, overshoot {max(over, 0):.0%}'
         axes.plot(columns[near], found[row, near], color=colour, lw=1.2, marker=marker, ms=4, label=label)

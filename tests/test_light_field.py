@@ -204,7 +204,7 @@ def test_resampling_on_its_own_grid_changes_nothing():
 
 def test_resampling_refuses_unknown_interpolation_and_odd_shapes():
     lf = field()
-    with pytest.raises(vcc.InputError, match="'nearest', 'linear', 'cubic', not 'quintic'"):
+    with pytest.raises(vcc.InputError, match="'nearest', 'linear' or 'cubic', not 'quintic'"):
         lf.resampled(lf.frame, (2, 2, 2, 2), interpolation="quintic")
     with pytest.raises(vcc.InputError, match=r"not \(2, 2, 0, 2\)"):
         lf.resampled(lf.frame, (2, 2, 0, 2))

@@ -322,7 +322,7 @@ def test_a_light_field_on_disk_gets_the_same_advice(tmp_path):
         ({"depths": (0.0, 1.0)}, "depths is"),
         ({"depths": (float("nan"), 1.0)}, "depths is"),
         ({"depths": (1.0, 2.0), "views": (0, 3)}, "views is"),
-        ({"depths": (1.0, 2.0), "wavelength": 0.0}, "wavelength is a length above 0"),
+        ({"depths": (1.0, 2.0), "wavelength": 0.0}, "wavelength is a length, greater than 0 m"),
         ({"light_field": light_field(), "views": (3, 3)}, "views is for advice without"),
         ({"light_field": "views/"}, "light_field is a vcc.LightField, not a str"),
         ({"depths": (1e-9, 2.0)}, "views: are they in metres"),

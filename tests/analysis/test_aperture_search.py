@@ -90,7 +90,7 @@ def test_reports_progress_and_stops_when_told():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"noise": 0}, "noise is a standard deviation above 0"),
+        ({"noise": 0}, "noise is a standard deviation, greater than 0"),
         ({"noise": float("nan")}, "noise is a standard deviation"),
         ({"power": -POWER}, "finite numbers of 0 or more"),
         ({"power": POWER[0]}, "rows, columns"),
@@ -99,10 +99,10 @@ def test_reports_progress_and_stops_when_told():
         ({"cells": 0}, "cells is a whole number"),
         ({"generations": 0}, "generations is a whole number"),
         ({"patience": 0}, "patience is a whole number"),
-        ({"survivors": 1}, "two survivors"),
+        ({"survivors": 1}, "survivors is a whole number, 2 or more, not 1; fewer cannot breed"),
         ({"population": 10, "survivors": 10}, "no place for children"),
-        ({"mutation": 1.5}, "mutation is a probability"),
-        ({"exchange": -0.1}, "exchange is a probability"),
+        ({"mutation": 1.5}, "probability of mutation must be from 0 to 1"),
+        ({"exchange": -0.1}, "probability of exchange must be from 0 to 1"),
     ],
 )
 def test_what_cannot_be_searched_is_refused(options, message):

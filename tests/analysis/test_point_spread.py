@@ -282,7 +282,7 @@ def test_what_is_refused():
         ((np.ones((9, 1)), 0.1, power), "larger than the picture"),
         ((np.zeros((2, 2)), 0.1, power), "not all 0"),
         (([[np.nan]], 0.1, power), "finite numbers"),
-        (([[1.0]], 0.0, power), "above 0"),
+        (([[1.0]], 0.0, power), "greater than 0"),
         (([[1.0]], 0.1, -power), "one for each frequency"),
     ]:
         with refused(words):

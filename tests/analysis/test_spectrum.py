@@ -315,9 +315,9 @@ def test_what_is_refused():
         plot_spectrum(spectrum, decades=0)
     with refused("finite values; at index (1, 0)"):
         picture_spectrum(vcc.Image(np.array([[0.0], [np.nan]]), vcc.Affine.identity(2)))
-    with refused("above 0 m"):
+    with refused("width of the rectangle whose spectrum is taken must be greater than 0 m"):
         mask_spectrum(CosineSum((1 * mm, 1 * mm), 1, 0.5), 0.0)
-    with refused('axis is "x" or "y"'):
+    with refused("axis is 'x' or 'y'"):
         PlaneSpectrum(np.ones((2, 2)), vcc.Affine.identity(2)).along("u")
     assert repr(spectrum) == "Spectrum(2×2×4×4 complex64)"
     assert isinstance(spectrum, Spectrum)

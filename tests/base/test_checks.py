@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,6 +44,11 @@ def test_whole_numbers_of_any_library_come_back_as_int():
         assert checks.whole_number(value) is None
 
 
+def test_counts_and_endings_that_are_right_come_back():
+    assert checks.counts("shape", np.array([2, 3]), "rows", "columns") == (2, 3)
+    assert checks.ending("a film", Path("a.MP4"), ".mp4", ".gif") == ".mp4"
+
+
 @pytest.mark.parametrize(
     ("check", "words"),
     [
@@ -58,6 +64,16 @@ def test_whole_numbers_of_any_library_come_back_as_int():
         (
             lambda: checks.whole_number_between("samples", 1, 2, 9, of="rays a pixel"),
             "samples is a whole number of rays a pixel from 2 to 9, not 1",
+        ),
+        (
+            lambda: checks.counts("views", (3, 0), "rows", "columns"),
+            r"views is \(rows, columns\), whole numbers of 1 or more, not \(3, 0\)",
+        ),
+        (lambda: checks.counts("shape", (3.0, 2), "rows", "columns"), r"not \(3.0, 2\)"),
+        (lambda: checks.counts("shape", 3, "rows", "columns"), "not 3"),
+        (
+            lambda: checks.ending("a film", Path("a.AVI"), ".mp4", ".gif"),
+            'a film cannot be written as "a.AVI": end its name in .mp4, .gif',
         ),
         (lambda: checks.seed(-1), "seed is -1: it is a whole number, 0 or more, such as 1"),
         (lambda: checks.seed(1.0, "pattern_seed"), "pattern_seed is 1.0: it is a whole number"),

@@ -156,5 +156,5 @@ def test_a_frame_is_for_the_axes_as_stored(tmp_path, samples):
     arrays.save(LightField.from_views(samples, 1e-3, 0.01), path)
     with pytest.raises(InputError, match="leave shape= and axes= out"):
         arrays.read(path, axes="uvtsc")
-    with pytest.raises(InputError, match=r"ends in \.npz"):
+    with pytest.raises(InputError, match=r"end its name in \.npz"):
         arrays.save(LightField.from_views(samples, 1e-3, 0.01), tmp_path / "a.npy")

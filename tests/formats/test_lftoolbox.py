@@ -184,7 +184,7 @@ def test_options_of_other_formats_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("a.h5", {}, r"is a \.mat file, not \"a\.h5\""),
+        ("a.h5", {}, r"as \"a\.h5\": end its name in \.mat"),
         ("a.mat", {"weights": np.zeros((2, 2))}, "weights of shape"),
     ],
 )

@@ -125,7 +125,7 @@ def test_missing_numbers(grid: Views, tmp_path: Path) -> None:
     ("options", "message"),
     [
         ({"order": "spiral"}, "order is one of .*not 'spiral'"),
-        ({"views": (0, 5)}, r"views are \(rows, columns\)"),
+        ({"views": (0, 5)}, r"views is \(rows, columns\)"),
         ({"every": 2}, "every= means nothing to a folder"),
         ({"views": (2, 3)}, r"20 numbered pictures, and views=\(2, 3\) would be 6"),
     ],

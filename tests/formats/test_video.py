@@ -86,10 +86,10 @@ def test_ten_bits(tmp_path, frames):
     ("options", "message"),
     [
         ({"every": 20}, "gives 1 of its 10 frames with every=20"),
-        ({"every": 0}, "every is a whole number of 1 or more, not 0"),
-        ({"every": 1.5}, "every is a whole number of 1 or more, not 1.5"),
-        ({"first": -1}, "first is a whole number of 0 or more, not -1"),
-        ({"first": 5, "last": 3}, "last is a whole number of 5 or more, not 3"),
+        ({"every": 0}, "every is a whole number, 1 or more, not 0"),
+        ({"every": 1.5}, "every is a whole number, 1 or more, not 1.5"),
+        ({"first": -1}, "first is a whole number, 0 or more, not -1"),
+        ({"first": 5, "last": 3}, "last is a whole number, 5 or more, not 3"),
         ({"moves": "forward"}, "moves is one of .*not 'forward'"),
     ],
 )
@@ -180,11 +180,11 @@ def test_what_is_too_bright_is_counted(tmp_path, light_field):
     ("name", "options", "message"),
     [
         ("a.mp4", {"flight": "loop"}, "flight is 'serpentine', 'circle' or 'row', not 'loop'"),
-        ("a.mp4", {"frames_per_second": 0}, "frames_per_second is"),
+        ("a.mp4", {"frames_per_second": 0}, "frames_per_second must be greater than 0"),
         ("a.mp4", {"quality": 99}, "0 to 51, not 99"),
         ("a.mp4", {"exposure": "bright"}, "exposure is"),
         ("a.mp4", {"exposure": -1}, "exposure is"),
-        ("a.avi", {}, r"ends in \.mp4"),
+        ("a.avi", {}, r"end its name in \.mp4"),
         ("lost/a.mp4", {}, "does not exist"),
     ],
 )

@@ -238,7 +238,7 @@ def test_hci_too_few_and_too_many(square_views: Views, folder_of: Write) -> None
         ("baseline_mm = 60.0", "", r"does not state baseline_mm in its section \[extrinsics\]"),
         ("baseline_mm = 60.0", "baseline_mm = wide", 'baseline_mm is "wide", not a number'),
         ("baseline_mm = 60.0", "baseline_mm = 0", "must be greater than 0"),
-        ("focus_distance_m = 6.9", "focus_distance_m = -1", "focus_distance_m is -1"),
+        ("focus_distance_m = 6.9", "focus_distance_m = -1", "focus_distance_m must be 0 or more, not -1"),
         ("num_cams_x = 3", "num_cams_x = 0", "3×0 cameras"),
         ("[intrinsics]", "intrinsics", "cannot be read"),
     ],

@@ -145,8 +145,8 @@ def test_pyplot_is_not_involved():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"across": "z"}, 'across is "x" or "y"'),
-        ({"rays": 1}, "2 rays or more"),
+        ({"across": "z"}, "across is 'x' or 'y'"),
+        ({"rays": 1}, "rays is a whole number, 2 or more"),
         ({"object_distances": [0]}, "must be greater than 0 m"),
     ],
 )

@@ -220,7 +220,7 @@ def test_pictures_on_planes_on_the_command_line(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("planes", "-o", "out.png"), "end it in .zarr"),
+        (("planes", "-o", "out.png"), "end its name in .zarr"),
         (("planes", "-o", "nowhere/out.zarr"), "there is no folder nowhere"),
         (("planes", "-o", "out.zarr", "--aperture", "20"), "needs a unit"),
         (("planes", "-o", "out.zarr", "--aperture", "1 mm, 2 mm, 3 mm"), "one length, or two with a comma"),

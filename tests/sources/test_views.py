@@ -47,8 +47,8 @@ def test_views_over_an_aperture_fill_it():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"views": (0, 3)}, r"views are \(rows, columns\), .*not \(0, 3\)"),
-        ({"pixels": (3.5, 3)}, "pixels are"),
+        ({"views": (0, 3)}, r"views is \(rows, columns\), .*not \(0, 3\)"),
+        ({"pixels": (3.5, 3)}, "pixels is"),
         ({"spacing": 0.0}, "spacing must be greater than 0"),
         ({"slope_per_pixel": -1.0}, "slope_per_pixel must be"),
         ({"focus_distance": 0.0}, "focus_distance must be"),

@@ -212,9 +212,9 @@ def test_a_limit_cuts_and_the_picture_stays(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"memory_limit": 0}, "memory_limit is a number of bytes above 0"),
-        ({"memory_limit": -5}, "memory_limit is a number of bytes above 0"),
-        ({"memory_limit": "much"}, "memory_limit is a number of bytes above 0"),
+        ({"memory_limit": 0}, "memory_limit is a number of bytes, greater than 0"),
+        ({"memory_limit": -5}, "memory_limit is a number of bytes, greater than 0"),
+        ({"memory_limit": "much"}, "memory_limit is a number of bytes, greater than 0"),
         ({"memory_limit": 1000}, "memory_limit=1000 bytes is too little"),
         ({"tolerance": 0.1}, "tolerance is for pictures made by rays"),
         ({"method": "rays", "tolerance": -1}, "greater than 0"),

@@ -80,7 +80,7 @@ def test_what_samples_are_comes_back(tmp_path, sample):
 def test_a_store_that_states_something_else_of_its_samples_is_refused(stored):
     group = zarr.open_group(stored.path, mode="r+")
     group.attrs["light_field"] = group.attrs["light_field"] | {"sample": "cell"}
-    with pytest.raises(vcc.InputError, match='sample is "mean" or "point", not \'cell\''):
+    with pytest.raises(vcc.InputError, match="sample is 'mean' or 'point', not 'cell'"):
         open_store(stored.path)
 
 
@@ -370,9 +370,9 @@ def test_impossible_stores_are_refused(tmp_path, change, words):
 @pytest.mark.parametrize(
     ("packing", "options", "words"),
     [
-        (Lossless, {"codec": "gzip"}, 'lossless compression is by "zstd" or "lz4", not \'gzip\''),
+        (Lossless, {"codec": "gzip"}, "the codec of lossless compression is 'zstd' or 'lz4', not 'gzip'"),
         (Lossless, {"level": 12}, "a whole number from 0 to 9, not 12"),
-        (Lossy, {"codec": "jpeg"}, 'lossy compression is by "jpegxl" or "avif", not \'jpeg\''),
+        (Lossy, {"codec": "jpeg"}, "the codec of lossy compression is 'jpegxl' or 'avif', not 'jpeg'"),
         (Lossy, {"quality": 0}, "a whole number from 1 to 99, not 0"),
     ],
 )
@@ -507,12 +507,12 @@ def change(stored, file, **keys):
     ("file", "keys", "words"),
     [
         ("zarr.json", {"format_version": 2}, "has format_version 2, and this vcc reads up to 1"),
-        ("zarr.json", {"format_version": "one"}, "format_version is 'one'"),
+        ("zarr.json", {"format_version": "one"}, "format_version is a whole number, 1 or more, not 'one'"),
         ("zarr.json", {"zarr_format": 2}, "zarr_format 2"),
         ("zarr.json", {"frame": None}, "do not state frame"),
         ("zarr.json", {"frame": [[1, 2], [3, 4]]}, "cannot be used"),
         ("zarr.json", {"frame": np.zeros((5, 5)).tolist()}, "cannot be used"),
-        ("zarr.json", {"transfer": "log"}, 'transfer is "linear" or "srgb"'),
+        ("zarr.json", {"transfer": "log"}, "transfer is 'linear' or 'srgb'"),
         ("zarr.json", {"transfer": "srgb"}, "only integers are sRGB codes"),
         ("zarr.json", {"units": {"u": "mm"}}, "units"),
         ("zarr.json", {"complete": "yes"}, "complete is true or false"),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.advice.folded import enough
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
@@ -43,7 +44,7 @@ def asked_for(train: Train, vergences: tuple[float, float], views: Any = None) -
         apart = [np.linalg.norm(by_place + by_slope * vergence, axis=0) for vergence in vergences]
         rows, columns = _needed(np.max(apart, axis=0), width, height)
     else:
-        rows, columns = _checked(views)
+        rows, columns = checks.counts("views", views, "rows", "columns")
     slopes = 1 / np.linalg.norm(by_slope, axis=0)
     nt, ns = train.sensor.shape
     steps = np.diag([width / columns, height / rows, -slopes[0], -slopes[1]])
@@ -88,10 +89,3 @@ def _needed(pixels_per_metre: Array, width: float, height: float) -> tuple[int, 
             "sensor near focus?"
         )
     return rows, columns
-
-
-def _checked(views: Any) -> tuple[int, int]:
-    counts = tuple(int(count) for count in views)
-    if len(counts) != 2 or min(counts) < 1 or counts != tuple(views):
-        raise InputError(f"views is (rows, columns), whole numbers from 1 on, not {views}")
-    return counts[0], counts[1]

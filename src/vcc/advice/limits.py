@@ -18,8 +18,8 @@ from vcc.advice.folded import Folded, enough, singular, stretch, widest
 from vcc.advice.mask_limits import mask_limits
 from vcc.advice.view_gaps import ROUNDING, ViewGaps, distance_of
 from vcc.advice.words import SamplingItem, SamplingLimits
+from vcc.base import checks
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.optics.deflections import CellDeflection, FacetDeflection
 from vcc.optics.train import Stage, Train
@@ -52,8 +52,7 @@ def sampling_limits(
     Raises:
         InputError: a wavelength of 0 or less.
     """
-    if not (wavelength > 0 and math.isfinite(wavelength)):
-        raise InputError(f"wavelength is a length above 0, such as 550 * nm, not {wavelength} m")
+    checks.above_zero("wavelength", wavelength, "a length", unit="m", way_out="such as 550 * nm")
     optics = Folded(train, grid, vergences)
     gaps, notes = optics.gaps, _notes(optics)
     items = _before_what_blocks(optics, wavelength)

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.analysis.deblurring import checked_power, expected_deblurring_error
+from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 
 Array = NDArray[np.float64]
 
@@ -91,8 +92,7 @@ def optimised_aperture(
     prior = checked_power(noise, power)
     _check_size(prior, cells * pixels_per_cell)
     for name, value in (("exchange", exchange), ("mutation", mutation)):
-        if not 0 <= value <= 1:
-            raise InputError(f"{name} is a probability from 0 to 1, not {value}")
+        checks.zero_or_more(f"the probability of {name}", value, most=1)
     random = np.random.default_rng(seed)
     errors_of = _Errors(noise, prior, cells, pixels_per_cell)
     bits = random.random((population, cells, cells)) < 0.5
@@ -107,8 +107,7 @@ def optimised_aperture(
         history.append(float(errors[0]))
         typical.append(float(np.median(errors)))
         done = len(history) - 1
-        if progress is not None:
-            progress(done, generations)
+        tell(progress, done, generations)
         converged = patience is not None and waited >= patience
         if converged or done >= generations:
             break
@@ -197,10 +196,8 @@ def _check_search(
         "patience": 1 if patience is None else patience,
     }
     for name, value in numbers.items():
-        if int(value) != value or value < 1:
-            raise InputError(f"{name} is a whole number of 1 or more, not {value}")
-    if int(survivors) != survivors or survivors < 2:
-        raise InputError(f"two survivors or more are needed to breed, not {survivors}")
+        checks.whole_number_between(name, value, 1)
+    checks.whole_number_between("survivors", survivors, 2, way_out="fewer cannot breed")
     if int(population) != population or population <= survivors:
         raise InputError(
             f"a population of {population} leaves no place for children of {survivors} survivors: make it larger"

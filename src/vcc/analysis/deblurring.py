@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 
 Array = NDArray[np.float64]
@@ -56,8 +57,7 @@ def checked_power(noise: float, power: ArrayLike) -> Array:
         InputError: a noise of zero or less, or powers that are negative or not finite.
     """
     prior = np.asarray(power, dtype=np.float64)
-    if not (noise > 0 and math.isfinite(noise)):
-        raise InputError(f"noise is a standard deviation above 0, not {noise}")
+    checks.above_zero("noise", noise, "a standard deviation")
     if prior.ndim != 2 or not np.isfinite(prior).all() or prior.min(initial=0.0) < 0:
         raise InputError("power is (rows, columns) of finite numbers of 0 or more, one for each frequency")
     return prior
@@ -81,13 +81,11 @@ def natural_image_power(
     Raises:
         InputError: a shape of fewer than 2 pixels, or a standard deviation or mean that is not above 0.
     """
-    if len(shape) != 2 or any(int(n) != n or n < 1 for n in shape) or shape[0] * shape[1] < 2:
+    if math.prod(checks.counts("shape", shape, "rows", "columns")) < 2:
         raise InputError(f"shape is (rows, columns) of two pixels or more, not {shape}")
-    for name, value in (("standard_deviation", standard_deviation), ("mean", mean)):
-        if not (value > 0 and math.isfinite(value)):
-            raise InputError(f"{name} must be greater than 0, not {value}")
-    if not math.isfinite(exponent):
-        raise InputError(f"exponent must be finite, not {exponent}")
+    checks.above_zero("standard_deviation", standard_deviation)
+    checks.above_zero("mean", mean)
+    checks.finite("exponent", exponent)
     radius = np.hypot(np.fft.fftfreq(shape[0])[:, None], np.fft.fftfreq(shape[1]))
     radius[0, 0] = 1.0
     power = radius**-exponent

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.sampled import to_numpy
@@ -133,11 +134,8 @@ def mask_spectrum(
         InputError: a size of zero or less, or fewer than one sample.
     """
     height = width if height is None else height
-    if not (width > 0 and height > 0 and samples >= 1):
-        raise InputError(
-            f"a mask's spectrum needs a width and a height above 0 m and 1 sample or more, not {width} m, "
-            f"{height} m and {samples}"
-        )
+    checks.sizes("the rectangle whose spectrum is taken", width=width, height=height)
+    checks.whole_number_between("samples", samples, 1)
     pattern = mask.faces().pattern if isinstance(mask, Mask) else as_pattern(mask)
     assert pattern is not None
     cell = width / samples
@@ -192,6 +190,4 @@ def transformed_along(values: NDArray[np.complex64], axis: int, *, inverse: bool
 
 
 def _axis(axis: str) -> int:
-    if axis not in ("x", "y"):
-        raise InputError(f'axis is "x" or "y", not {axis!r}')
-    return "xy".index(axis)
+    return "xy".index(checks.one_of("axis", axis, "xy"))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.analysis.plane_spectrum import PlaneSpectrum, plane_spectrum
 from vcc.analysis.point_rays import MOST_CELLS, PointRays, Spot
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import short
@@ -195,12 +196,10 @@ def _check(
 ) -> None:
     if not isinstance(camera, Camera):
         raise InputError(f"a point spread function is that of a vcc.Camera, not of a {type(camera).__name__}")
-    if not distance > 0:
-        raise InputError(f"the distance of a point must be greater than 0 m, not {distance}")
-    if len(field) != 2 or not all(math.isfinite(slope) for slope in field):
-        raise InputError(f"field is a pair of finite slopes (X/Z, Y/Z), not {field}")
-    if pitch is not None and not (pitch > 0 and math.isfinite(pitch)):
-        raise InputError(f"pitch must be greater than 0 m, not {pitch}")
+    checks.above_zero("the distance of a point", distance, unit="m", infinite=True)
+    checks.pair("field", field, "a pair of finite slopes (X/Z, Y/Z)")
+    if pitch is not None:
+        checks.above_zero("pitch", pitch, unit="m")
     if pitch is not None and on_pixels:
         raise InputError("on_pixels counts light in the sensor's own pixels: leave out pitch")
     if cells is not None and not (int(cells) == cells and 2 <= cells <= MOST_CELLS):
@@ -245,9 +244,7 @@ def _lattice(
             )
         rows, columns = int(2 * half[1] + 1), int(2 * half[0] + 1)
     else:
-        if len(shape) != 2 or any(int(n) != n or n < 1 for n in shape):
-            raise InputError(f"shape is (rows, columns), each at least 1, not {shape}")
-        rows, columns = int(shape[0]), int(shape[1])
+        rows, columns = checks.counts("shape", shape, "rows", "columns")
     frame = (
         Affine.translation(float(image[0]), float(image[1]))
         @ Affine.scaling(float(steps[0]), float(steps[1]))

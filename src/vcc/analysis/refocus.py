@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.analysis.plane_spectrum import BLOCK_BYTES
 from vcc.analysis.spectrum import check_size
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.sampled import to_numpy
@@ -162,11 +163,8 @@ class Refocuser:
         Raises:
             InputError: a distance of zero or less, or one at which the pixels of a view all see one place.
         """
-        if not distance > 0:
-            raise InputError(
-                f"a distance to focus at must be greater than 0 m, not {distance}: it is counted from the plane "
-                "of the light field towards the scene"
-            )
+        counted = "it is counted from the plane of the light field towards the scene"
+        checks.above_zero("a distance to focus at", distance, unit="m", infinite=True, way_out=counted)
         linear = self.light_field.frame.linear
         # Places (u − Z·s, v − Z·t) at the distance, divided by Z, which may be infinite.
         place = linear[:2] / distance - linear[2:]

@@ -11,6 +11,7 @@ import numpy as np
 from vcc.advice.asked_for import asked_for
 from vcc.advice.limits import GREEN_LIGHT, sampling_limits
 from vcc.advice.words import SamplingLimits
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
@@ -47,8 +48,7 @@ class SamplingAdvice(SamplingLimits):
         Raises:
             InputError: a distance of 0 or less, or a camera for which this is not given (see ``notes``).
         """
-        if not distance > 0:
-            raise InputError(f"the distance of a point must be greater than 0 m, not {distance}")
+        checks.above_zero("the distance of a point", distance, unit="m", infinite=True)
         if self.gaps is None:
             raise InputError("; ".join(self.notes))
         return float(self.gaps.at(np.array([1 / distance]))[0])

@@ -10,6 +10,7 @@ import math
 import operator
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,23 @@ def one_of(name: str, value: object, choices: Iterable[str]) -> str:
         listed = " or ".join([*filter(None, [", ".join(map(repr, words[:-1]))]), repr(words[-1])])
         raise InputError(f"{name} is {'one of ' if len(words) > 3 else ''}{listed}, not {value!r}")
     return str(value)
+
+
+def ending(what: str, path: Path, *endings: str) -> str:
+    """The ending of a file's name, in small letters.
+
+    Args:
+        what: is written there, for the error, such as "a picture".
+        path: of the file.
+        endings: that it may have, such as ".png".
+
+    Raises:
+        InputError: another one.
+    """
+    found = path.suffix.lower()
+    if found not in endings:
+        raise InputError(f'{what} cannot be written as "{path.name}": end its name in {", ".join(endings)}')
+    return found
 
 
 # --- whole numbers ---
@@ -78,6 +96,26 @@ def whole_number_between(
         limits = f", {least} or more" if most is None else f" from {least} to {most}"
         raise InputError(f"{name} is {what}{limits}, not {_told(value)}{_and(way_out)}")
     return number
+
+
+def counts(name: str, value: Any, *axes: str) -> tuple[int, ...]:
+    """Whole numbers of 1 or more, one for each axis: a shape, how many views.
+
+    Args:
+        name: what to call them in an error.
+        value: the numbers; floating-point numbers are none.
+        axes: what is counted, such as "rows" and "columns".
+
+    Raises:
+        InputError: anything else.
+    """
+    try:
+        numbers = tuple(whole_number(number) or 0 for number in value)
+    except TypeError:
+        numbers = ()
+    if len(numbers) != len(axes) or min(numbers) < 1:
+        raise InputError(f"{name} is ({', '.join(axes)}), whole numbers of 1 or more, not {_told(value)}")
+    return numbers
 
 
 def seed(value: object, name: str = "seed") -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress
 from vcc.camera import Camera
 from vcc.demo.report import DemoReport, Timing
 from vcc.demo.sheet import MASK_TITLES, drawn_sheet, truth_in_words
@@ -114,7 +115,7 @@ class _Work:
         self.timings.append(Timing(step, time.perf_counter() - begun, note=note))
 
     @contextmanager
-    def bar(self, words: str) -> Iterator[Callable[[int, int], None]]:
+    def bar(self, words: str) -> Iterator[Progress]:
         """A progress bar; yields what to call with (done, total)."""
         from rich.progress import Progress
 

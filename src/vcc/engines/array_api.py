@@ -14,7 +14,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.engines.rays import memory_of_rays, traced
 from vcc.fields.sampled import to_dtype
 from vcc.plan import operators
@@ -84,12 +84,10 @@ class _Run:
         raster = None
         total = len(core.view_columns)
         for a in range(total):
-            if progress is not None:
-                progress(a, total)
+            tell(progress, a, total)
             part = self.separable_column(a) if core.separable else self.sheared_column(a)
             raster = part if raster is None else raster + part
-        if progress is not None:
-            progress(total, total)
+        tell(progress, total, total)
         assert raster is not None  # a plan has at least one column of taps
         return raster * core.scale
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import rays_compiled, sharpening_kernels
@@ -334,15 +334,13 @@ def _sheared(
     footprint = tables.Footprint(list(REACH).index(core.interpolation), REACH[core.interpolation], core.opening)
     masks = _textures(core)
     for done, (b, a) in enumerate(zip(*np.nonzero(core.weights), strict=True)):
-        if progress is not None:
-            progress(done, core.taps_used)
+        tell(progress, done, core.taps_used)
         place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
         samples = fine.divided(values[core.view_rows[b], core.view_columns[a]].reshape(*core.samples, -1))
         view = tables.View(samples, core.weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
         add = partial(kernels.sheared_view, view, grid, footprint, masks)
         list(pool.map(lambda band, add=add: add(band, raster), _bands(len(raster))))
-    if progress is not None:
-        progress(core.taps_used, core.taps_used)
+    tell(progress, core.taps_used, core.taps_used)
     return raster.reshape(len(raster), -1)
 
 

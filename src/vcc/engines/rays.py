@@ -12,7 +12,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.fields.sampled import to_dtype
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
@@ -51,8 +51,7 @@ def traced(core: Rays, values: Any, double: bool, beside: int, progress: Progres
         half = core.samples // 2
         halves[0].append(xp.sum(found[:, :, :half, :], axis=(1, 2)) * core.scale)
         halves[1].append(xp.sum(found[:, :, half:, :], axis=(1, 2)) * core.scale)
-        if progress is not None:
-            progress(int(pixel[-1]) + 1, rows * columns)
+        tell(progress, int(pixel[-1]) + 1, rows * columns)
     one, two = (xp.reshape(xp.concat(half, axis=0), (rows, columns, channels)) for half in halves)
     return Partial(one + two, 2 * (one - two), asked, lacking, rays, core.samples)
 

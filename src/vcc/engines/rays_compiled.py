@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
 from vcc.plan.protocol import Partial
@@ -49,8 +49,7 @@ def traced(
         # Tallies are summed in the order of tiles: the same sums whatever the number of threads.
         for done, part in enumerate(pool.map(add, tiles), start=1):
             tally += part
-            if progress is not None:
-                progress(done, len(tiles))
+            tell(progress, done, len(tiles))
     asked, lacking, traced_rays = tally.tolist()
     return Partial(pictures[0], pictures[1], asked, lacking, int(traced_rays), core.samples)
 

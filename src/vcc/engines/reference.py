@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.engines.rays import memory_of_rays, traced
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
@@ -34,8 +34,7 @@ def footprints(
     raster = np.zeros((*core.raster_shape, *channels))
     total = core.weights.size
     for done, (b, a) in enumerate(np.ndindex(core.weights.shape)):
-        if progress is not None:
-            progress(done, total)
+        tell(progress, done, total)
         if core.weights[b, a] == 0:
             continue
         view = values[core.view_rows[b], core.view_columns[a]].astype(np.float64)
@@ -44,8 +43,7 @@ def footprints(
         for mask in core.masks:
             flux = flux * mask.weights(b, a, k, l)[..., None]
         _spread(core, raster, flux, b, a, k, l)
-    if progress is not None:
-        progress(total, total)
+    tell(progress, total, total)
     return Partial(raster * core.scale)
 
 

@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.fields.grid import Block, Grid
+from vcc.fields.grid import Block, Grid, axes_agree
 from vcc.fields.parallax import Axis
 from vcc.fields.sampled import to_numpy
 
 Array = NDArray[np.float32]
-Doubles = NDArray[np.float64]
 
 LARGEST_RANGE = 64
 """Pixels per view either way; more is a range in other units."""
@@ -77,9 +76,7 @@ def check_axes(grid: Grid, fewest: int) -> None:
         raise InputError(
             f"depth needs {fewest} views or more in a row or column; this light field has {rows}×{columns}"
         )
-    linear = grid.frame.linear
-    scale = np.abs(linear).max(axis=1, keepdims=True)
-    if not np.allclose(linear[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]] / scale.repeat(2), 0, atol=1e-9):
+    if not axes_agree(grid.frame):
         raise InputError(
             "depth needs a light field whose view axes are along those of its pixels; this frame turns or "
             "mixes them. Resample it first (vcc.LightField.resampled)"

@@ -267,8 +267,7 @@ def camera_array_frame(
     Raises:
         InputError: another number of axes, or a spacing, slope or focus distance of zero or less.
     """
-    dv, du = spacing if isinstance(spacing, tuple) else (spacing, spacing)
-    pt, ps = slope_per_pixel if isinstance(slope_per_pixel, tuple) else (slope_per_pixel, slope_per_pixel)
+    (dv, du), (pt, ps) = pair(spacing), pair(slope_per_pixel)
     for name, value in (
         ("spacing", du),
         ("spacing", dv),
@@ -285,6 +284,23 @@ def camera_array_frame(
     matrix[2, 0], matrix[3, 1] = du / focus_distance, dv / focus_distance
     matrix[2, 2], matrix[3, 3] = -ps, -pt
     return Affine(matrix) @ Affine.translation(-(nu - 1) / 2, -(nv - 1) / 2, -(ns - 1) / 2, -(nt - 1) / 2)
+
+
+def pair(given: float | tuple[float, float]) -> tuple[float, float]:
+    """One number for rows and for columns, twice; two as they are."""
+    return given if isinstance(given, tuple) else (given, given)
+
+
+def skew(frame: Affine) -> Array:
+    """All of a frame that parallel cameras do not have: what leads from x to y or from pixels to places, (10,)."""
+    return frame.linear[[0, 0, 0, 1, 1, 1, 2, 2, 3, 3], [1, 2, 3, 0, 2, 3, 1, 3, 0, 2]]
+
+
+def axes_agree(frame: Affine) -> bool:
+    """Whether the axes of views lie along those of pixels: nothing is turned or mixed."""
+    linear = frame.linear
+    across, within = [0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]
+    return bool((np.abs(linear[across, within]) <= 1e-9 * np.abs(linear).max(axis=1)[across]).all())
 
 
 def told_along_u(

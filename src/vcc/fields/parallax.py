@@ -20,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 
 Axis = Literal["u", "v"]
@@ -99,8 +100,7 @@ def block_disparities(values: NDArray[Any], axis: Axis) -> BlockDisparities:
         InputError: another axis or shape.
     """
     _check(values)
-    if axis not in ("u", "v"):
-        raise InputError(f'a view axis is "u" or "v", not {axis!r}')
+    checks.one_of("a view axis", axis, "uv")
     return _measure(values, axis, "s" if axis == "u" else "t").found
 
 

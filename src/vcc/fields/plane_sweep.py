@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from vcc.base.checks import above_zero
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.base.version import VERSION
 from vcc.fields.cross import Arm, Array, Views, arms, check_axes, cubic_weights, moved, range_to_search
 from vcc.fields.disparity import DisparityMaps
@@ -92,8 +92,7 @@ def plane_sweep(
             row.disagreement(grid.disparities_along(row.arm.along, disparity)) for row in rows_of_views
         ]
         costs[n] = gather(np.sum(disagreement, axis=0))
-        if progress is not None:
-            progress(n + 1, len(tried))
+        tell(progress, n + 1, len(tried))
     best = costs.argmin(axis=0)
     offset, lowest = _parabola(costs, best)
     found = tried[best] + offset * (tried[1] - tried[0])

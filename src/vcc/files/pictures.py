@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
@@ -154,11 +155,7 @@ def save_picture(
         InputError: see there.
     """
     path = Path(path)
-    ending = path.suffix.lower()
-    if ending not in WRITE_ENDINGS:
-        raise InputError(
-            f'a picture cannot be written as "{path.name}": end the name in {", ".join(WRITE_ENDINGS)}'
-        )
+    ending = checks.ending("a picture", path, *WRITE_ENDINGS)
     save = _save_linear if ending in (".exr", ".npy") else _save_display
     return save(_grey_if_one(values), path, exposure, bits)
 
@@ -180,11 +177,7 @@ def save_numbers(
             written to.
     """
     path = Path(path)
-    ending = path.suffix.lower()
-    if ending not in RAW_ENDINGS:
-        raise InputError(
-            f'raw numbers cannot be written as "{path.name}": end the name in {", ".join(RAW_ENDINGS)}'
-        )
+    ending = checks.ending("raw numbers", path, *RAW_ENDINGS)
     values = _grey_if_one(values)
     if ending != ".npy" and values.ndim == 3 and values.shape[2] != 3:
         raise InputError(
@@ -386,8 +379,6 @@ def _read_tiff(path: Path) -> NDArray[Any]:
             samples = np.moveaxis(np.asarray(page.colormap)[:, samples], 0, -1)
         if samples.ndim == 3 and page.planarconfig == tifffile.PLANARCONFIG.SEPARATE:
             samples = np.moveaxis(samples, 0, -1)
-    if samples.dtype == np.bool_:
-        samples = samples.astype(np.uint8) * np.uint8(255)
     return samples
 
 
@@ -423,8 +414,6 @@ def _read_exr(path: Path) -> NDArray[Any]:
 
 def _read_npy(path: Path) -> NDArray[Any]:
     samples: NDArray[Any] = np.load(path, allow_pickle=False)
-    if samples.dtype == np.bool_:
-        samples = samples.astype(np.uint8) * np.uint8(255)
     return samples
 
 
@@ -448,6 +437,8 @@ _READERS: dict[str, Callable[[Path], NDArray[Any]]] = {
 
 def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
     """Samples of a type and shape that everything behind can rely on, and their bits."""
+    if samples.dtype == np.bool_:
+        samples = samples.astype(np.uint8) * np.uint8(255)
     if samples.dtype.kind == "f":
         samples = samples.astype(np.float32, copy=False)
     if samples.dtype not in (np.uint8, np.uint16, np.float32):

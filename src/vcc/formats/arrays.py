@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.arrays import all_samples
@@ -95,8 +96,7 @@ def save(light_field: Samples, path: str | PathLike[str]) -> Path:
         InputError: another ending, or a place that cannot be written to.
     """
     path = Path(path).expanduser()
-    if path.suffix.lower() != ".npz":
-        raise InputError(f'a light field is written as arrays to a name that ends in .npz, not "{path.name}"')
+    checks.ending("a light field as arrays", path, ".npz")
     grid = light_field.grid
     arrays: dict[str, Any] = {
         "values": all_samples(light_field),

@@ -57,11 +57,6 @@ class Cameras:
         return replace(self, spacing=self.spacing[::-1])
 
 
-def pair(given: Pair) -> tuple[float, float]:
-    """One number for both axes, twice; two as they are."""
-    return given if isinstance(given, tuple) else (given, given)
-
-
 def cameras_of(grid: Grid) -> Cameras:
     """The cameras of a light field.
 

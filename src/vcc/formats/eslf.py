@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.fields.arrays import all_samples
 from vcc.fields.samples import Samples
@@ -86,8 +87,7 @@ def save(light_field: Samples, path: str | PathLike[str], *, bits: int = 16) -> 
     import imagecodecs
 
     path = Path(path).expanduser()
-    if path.suffix.lower() != ".png":
-        raise InputError(f'an ESLF is written as .png, not "{path.name}"')
+    checks.ending("an ESLF", path, ".png")
     grid = light_field.grid
     if grid.channels not in (None, 1, 3):
         raise InputError(f"a PNG has 1 or 3 channels, and this light field has {grid.channels}")

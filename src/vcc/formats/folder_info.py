@@ -9,9 +9,9 @@ from typing import Literal
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.fields.grid import Sample
+from vcc.fields.grid import Sample, pair
 from vcc.files.pictures import read_picture
-from vcc.formats.cameras import Cameras, Pair, pair
+from vcc.formats.cameras import Cameras, Pair
 from vcc.formats.grid import DEFAULT_SPACING, Decoded, Geometry, ViewGrid
 from vcc.formats.hci import parameters_file
 

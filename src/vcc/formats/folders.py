@@ -87,8 +87,8 @@ def _check(folder: Path, views: tuple[int, int] | None, order: Order | None, opt
         raise InputError(f"{option}= means nothing to a folder of views")
     if order is not None:
         checks.one_of("order", order, ORDERS)
-    if views is not None and (len(views) != 2 or min(views) < 1):
-        raise InputError(f"views are (rows, columns), whole numbers of 1 or more, not {views}")
+    if views is not None:
+        checks.counts("views", views, "rows", "columns")
 
 
 def _reordered(grid: ViewGrid, order: Order) -> ViewGrid:

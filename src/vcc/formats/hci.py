@@ -10,6 +10,7 @@ import math
 import re
 from pathlib import Path
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.fields.grid import Sample
@@ -70,10 +71,7 @@ def read_geometry(folder: Path) -> Geometry | None:
         return None
 
     def positive(section: str, key: str) -> float:
-        value = _number(settings, section, key, folder)
-        if not value > 0:
-            raise InputError(f"{parameters_file(folder)}: {key} is {value:g}, and must be greater than 0")
-        return value
+        return checks.above_zero(f"{parameters_file(folder)}: {key}", _number(settings, section, key, folder))
 
     width = positive("intrinsics", "image_resolution_x_px")
     height = positive("intrinsics", "image_resolution_y_px")
@@ -81,8 +79,7 @@ def read_geometry(folder: Path) -> Geometry | None:
     sensor = positive("intrinsics", "sensor_size_mm") * mm
     focal_length = positive("intrinsics", "focal_length_mm") * mm
     focus = _number(settings, "extrinsics", "focus_distance_m", folder)
-    if focus < 0:
-        raise InputError(f"{parameters_file(folder)}: focus_distance_m is {focus:g}, and must be 0 or more")
+    checks.zero_or_more(f"{parameters_file(folder)}: focus_distance_m", focus)
     low = _number(settings, "meta", "disp_min", folder, needed=False)
     high = _number(settings, "meta", "disp_max", folder, needed=False)
     return Geometry(

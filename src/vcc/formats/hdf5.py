@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -27,13 +28,10 @@ def library() -> Any:
     Raises:
         InputError: it is not installed.
     """
-    try:
+    with checks.package("reading and writing HDF5 files (.mat, .h5)", "h5py", "hdf5"):
         import h5py
-    except ImportError:
-        raise InputError(
-            'HDF5 files (.mat, .h5) need the package h5py: pip install "virtual-computational-camera[hdf5]"'
-        ) from None
-    return h5py
+
+        return h5py
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.arrays import all_samples
@@ -138,8 +139,7 @@ def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[An
             shape, or a place that cannot be written to.
     """
     path = Path(path).expanduser()
-    if path.suffix.lower() != ".mat":
-        raise InputError(f'a light field of the Light Field Toolbox is a .mat file, not "{path.name}"')
+    checks.ending("a light field of the Light Field Toolbox", path, ".mat")
     h5py = hdf5.library()
     grid, values = light_field.grid, all_samples(light_field)
     if values.dtype == np.float16:

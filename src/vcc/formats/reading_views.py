@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.files.pictures import read_picture, read_png_into
 from vcc.files.transfer import decode
 
@@ -90,8 +90,7 @@ def read_views(
         try:
             for done, task in enumerate(as_completed(tasks), 1):
                 task.result()
-                if progress is not None:
-                    progress(done, len(listed))
+                tell(progress, done, len(listed))
             beside.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)  # one fault is enough

@@ -4,7 +4,6 @@ for people.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from fractions import Fraction
 from os import PathLike
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
 from vcc.files.pictures import Exposure
@@ -90,8 +89,7 @@ def read(
                         remarks = _remarks(frame, stream)
                 decoded += 1
                 end = frame.time or 0.0
-                if progress is not None:
-                    progress(decoded, stream.frames)
+                tell(progress, decoded, stream.frames)
             else:
                 _check_complete(stream, decoded, end, path)
     except av.error.FFmpegError as error:
@@ -149,15 +147,12 @@ def save(
             quality, or a place that cannot be written to.
     """
     path = Path(path).expanduser()
-    if path.suffix.lower() != ".mp4":
-        raise InputError(f'a flight is written to a name that ends in .mp4, not "{path.name}"')
+    checks.ending("a flight", path, ".mp4")
     grid = light_field.grid
     if grid.channels not in (None, 1, 3):
         raise InputError(f"a video has 1 or 3 channels, and this light field has {grid.channels}")
-    if not (frames_per_second > 0 and math.isfinite(frames_per_second)):
-        raise InputError(f"frames_per_second is a number above 0, not {frames_per_second}")
-    if not 0 <= quality <= 51:
-        raise InputError(f"quality is libx264's constant rate factor, 0 to 51, not {quality}")
+    checks.above_zero("frames_per_second", frames_per_second)
+    checks.zero_or_more("quality (libx264's constant rate factor)", quality, most=51)
     rows, columns, height, width = grid.shape[:4]
     way = _way(rows, columns, flight)
     numbers = Codes(light_field, 8, "srgb", exposure)
@@ -185,18 +180,17 @@ def library() -> Any:
     Raises:
         InputError: it is not installed.
     """
-    try:
+    with checks.package("reading and writing videos", "av", "video"):
         import av
-    except ImportError:
-        raise InputError('videos need the package av: pip install "virtual-computational-camera[video]"') from None
-    return av
+
+        return av
 
 
 def _check_selection(every: int, first: int, last: int | None, moves: str) -> None:
     checks.one_of("moves", moves, get_args(Movement))
     for name, value, least in (("every", every, 1), ("first", first, 0), ("last", last, first)):
-        if value is not None and (not isinstance(value, int | np.integer) or value < least):
-            raise InputError(f"{name} is a whole number of {least} or more, not {value!r}")
+        if value is not None:
+            checks.whole_number_between(name, value, least)
 
 
 def _picture(frame: Any, path: Path) -> NDArray[Any]:

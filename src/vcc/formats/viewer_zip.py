@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.base.units import mm
 from vcc.files.pictures import read_picture
 from vcc.formats.grid import Decoded, Geometry, Place, arrange
@@ -273,7 +273,6 @@ def _pictures(
                 "type"
             )
         values[row, column] = samples
-        if progress is not None:
-            progress(number + 1, len(names))
+        tell(progress, number + 1, len(names))
     assert values is not None
     return values

@@ -18,7 +18,7 @@ import numpy as np
 
 from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.base.units import mm
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
@@ -138,8 +138,7 @@ def save_light_field(
         saved = SavedLightField(path, chosen, 1.0, 0.0, _words(light_field.grid, path, _HOW[chosen]))
     if light_field.grid.sample != "mean" and chosen in ("eslf", "mp4"):
         warnings.warn(f"{path}: {_POINTS_UNSAID}", ResultWarning, stacklevel=2)
-    if progress is not None:
-        progress(1, 1)
+    tell(progress, 1, 1)
     return saved
 
 
@@ -195,8 +194,7 @@ def save_folder(
                 save_picture(samples.astype(np.float32) / np.float32(full_scale), file)
             else:
                 write_codes(codes.view(row, column), file, ending, png_level=_PNG_LEVEL)
-            if progress is not None:
-                progress(number + 1, rows * columns)
+            tell(progress, number + 1, rows * columns)
     if remark:
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
     _warn_of_clipping(path, codes.clipped, exposure)

@@ -8,15 +8,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vcc.base.progress import Progress as Progress
 from vcc.light_field import LightField
 from vcc.showcase.bench import Bench, built_in, from_someone
 from vcc.showcase.figures import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Progress = Callable[[int, int], None]
-"""Called with (done, total) as the work advances."""
 
 
 @dataclass

@@ -17,7 +17,7 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.values import Value
 from vcc.fields.disparity import Disparities, DisparityMaps
-from vcc.fields.grid import Grid
+from vcc.fields.grid import Grid, axes_agree
 from vcc.optics.train import Train
 
 Array = NDArray[np.float64]
@@ -50,15 +50,13 @@ class Parallax:
         Raises:
             InputError: a frame that turns view axes against those of pixels.
         """
-        linear = frame.linear
-        scale = np.abs(linear).max(axis=1)
-        across, within = [0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]
-        if (np.abs(linear[across, within]) > 1e-9 * scale[across]).any():
+        if not axes_agree(frame):
             raise InputError(
                 "between_views='depth' needs a light field whose view axes are along those of its pixels; this "
                 "frame turns or mixes them. Resample it first (vcc.LightField.resampled), or pass "
                 "between_views='auto'"
             )
+        linear = frame.linear
         (ui, uk), (si, sk) = linear[0, [0, 2]], linear[2, [0, 2]]
         (vj, vl), (tj, tl) = linear[1, [1, 3]], linear[3, [1, 3]]
         # Z : 1 = (∂u/∂i − d·∂u/∂k) : (∂s/∂i − d·∂s/∂k)

@@ -9,8 +9,6 @@ import os
 from dataclasses import dataclass
 from typing import Any, Literal, TypedDict, get_args
 
-import numpy as np
-
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.values import Value
@@ -104,30 +102,22 @@ class How(Value):
                     "scene_distance is for between_views='auto'; by 'depth' each pixel has a distance of its own: "
                     "leave it out"
                 )
-            if not self.scene_distance > 0:
-                raise InputError(f"scene_distance must be greater than 0 m, not {self.scene_distance}")
+            checks.above_zero("scene_distance", self.scene_distance, unit="m", infinite=True)
         if self.refine != "auto" and not 1 <= (checks.whole_number(self.refine) or 0) <= LARGEST_REFINEMENT:
             raise InputError(
                 f"refine is 'auto' or a whole number from 1 to {LARGEST_REFINEMENT}, not {self.refine!r}"
             )
-        if self.samples is not None and not 2 <= (checks.whole_number(self.samples) or 0) <= LARGEST_SAMPLES:
-            raise InputError(
-                f"samples is a whole number of rays a pixel from 2 to {LARGEST_SAMPLES}, not {self.samples!r}"
-            )
+        if self.samples is not None:
+            checks.whole_number_between("samples", self.samples, 2, LARGEST_SAMPLES, of="rays a pixel")
         if self.tolerance is not None:
             checks.above_zero("tolerance", self.tolerance, "a share of the picture's mean")
         checks.seed(self.seed)
-        if self.engine is not None and self.engine not in get_args(EngineName):
-            raise InputError(
-                f"there is no engine {self.engine!r}: choose one of {', '.join(get_args(EngineName))}"
-            )
-        if self.threads is not None and (checks.whole_number(self.threads) or 0) < 1:
-            raise InputError(f"threads is a whole number, 1 or more, not {self.threads!r}")
-        limit = self.memory_limit
-        if limit is not None and (
-            isinstance(limit, bool) or not isinstance(limit, int | float | np.integer) or not limit > 0
-        ):
-            raise InputError(f"memory_limit is a number of bytes above 0, not {limit!r}")
+        if self.engine is not None:
+            checks.one_of("engine", self.engine, get_args(EngineName))
+        if self.threads is not None:
+            checks.whole_number_between("threads", self.threads, 1)
+        if self.memory_limit is not None:
+            checks.above_zero("memory_limit", self.memory_limit, "a number of bytes", infinite=True)
 
     @classmethod
     def of(cls, how: How | None, options: Any) -> How:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import mm, short
@@ -132,10 +133,9 @@ def plot_camera(
             camera without an array before its sensor or without axes for it beside given ones, or an element that
             returns what it must not.
     """
-    if across not in ("x", "y"):
-        raise InputError(f'across is "x" or "y", not {across!r}')
-    if rays is not None and rays < 2:
-        raise InputError(f"a fan has 2 rays or more, not {rays}")
+    checks.one_of("across", across, "xy")
+    if rays is not None:
+        checks.whole_number_between("rays", rays, 2)
     if magnified is True and axes is not None:
         raise InputError("beside axes that are given, a magnified piece needs axes too: pass them as magnified=")
     from matplotlib.lines import Line2D
@@ -201,8 +201,7 @@ def _points(camera: Train, distances: Sequence[float] | None, axis: int) -> list
     colours = (style.BLUE, style.ORANGE, style.GREEN)
     if distances is not None:
         for distance in distances:
-            if not distance > 0:
-                raise InputError(f"an object distance must be greater than 0 m, not {distance}")
+            checks.above_zero("an object distance", distance, unit="m", infinite=True)
         return [
             _Point(distance, 0.0, colours[number % 3], f"point {_away(distance)}")
             for number, distance in enumerate(distances)

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.recover.blur import Blur, Borders, channels_first, channels_last
 from vcc.recover.recorded import numbers_of
 
@@ -96,8 +97,8 @@ def wiener(
 
     values = numbers_of(recording, "the recording")
     _check_noise(noise, above=False)
-    if contrast is not None and not (contrast > 0 and math.isfinite(contrast)):
-        raise InputError(f"the contrast of the prior must be above 0, not {contrast}")
+    if contrast is not None:
+        checks.above_zero("the contrast of the prior", contrast)
     channels = channels_first(values)
     rows, columns = values.shape[:2]
     blur = Blur.of(psf, None, (rows, columns), borders, several=np.ndim(psf) == 3)
@@ -225,8 +226,7 @@ def richardson_lucy(
         size = float(sum((blur.seen(each) ** 2).sum() for each in picture))
         change = math.sqrt(moved / size) if size > 0 else 0.0
         objective.append(sum(_divergence(c, blur.apply(e)) for c, e in zip(channels, picture, strict=True)))
-        if progress is not None:
-            progress(done, iterations)
+        tell(progress, done, iterations)
     converged = change <= tolerance
     found = np.stack([blur.seen(each) for each in picture])
     message = _ended(converged, done, change) + ("" if converged else f", more than the tolerance {tolerance:g}")
@@ -292,10 +292,9 @@ def sparse_gradients(
 
     values = numbers_of(recording, "the recording")
     _check_noise(noise, above=True)
-    if not 0 < exponent <= 2:
-        raise InputError(f"the exponent of the gradients lies above 0 and up to 2, not {exponent}")
-    if gradient_scale is not None and not (gradient_scale > 0 and math.isfinite(gradient_scale)):
-        raise InputError(f"gradient_scale must be above 0, not {gradient_scale}")
+    checks.above_zero("the exponent of the gradients", exponent, most=2)
+    if gradient_scale is not None:
+        checks.above_zero("gradient_scale", gradient_scale)
     _check_steps(iterations, tolerance)
     channels = channels_first(values)
     blur = Blur.of(psf, masks, values.shape[:2], borders)
@@ -313,8 +312,7 @@ def sparse_gradients(
         change = float(np.linalg.norm(new - latest) / max(float(np.linalg.norm(new)), 1e-300))
         latest = new.copy()
         objective.append(float(intermediate_result.fun))
-        if progress is not None:
-            progress(min(len(objective), iterations), iterations)
+        tell(progress, min(len(objective), iterations), iterations)
 
     found = optimize.minimize(
         _Surprise(channels, blur, noise, exponent, scale),
@@ -428,7 +426,6 @@ def _check_noise(noise: float, above: bool) -> None:
 
 
 def _check_steps(iterations: int, tolerance: float) -> None:
-    if int(iterations) != iterations or iterations < 1:
-        raise InputError(f"iterations is a whole number of 1 or more, not {iterations}")
+    checks.whole_number_between("iterations", iterations, 1)
     if not tolerance >= 0:
         raise InputError(f"the tolerance is 0 or more, not {tolerance}")

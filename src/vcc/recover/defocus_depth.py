@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.memory import check_memory
 from vcc.camera import Camera
@@ -119,8 +120,7 @@ def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: flo
     if not away or not all(distance > 0 for distance in away):
         raise InputError(f"distances are one or more, in metres, greater than 0, not {list(distances)}")
     aperture = _opening(camera) if aperture is None else aperture
-    if not (aperture > 0 and math.isfinite(aperture)):
-        raise InputError(f"aperture must be greater than 0 m, not {aperture}")
+    checks.above_zero("aperture", aperture, unit="m")
     ray = camera.rays_at(camera.sensor.z).linear
     # A point at Z sends u, s = u/Z: it lands at u·(A + B/Z).
     spread = {distance: ray[0, 0] + ray[0, 2] / distance for distance in away}
@@ -213,8 +213,7 @@ def depth_from_defocus(
     values = numbers.reshape(*numbers.shape[:2], -1)
     spreads = [np.asarray(kernel, np.float64) for kernel in kernels]
     _check_candidates(spreads, distances, values.shape[:2])
-    if not (noise > 0 and math.isfinite(noise)):
-        raise InputError(f"noise must be greater than 0, in the picture's units, not {noise}")
+    checks.above_zero("noise", noise, way_out="it is in the picture's units")
     starts = _block_starts(values.shape[:2], spreads, block, max(1, block // 2) if step is None else step)
     blocks, parts = starts[0].size * starts[1].size, _SECTORS * _RINGS * values.shape[2]
     needed = 8 * blocks * (3 * block**2 + len(spreads) * parts) + 8 * 4 * (_FINER * block) ** 2

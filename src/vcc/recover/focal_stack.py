@@ -12,10 +12,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory, check_samples
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
 from vcc.files.pictures import auto_exposure, checked_exposure
@@ -110,8 +111,7 @@ class FocalStack:
         """
         from scipy import ndimage
 
-        if not (window > 0 and math.isfinite(window)):
-            raise InputError(f"the window must be above 0 pixels, not {window}")
+        checks.above_zero("the window", window, unit="pixels")
         if not selectivity >= 0:
             raise InputError(f"the selectivity is 0 or more, not {selectivity}")
         count, rows, columns = self.pictures.shape[:3]
@@ -252,15 +252,12 @@ def focal_stack(
     for number, distance in enumerate(distances):
         image = refocused(light_field, distance, **options)
         pictures[number], frame = image.values, image.frame
-        if progress is not None:
-            progress(number + 1, len(distances))
+        tell(progress, number + 1, len(distances))
     return FocalStack(pictures, distances, frame)
 
 
 def _check_film(path: Path, frames_per_second: float) -> None:
-    ending = path.suffix.lower()
-    if ending not in ENDINGS:
-        raise InputError(f'a focal stack is written to a name that ends in .mp4 or .gif, not "{path.name}"')
+    ending = checks.ending("a focal stack", path, *ENDINGS)
     if not 0 < frames_per_second <= (50 if ending == ".gif" else math.inf) or math.isinf(frames_per_second):
         raise InputError(
             f"frames_per_second is a number above 0{' and up to 50' if ending == '.gif' else ''}, not "

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_samples
@@ -142,8 +143,7 @@ def decode_heterodyne(
     """
     setup = HeterodyneSetup.of(camera)
     geometry = setup.geometry
-    if not 0 <= border <= 0.25:
-        raise InputError(f"border is a share of the sensor from 0 to 0.25, not {border}")
+    checks.zero_or_more("border, a share of the sensor,", border, most=0.25)
     raw = _checked(recording, camera, "the recording")
     white = _checked(
         heterodyne_calibration(camera) if calibration is None else calibration, camera, "the calibration"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.camera import Camera
+from vcc.fields.grid import skew
 from vcc.light_field import LightField
 from vcc.recover.heterodyne import HeterodyneGeometry
 
@@ -124,9 +125,7 @@ def places_on_sensor(light_field: LightField, camera: Camera, axis: int) -> Arra
     Raises:
         InputError: views that do not lie along the axes.
     """
-    linear = light_field.frame.linear
-    mixed = linear[[0, 0, 0, 1, 1, 1, 2, 2, 3, 3], [1, 2, 3, 0, 2, 3, 1, 3, 0, 2]]
-    if not np.allclose(mixed, 0):
+    if not np.allclose(skew(light_field.frame), 0):
         raise InputError("views must stand in rows along the axes, and so must their pixels")
     views, pixels = light_field.shape[1 - axis], light_field.shape[3 - axis]
     index = np.zeros((views, pixels, 4))

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.affine import Affine
-from vcc.base.checks import whole_number
+from vcc.base.checks import above_zero, whole_number
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.memory import check_samples
 from vcc.camera import Camera
@@ -100,8 +100,7 @@ def decode_plenoptic(
     grid = _chosen_grid(grid, camera, white, dark, prepared.color_filter is not None)
     counts = _view_counts(views, grid, view_step)
     step = grid.pitch * math.sqrt(ROW_HEIGHT[grid.layout]) if step is None else float(step)
-    if not step > 0:
-        raise InputError(f"step is {step} pixels of the recording: it must be greater than 0")
+    above_zero("step", step, unit="pixels of the recording")
     raw = prepared.demosaiced(demosaicing)
     lenslets = LensletViews.of(grid, prepared.shape, (max(counts) - 1) / 2 * view_step, step)
     channels = raw.shape[2] if raw.ndim == 3 else None
@@ -219,8 +218,7 @@ def _chosen_grid(
 
 
 def _view_counts(views: Any, grid: LensletGrid, view_step: float) -> tuple[int, int]:
-    if not (view_step > 0 and math.isfinite(view_step)):
-        raise InputError(f"view_step is {view_step} pixels: it must be greater than 0")
+    above_zero("view_step", view_step, unit="pixels")
     most = 1 + 2 * math.floor((grid.pitch / 2 - 0.5) / view_step + 1e-9)
     if views is None:
         if most < 3:

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.checks import above_zero
 from vcc.base.errors import InputError, ResultWarning
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.camera import Camera
-from vcc.fields.grid import Grid
+from vcc.fields.grid import Grid, skew
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Element, Lens, Mask
@@ -62,8 +63,8 @@ def ideal_camera(
             the plane of that distance, where all pixels of a view show the same place.
     """
     check_distance(distance, "distance")
-    if diameter is not None and not diameter > 0:
-        raise InputError(f"the diameter of the aperture must be greater than 0 m, not {diameter}")
+    if diameter is not None:
+        above_zero("the diameter of the aperture", diameter, unit="m", infinite=True)
     if diameter is None and tuple(centre) != (0.0, 0.0):
         raise InputError(f"centre = {centre} m is the middle of a round aperture: give its diameter too")
     d = IMAGE_DISTANCE
@@ -242,8 +243,7 @@ def novel_view(
             better = cost < best
             best = np.where(better, cost, best)
             picture[better] = mean[better]
-        if progress is not None:
-            progress(done + 1, len(vergences))
+        tell(progress, done + 1, len(vergences))
     at_view = light_field.frame @ Affine.translation(i, j, 0, 0)
     looks_at = Affine.from_parts(-at_view.linear[2:, 2:], -at_view.offset[2:])
     if light_field.channels is None:
@@ -340,11 +340,7 @@ def _sweep(light_field: LightField) -> NDArray[np.float64]:
 def _view_index(light_field: LightField, u: float, v: float) -> tuple[float, float]:
     """(i, j) of a place on the grid of views."""
     linear, offset = light_field.frame.linear, light_field.frame.offset
-    mixed = [
-        linear[a, b] for a, b in ((0, 1), (1, 0), (0, 2), (0, 3), (1, 2), (1, 3), (2, 1), (3, 0), (2, 3), (3, 2))
-    ]
-    size = np.abs(linear).max(axis=1)
-    if np.abs(mixed).max() > 1e-9 * size.min():
+    if np.abs(skew(light_field.frame)).max() > 1e-9 * np.abs(linear).max(axis=1).min():
         raise InputError(
             "views are interpolated in light fields of parallel cameras, whose frame does not mix its axes; this "
             f"one's does:\n{light_field.frame!r}\nResample it first (LightField.resampled)"
@@ -373,5 +369,4 @@ def check_distance(distance: float, name: str) -> None:
     Raises:
         InputError: zero or less, or NaN.
     """
-    if not distance > 0:  # NaN too
-        raise InputError(f"{name} must be greater than 0 m (infinite is allowed), not {distance}")
+    above_zero(name, distance, unit="m", infinite=True, way_out="it may be infinite")

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_samples
@@ -230,10 +231,8 @@ def resampled(
     """The light field on another grid; see `vcc.LightField.resampled`."""
     from scipy.ndimage import affine_transform
 
-    if interpolation not in SPLINE_ORDER:
-        raise InputError(f"interpolation is one of {', '.join(map(repr, SPLINE_ORDER))}, not {interpolation!r}")
-    if len(shape) != 4 or min(shape) < 1:
-        raise InputError(f"a grid has the shape (v, u, t, s), each at least 1, not {shape}")
+    checks.one_of("interpolation", interpolation, SPLINE_ORDER)
+    checks.counts("the shape of a grid", shape, "v", "u", "t", "s")
     check_samples((*shape, light_field.grid.channels or 1), memory_limit, "the resampled light field")
     old_from_new = light_field.frame.inverse() @ frame
     axes = list(np.argsort(LIGHT_FIELD_AXES))

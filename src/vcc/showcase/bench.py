@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,8 +10,10 @@ import numpy as np
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress
 from vcc.base.units import mm, um
 from vcc.camera import Camera
+from vcc.fields.grid import skew
 from vcc.formats import open_light_field
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
@@ -138,7 +139,7 @@ class Bench:
         return camera.sensor.z**2 / (math.pi / 4 * diameter**2 * transmitted)
 
 
-def built_in(small: bool, progress: Callable[[int, int], None] | None = None) -> Bench:
+def built_in(small: bool, progress: Progress | None = None) -> Bench:
     """The bench with the demo's own scene.
 
     20×20 views 1 mm apart converge at 1.3 m; a view is 500×500 pixels of 50 um at a distance of 52 mm, a
@@ -163,9 +164,7 @@ def built_in(small: bool, progress: Callable[[int, int], None] | None = None) ->
     return Bench(light_field, scene, NEAR, MIDDLE, FAR, FOCAL_LENGTH, RIM * APERTURE, (pitch, pitch))
 
 
-def from_someone(
-    given: Path | LightField, small: bool, progress: Callable[[int, int], None] | None = None
-) -> Bench:
+def from_someone(given: Path | LightField, small: bool, progress: Progress | None = None) -> Bench:
     """The bench with someone's own light field.
 
     Its world is scaled so that the grid of views is 20 mm wide, a lens's width. The lens has f = 50 mm, or less
@@ -203,9 +202,7 @@ def from_someone(
 
 def _check_upright(light_field: LightField) -> None:
     """The close-ups and the true picture rely on u and s running along columns, v and t along rows."""
-    linear = light_field.frame.linear
-    mixed = linear[[0, 0, 0, 1, 1, 1, 2, 2, 3, 3], [1, 2, 3, 0, 2, 3, 1, 3, 0, 2]]
-    if not np.allclose(mixed, 0):
+    if not np.allclose(skew(light_field.frame), 0):
         raise InputError("the demo needs a light field of views on an upright grid; this one has another frame")
 
 

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks, late
 from vcc.base.errors import InputError
+from vcc.fields.grid import pair
 from vcc.sources.views import CameraArray, ViewCamera
 
 Array = NDArray[np.float64]
@@ -91,7 +92,7 @@ class DepthMapScene:
                 f"depth is a distance above 0 m in every pixel, and at {where} (row, column) it is "
                 f"{distance[where]}; infinite stands for the sky"
             )
-        slopes = slope_per_pixel if isinstance(slope_per_pixel, tuple) else (slope_per_pixel, slope_per_pixel)
+        slopes = pair(slope_per_pixel)
         for name, value in (("slope_per_pixel", min(slopes)), ("reach", reach), ("edge", edge)):
             checks.above_zero(name, value)
         self.slopes, self.reach, self.edge = slopes, float(reach), float(edge)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from vcc.base import checks, late
 from vcc.base.errors import InputError
+from vcc.base.progress import Progress, tell
 from vcc.light_field import LightField
 from vcc.plan.how import cores
 from vcc.shapes.patterns import overlap_share
@@ -320,7 +321,7 @@ class PlanesScene:
         focus_distance: float = math.inf,
         dtype: DTypeLike = np.uint8,
         threads: int | None = None,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Progress | None = None,
     ) -> LightField:
         """What a planar array of parallel pinhole cameras sees of the scene.
 
@@ -449,7 +450,7 @@ def _fill(
     grid: _Grid,
     rasters: NDArray[np.float32],
     pool: ThreadPoolExecutor,
-    progress: Callable[[int, int], None] | None,
+    progress: Progress | None,
 ) -> None:
     down, across = (_starts(planes, grid, axis) for axis in (0, 1))
     whole = values.dtype.kind == "u"
@@ -462,8 +463,7 @@ def _fill(
     tasks = [pool.submit(views, j) for j in range(grid.views[0])]
     for done, task in enumerate(as_completed(tasks), 1):
         task.result()
-        if progress is not None:
-            progress(done, grid.views[0])
+        tell(progress, done, grid.views[0])
 
 
 def _fill_view_by_view(
@@ -471,7 +471,7 @@ def _fill_view_by_view(
     values: Array,
     cameras: CameraArray,
     threads: int | None,
-    progress: Callable[[int, int], None] | None,
+    progress: Progress | None,
 ) -> None:
     whole = values.dtype.kind == "u"
     top = float(np.iinfo(values.dtype).max) if whole else 1.0
@@ -485,8 +485,7 @@ def _fill_view_by_view(
         for row in range(rows):
             for task in [pool.submit(view, row, column) for column in range(columns)]:
                 task.result()
-            if progress is not None:
-                progress(row + 1, rows)
+            tell(progress, row + 1, rows)
 
 
 def _starts(planes: tuple[TexturedPlane, ...], grid: _Grid, axis: int) -> tuple[Array, NDArray[np.float32]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import asdict
 from os import PathLike, fspath
 from pathlib import Path
@@ -14,14 +13,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from vcc import __version__
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress, tell
 from vcc.light_field import LightField
 from vcc.sources.views import CameraArray, ViewCamera
 from vcc.store import StoredLightField, create_store
 
 DTYPES = ("float16", "float32", "uint8", "uint16")
 """What the samples of a synthesized light field may be kept as."""
-
-Progress = Callable[[int, int], None]
 
 
 class Renderer(Protocol):
@@ -87,12 +85,10 @@ def _in_memory(
     order = list(np.ndindex(*cameras.views))
     cut = _Cut(kind)
     for done, (row, column) in enumerate(order):
-        if progress is not None:
-            progress(done, len(order))
+        tell(progress, done, len(order))
         hint = "Give store=… (a folder) to keep the views that are done and to go on where it stopped"
-        values[row, column] = _rendered(renderer, cameras, row, column, kind, done, cut, hint)
-    if progress is not None:
-        progress(len(order), len(order))
+        values[row, column] = _rendered(renderer, cameras, row, column, done, cut, hint)
+    tell(progress, len(order), len(order))
     cut.warn()
     return cameras.light_field(values)
 
@@ -116,12 +112,10 @@ def _in_store(
     ) as writer:
         missing = writer.missing()
         for done, (row, column) in enumerate(missing, total - len(missing)):
-            if progress is not None:
-                progress(done, total)
+            tell(progress, done, total)
             hint = f"{done} of {total} views are kept in {path}: the same call goes on with this one"
-            writer.write_view(row, column, _rendered(renderer, cameras, row, column, kind, done, cut, hint))
-        if progress is not None:
-            progress(total, total)
+            writer.write_view(row, column, _rendered(renderer, cameras, row, column, done, cut, hint))
+        tell(progress, total, total)
         cut.warn()
         return writer.finish()
 
@@ -131,7 +125,6 @@ def _rendered(
     cameras: CameraArray,
     row: int,
     column: int,
-    kind: np.dtype[Any],
     done: int,
     cut: _Cut,
     hint: str,

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.fields.grid import Sample
+from vcc.fields.grid import Sample, pair
 from vcc.light_field import LightField
 
 
@@ -69,9 +70,8 @@ class CameraArray:
     focus_distance: float = field(default=math.inf, metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        for name, pair in (("views", self.views), ("pixels", self.pixels)):
-            if len(pair) != 2 or any(not isinstance(n, int | np.integer) or n < 1 for n in pair):
-                raise InputError(f"{name} are (rows, columns), whole numbers of 1 or more, not {pair}")
+        checks.counts("views", self.views, "rows", "columns")
+        checks.counts("pixels", self.pixels, "rows", "columns")
         self.light_field(np.zeros((1, 1, 1, 1), dtype=np.uint8))  # refuses what is impossible
 
     @classmethod
@@ -101,7 +101,7 @@ class CameraArray:
                 f"field_of_view is an angle between 0 and π radians, not {field_of_view:g}; "
                 "write 40 * vcc.units.deg for 40°"
             )
-        high, wide = aperture if isinstance(aperture, tuple) else (aperture, aperture)
+        high, wide = pair(aperture)
         return cls(
             views=views,
             pixels=pixels,
@@ -113,12 +113,12 @@ class CameraArray:
     @property
     def spacings(self) -> tuple[float, float]:
         """(dv, du), metres."""
-        return _pair(self.spacing)
+        return pair(self.spacing)
 
     @property
     def slopes_per_pixel(self) -> tuple[float, float]:
         """(pt, ps)."""
-        return _pair(self.slope_per_pixel)
+        return pair(self.slope_per_pixel)
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -170,7 +170,3 @@ class CameraArray:
         return LightField.from_views(
             values, self.spacings, self.slopes_per_pixel, self.focus_distance, disparity_range, sample
         )
-
-
-def _pair(given: float | tuple[float, float]) -> tuple[float, float]:
-    return given if isinstance(given, tuple) else (given, given)

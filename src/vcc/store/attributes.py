@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.grid import Sample
@@ -85,9 +86,7 @@ class Attributes:
                 "written says docs/store.md"
             )
         version = stated.get("format_version")
-        if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-            raise InputError(f"{path}: format_version is {version!r}; it is a whole number from 1 on")
-        if version > FORMAT_VERSION:
+        if checks.whole_number_between(f"{path}: format_version", version, 1) > FORMAT_VERSION:
             raise InputError(
                 f"{path} has format_version {version}, and this vcc reads up to {FORMAT_VERSION}: use a newer vcc"
             )
@@ -124,10 +123,8 @@ class Attributes:
         """
         if self.frame.dimensions != 4 or not self.frame.is_invertible():
             raise InputError(f"{owner}: frame is an invertible 5×5 map of indices to rays, not\n{self.frame!r}")
-        if self.transfer not in get_args(Transfer):
-            raise InputError(f'{owner}: transfer is "linear" or "srgb", not {self.transfer!r}')
-        if self.sample not in get_args(Sample):
-            raise InputError(f'{owner}: sample is "mean" or "point", not {self.sample!r}')
+        checks.one_of(f"{owner}: transfer", self.transfer, get_args(Transfer))
+        checks.one_of(f"{owner}: sample", self.sample, get_args(Sample))
         if not isinstance(self.complete, bool):
             raise InputError(f"{owner}: complete is true or false, not {self.complete!r}")
         if self.disparity_range is not None:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vcc.base import late
+from vcc.base import checks, late
 from vcc.base.errors import InputError
 from vcc.store.attributes import PICTURES
 
@@ -38,10 +38,8 @@ class Lossless:
     level: int = 3
 
     def __post_init__(self) -> None:
-        if self.codec not in ("zstd", "lz4"):
-            raise InputError(f'lossless compression is by "zstd" or "lz4", not {self.codec!r}')
-        if not isinstance(self.level, int) or isinstance(self.level, bool) or not 0 <= self.level <= 9:
-            raise InputError(f"the level of compression is a whole number from 0 to 9, not {self.level!r}")
+        checks.one_of("the codec of lossless compression", self.codec, ("zstd", "lz4"))
+        checks.whole_number_between("the level of compression", self.level, 0, 9)
 
     @property
     def words(self) -> str:
@@ -68,14 +66,9 @@ class Lossy:
     quality: int = 90
 
     def __post_init__(self) -> None:
-        if self.codec not in ("jpegxl", "avif"):
-            raise InputError(f'lossy compression is by "jpegxl" or "avif", not {self.codec!r}')
-        number = isinstance(self.quality, int) and not isinstance(self.quality, bool)
-        if not (number and 1 <= self.quality <= 99):
-            raise InputError(
-                f"the quality of lossy compression is a whole number from 1 to 99, not {self.quality!r}; to keep "
-                "samples exactly leave it out"
-            )
+        checks.one_of("the codec of lossy compression", self.codec, ("jpegxl", "avif"))
+        exact = "to keep samples exactly leave it out"
+        checks.whole_number_between("the quality of lossy compression", self.quality, 1, 99, way_out=exact)
 
     @property
     def words(self) -> str:
@@ -114,8 +107,8 @@ def chunk_rows(rows: int, row_bytes: int, wanted: int | None) -> int:
     Raises:
         InputError: a number below 1.
     """
-    if wanted is not None and (not isinstance(wanted, int) or isinstance(wanted, bool) or wanted < 1):
-        raise InputError(f"chunks is how many rows of pixels are packed together, 1 or more, not {wanted!r}")
+    if wanted is not None:
+        checks.whole_number_between("chunks", wanted, 1, of="rows of pixels that are packed together")
     target = min(max(CHUNK_BYTES // row_bytes, 8) if wanted is None else wanted, rows)
     return target if wanted is not None else math.ceil(rows / math.ceil(rows / target))
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -67,18 +67,14 @@ def convert(
         raise InputError(f"samples are stored as {', '.join(DTYPES)}, not {wanted}")
     recoded, now = _recoding(kind, transfer, wanted)
     return write_views(
-        Path(path).expanduser(),
-        grid.frame,
-        grid.shape,
-        wanted,
+        path,
+        replace(grid, kind=wanted),
         lambda row, column: recoded(view(row, column), f"view ({row}, {column})"),
         overwrite=overwrite,
         progress=progress,
         provenance=made if provenance is None else provenance,
         transfer=now,
         channel_names=names,
-        disparity_range=grid.disparity_range,
-        sample=grid.sample,
         chunks=chunks,
         compression=compression,
     )

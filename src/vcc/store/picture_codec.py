@@ -15,7 +15,7 @@ from zarr.core.buffer import Buffer, NDBuffer
 from zarr.core.common import JSON
 from zarr.registry import register_codec
 
-from vcc.base.errors import InputError
+from vcc.base import checks
 from vcc.store.attributes import PICTURES
 
 
@@ -37,8 +37,7 @@ class PictureCodec(ArrayBytesCodec):
     def from_dict(cls, data: dict[str, JSON]) -> PictureCodec:
         """The codec from the metadata of an array."""
         settings: Any = data.get("configuration", {})
-        if settings.get("codec") not in ("jpegxl", "avif"):
-            raise InputError(f'{PICTURES} is by "jpegxl" or "avif", not {settings.get("codec")!r}')
+        checks.one_of(f"the codec of {PICTURES}", settings.get("codec"), ("jpegxl", "avif"))
         return cls(settings["codec"], int(settings.get("quality", 0)))
 
     def to_dict(self) -> dict[str, JSON]:

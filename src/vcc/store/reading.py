@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.base.words import first_few
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, told_along_u
@@ -300,8 +300,7 @@ class StoredLightField(OnGrid):
         total = len(rows) * len(columns)
         for done, (j, i) in enumerate(np.ndindex(len(rows), len(columns)), start=1):
             values[j, i] = self.linear_view(rows[j], columns[i], low, high)[within]
-            if progress is not None:
-                progress(done, total)
+            tell(progress, done, total)
         return values
 
     def _kept_or_found(self, progress: Progress | None) -> DisparityMaps:

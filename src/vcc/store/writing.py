@@ -19,12 +19,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.measures import decibels
+from vcc.base.progress import Progress, tell
 from vcc.base.version import VERSION
 from vcc.base.words import first_few
 from vcc.fields.arrays import one_view
 from vcc.fields.disparity import DisparityMaps
-from vcc.fields.grid import Sample
+from vcc.fields.grid import Grid, Sample
 from vcc.fields.samples import Samples
 from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
 from vcc.store.compression import Compression, Lossless, Lossy, layout
@@ -174,7 +175,7 @@ class StoreWriter:
 
     def _decibels(self, mean_square: float) -> float:
         peak = float(np.iinfo(self.dtype).max)
-        return math.inf if mean_square == 0 else 10 * math.log10(peak * peak / mean_square)
+        return math.inf if mean_square == 0 else decibels(mean_square, peak)
 
 
 def create_store(
@@ -281,10 +282,8 @@ def save_store(
     """
     grid = light_field.grid
     return write_views(
-        Path(path).expanduser(),
-        grid.frame,
-        grid.shape,
-        grid.kind,
+        path,
+        grid,
         partial(one_view, light_field),
         overwrite=overwrite,
         progress=progress,
@@ -292,18 +291,14 @@ def save_store(
         provenance={"written_by": f"vcc {VERSION}"} if provenance is None else provenance,
         transfer=transfer,
         channel_names=channel_names,
-        disparity_range=grid.disparity_range,
-        sample=grid.sample,
         chunks=chunks,
         compression=compression,
     )
 
 
 def write_views(
-    folder: Path,
-    frame: Affine,
-    shape: tuple[int, ...],
-    kind: np.dtype[Any],
+    path: str | PathLike[str],
+    grid: Grid,
     view: Callable[[int, int], NDArray[Any]],
     *,
     overwrite: bool,
@@ -314,10 +309,8 @@ def write_views(
     """Write a whole store under a temporary name and rename it.
 
     Args:
-        folder: of the store.
-        frame: see `create_store`, likewise shape and kind.
-        shape: see there.
-        kind: see there.
+        path: folder of the store.
+        grid: what the samples stand for, and of which type they are written.
         view: gives the samples of view (row, column).
         overwrite: see `save_store`.
         progress: see there.
@@ -327,16 +320,17 @@ def write_views(
     Raises:
         InputError: see `save_store`.
     """
+    folder = Path(path).expanduser()
     if os.path.lexists(folder):
         _check_replaceable(folder, overwrite)
     part = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
     try:
-        with create_store(part, frame, shape, kind, **stated) as writer:
-            total = shape[0] * shape[1]
-            for done, (j, i) in enumerate(np.ndindex(*shape[:2]), start=1):
+        stated |= {"disparity_range": grid.disparity_range, "sample": grid.sample}
+        with create_store(part, grid.frame, grid.shape, grid.kind, **stated) as writer:
+            total = grid.shape[0] * grid.shape[1]
+            for done, (j, i) in enumerate(np.ndindex(*grid.shape[:2]), start=1):
                 writer.write_view(j, i, view(j, i))
-                if progress is not None:
-                    progress(done, total)
+                tell(progress, done, total)
             writer.finish()
             if disparity is not None:
                 _keep(part, disparity)

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.units import deg, mm, parse, short
 from vcc.cli.console import progress, show
@@ -100,8 +101,7 @@ def check_store(path: Path) -> Path:
         InputError: a name that does not end in .zarr, or a folder that is not there.
     """
     path = path.expanduser()
-    if path.suffix.lower() != ".zarr":
-        raise InputError(f'"{path.name}" is no name of a store: end it in .zarr')
+    checks.ending("a store", path, ".zarr")
     if not path.parent.is_dir():
         raise InputError(f"{path} cannot be written: there is no folder {path.parent}; make it first")
     return path
