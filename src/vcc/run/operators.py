@@ -24,7 +24,8 @@ from vcc.optics.faces import Element
 from vcc.optics.mask import Mask
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
-from vcc.plan.footprints.planes import Plane, depends_on_view_only, mask_lookup
+from vcc.plan.footprints.mask_textures import mask_lookup
+from vcc.plan.footprints.planes import Plane, depends_on_view_only
 from vcc.shapes.patterns import Pattern
 
 Field = TypeVar("Field", bound=InMemory)
