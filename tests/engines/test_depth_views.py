@@ -51,7 +51,7 @@ def between(times, disparity, frame=FRAME, source="given"):
 
 def made(values, rule):
     """All views in between, (v, u, t, s)."""
-    views = DenserViews(InMemory(values, FRAME), rule, threads=2, memory_limit=2**28)
+    views = DenserViews(InMemory(values, FRAME), rule, threads=2, held=2**26)
     return views.read(Block.all_of(rule.shape(values.shape))), views
 
 

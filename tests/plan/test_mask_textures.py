@@ -9,7 +9,7 @@ import pytest
 
 import vcc
 from vcc.base.units import mm, um
-from vcc.plan.footprints.planes import texture_error
+from vcc.plan.footprints.mask_textures import texture_error
 from vcc.shapes import patterns
 
 

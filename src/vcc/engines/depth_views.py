@@ -34,8 +34,6 @@ BAND = 64
 """Rows of a picture that a thread makes at once."""
 TEAR = 0.25
 """Pixels per view of disparity from pixel to pixel from which on a map shows a border, not a slanted surface."""
-HELD = 0.25
-"""Share of the memory that views and maps, kept to be used again, may take."""
 
 
 class _Held:
@@ -67,17 +65,17 @@ class DenserViews:
         source: the light field that there is: in memory, or on disk.
         between: how views in between are made.
         threads: how many make a view at once.
-        memory_limit: bytes; a share of it is for views and maps kept to be used again.
+        held: bytes that views and maps, kept to be used again, may take.
     """
 
-    def __init__(self, source: Samples, between: ViewsBetween, threads: int, memory_limit: float) -> None:
+    def __init__(self, source: Samples, between: ViewsBetween, threads: int, held: float) -> None:
         self._source, self._given, self._between = source, source.grid.shape, between
         self._threads = threads
         self.unseen = 0
         """Samples made so far that no view shows."""
         self.made = 0
         """Samples made so far, channels not counted."""
-        self._views = _Held(self._read, HELD * memory_limit)
+        self._views = _Held(self._read, held)
         self._own = {view: number for number, view in enumerate(between.maps.views)}
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,6 @@ import numpy as np
 from vcc.base.errors import InputError
 from vcc.fields.grid import Block, Grid
 from vcc.plan.model import Plan
-
-SMALLEST_BLOCK = 1
-"""Rows of pixels."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ class Need:
         fixed: bytes that are taken whatever the blocks are: sums, a block's raster, and what the engine needs.
         view: bytes of a view as it is kept.
         times: how many times a block's samples are in memory.
-        border: dark views on each side of a block.
+        border: dark views along each axis of a block, those on both of its sides.
     """
 
     fixed: int
@@ -128,21 +126,23 @@ def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
     used = plan.core.used_views(grid.shape)
     rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
     high, wide = rows[1] - rows[0], columns[1] - columns[0]
-    view, times, border = need.view, need.times, need.border
+    of = partial(Blocks, rows, columns, nt, ns)
+    view, border = need.view, need.border
     # A view is read, unpacked and converted before it has its place.
-    spare = limit - need.fixed - 3 * view
-    rows_each = int(spare / times // (view * (wide + border))) - border
-    if spare > 0 and (rows_each >= 1 or (border and spare >= times * view * high * wide)):
-        whole = spare >= times * view * high * wide  # a single block has no neighbours and needs no border
-        return Blocks(rows, columns, nt, ns, high if whole else min(rows_each, high), wide, nt)
-    columns_each = int(spare / times // (view * (1 + border))) - border
-    if spare > 0 and columns_each >= 1:
-        return Blocks(rows, columns, nt, ns, 1, min(columns_each, wide), nt)
-    each = view / nt * (3 + times * (1 + border) ** 2)
-    pixel_rows_each = int((limit - need.fixed) // each) if limit > need.fixed else 0
-    if pixel_rows_each >= SMALLEST_BLOCK:
-        return Blocks(rows, columns, nt, ns, 1, 1, min(pixel_rows_each, nt))
-    least = need.fixed + each * SMALLEST_BLOCK
+    spare = max(limit - need.fixed - 3 * view, 0.0) / need.times
+    if spare >= view * high * wide:  # a single block has no neighbours and needs no border
+        return of(high, wide, nt)
+    rows_each = int(spare // (view * (wide + border))) - border
+    if rows_each >= 1:
+        return of(min(rows_each, high), wide, nt)
+    columns_each = int(spare // (view * (1 + border))) - border
+    if columns_each >= 1:
+        return of(1, min(columns_each, wide), nt)
+    pixel_row = view / nt * (3 + need.times * (1 + border) ** 2)
+    pixel_rows_each = int(max(limit - need.fixed, 0.0) // pixel_row)
+    if pixel_rows_each >= 1:
+        return of(1, 1, min(pixel_rows_each, nt))
+    least = need.fixed + pixel_row
     raise InputError(
         f"memory_limit={math.ceil(limit)} bytes is too little: this picture takes {math.ceil(least / 1e6)} MB "
         f"however small the blocks are, and about {math.ceil(need.least_for_views / 1e6)} MB to go well"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -26,9 +26,10 @@ from vcc.engines import chosen, engine
 from vcc.fields.grid import Block
 from vcc.fields.sampled import has_values, to_dtype, to_numpy
 from vcc.fields.samples import Samples
+from vcc.plan.depth_rule import ViewsBetween
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
-from vcc.plan.protocol import Partial
+from vcc.plan.protocol import Core, Partial
 from vcc.run.blocks import Blocks, Need, cut
 
 HELD = 0.25
@@ -85,6 +86,19 @@ class Drive:
         samples: of what.
         how: by what, and within what.
 
+    Attributes:
+        plan: as given.
+        how: as given.
+        given: the samples that were given.
+        samples: those that the core looks at; others than given where views in between are made.
+        name: of the engine.
+        engine: its module.
+        threads: how many work at once.
+        limit: bytes within which blocks are cut.
+        kind: of the samples as the core takes them.
+        core: the plan's, for samples of these numbers.
+        runner: the engine's way to run it.
+
     Raises:
         InputError: see `drive`.
     """
@@ -94,18 +108,16 @@ class Drive:
         if how.tolerance is not None and not plan.by_rays:
             raise InputError("tolerance is for pictures made by rays; footprints have no sampling error")
         self.plan, self.how = plan, how
+        self.given, self.samples = samples, samples
         self.name = chosen(how.engine, samples.whole())
         self.engine, self.threads = engine(self.name), how.workers
-        self.given = samples
-        self.samples: Samples = samples
         self.limit: float = MEMORY_LIMIT // 4 if how.memory_limit is None else how.memory_limit
         if plan.views_between is not None:
-            self._make_views_between(samples)
+            self._look_between(plan.views_between)
         kind = to_dtype(samples.whole()) if self.in_memory else self.samples.grid.kind
         self.kind, factor = plan.kept_as(kind)
         self.core = plan.core.scaled(factor / self.samples.grid.full_scale)
         self.runner = plan.core.by(self.engine)
-        self._ready: Any = None
 
     @property
     def in_memory(self) -> bool:
@@ -190,73 +202,91 @@ class Drive:
         run = partial(self.runner, beside=int(beside > 0), threads=self.threads)
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
-            if self._ready is None:
-                self._ready = self.engine.prepared(self.plan.before, self.samples.whole(), self.threads)
-            return run(core, self._ready, progress=progress)
-        used = self.plan.core.used_views(self.samples.grid.shape)
-        looked_at = {block: int(used[slice(*block.rows), slice(*block.columns)].sum()) for block in listed}
-        counted = _Counted(progress, sum(looked_at.values()))
-        total: Partial | None = None
-        for block in [block for block in listed if looked_at[block]]:
-            values, around = self._values(block, used, counted)
-            part = run(core.part(self.plan.block(around)), values)
-            del values
-            wide = self._in_double(part)
-            total = wide if total is None else total + wide
-        assert total is not None
+            return run(core, self._prepared, progress=progress)
+        total = self._over_blocks(core, run, listed, progress)
         if not self.plan.by_rays or self.in_memory:
             return total
         # Each block knows of its own rays only: a light field of one sample tells which of all are missing.
         whole = run(core.alone(), np.zeros((1, 1, 1, 1), self.kind))
         return replace(total, asked=whole.asked, lacking=whole.lacking, rays=whole.rays)
 
+    @cached_property
+    def _prepared(self) -> Any:
+        """All samples in memory as the core takes them, the same for each round of rays."""
+        return self.engine.prepared(self.plan.before, self.samples.whole(), self.threads)
+
+    def _over_blocks(
+        self, core: Core, run: Callable[..., Partial], blocks: list[Block], progress: Progress | None
+    ) -> Partial:
+        """The sum of what blocks give, in double precision; those of which no view is looked at are not read."""
+        used = self.plan.core.used_views(self.samples.grid.shape)
+        looked_at = {block: int(used[slice(*block.rows), slice(*block.columns)].sum()) for block in blocks}
+        counted = _Counted(progress, sum(looked_at.values()))
+        total: Partial | None = None
+        for block in [block for block in blocks if looked_at[block]]:
+            values, around = self._values(block, used, counted)
+            part = _in_double(run(core.part(self.plan.block(around)), values))
+            del values  # before the next block is read
+            total = part if total is None else total + part
+        assert total is not None
+        return total
+
     def _values(self, block: Block, used: NDArray[np.bool_], counted: _Counted) -> tuple[Any, Block]:
         """A block's samples as the core takes them, with a border of dark views towards its neighbours."""
         if self.in_memory:
             counted.add(int(used[slice(*block.rows), slice(*block.columns)].sum()))
             return self.engine.prepared(self.plan.before, self.samples.read(block), self.threads), block
-        grid, border = self.samples.grid, self.plan.core.border
-        (a, b), (c, d), (first, stop) = block.rows, block.columns, block.pixel_rows
-        around = replace(
-            block,
-            rows=(max(a - border, 0), min(b + border, grid.shape[0])),
-            columns=(max(c - border, 0), min(d + border, grid.shape[1])),
-        )
-        above, below = min(self.plan.reach, first), min(self.plan.reach, grid.shape[2] - stop)
-        room = np.zeros(self.plan.shape((*around.shape, *grid.shape[4:])), dtype=self.kind)
+        around = _with_border(block, self.plan.core.border, self.samples.grid.shape)
+        room = np.zeros(self.plan.shape((*around.shape, *self.samples.grid.shape[4:])), dtype=self.kind)
+        (a, b), (c, d) = block.rows, block.columns
         for j, i in zip(*np.nonzero(used[a:b, c:d]), strict=True):
             row, column = a + int(j), c + int(i)
-            one = Block((row, row + 1), (column, column + 1), (first - above, stop + below), block.pixel_columns)
-            view = self.engine.prepared(self.plan.before, self.samples.read(one), self.threads)
-            if above or below:
-                view = view[:, :, above : view.shape[2] - below]
-            room[row - around.rows[0], column - around.columns[0]] = view[0, 0]
+            room[row - around.rows[0], column - around.columns[0]] = self._view(row, column, block)
             counted.add(1)
         return room, around
 
-    def _in_double(self, part: Partial) -> Partial:
-        """Sums of many parts are kept in double precision."""
-        if not isinstance(part.values, np.ndarray):
-            return part
-        difference = None if part.difference is None else part.difference.astype(np.float64)
-        return replace(part, values=part.values.astype(np.float64), difference=difference)
+    def _view(self, row: int, column: int, block: Block) -> Any:
+        """The samples of one view of a block, read with as many more rows of pixels as operators before reach."""
+        first, stop = block.pixel_rows
+        above, below = min(self.plan.reach, first), min(self.plan.reach, self.samples.grid.shape[2] - stop)
+        one = Block((row, row + 1), (column, column + 1), (first - above, stop + below), block.pixel_columns)
+        view = self.engine.prepared(self.plan.before, self.samples.read(one), self.threads)[0, 0]
+        return view[above : view.shape[0] - below] if above or below else view
 
-    def _make_views_between(self, samples: Samples) -> None:
+    def _look_between(self, between: ViewsBetween) -> None:
         """Look at the denser light field instead, whose views are made when they are read."""
-        whole = samples.whole()
+        whole = self.given.whole()
         if whole is not None and not isinstance(whole, np.ndarray):
             raise InputError(
                 f"between_views='depth' takes NumPy arrays, not {type(whole).__module__}.{type(whole).__name__}: "
                 "pass light_field.replaced(numpy.asarray(values)), or between_views='auto', which carries "
                 "gradients"
             )
-        made = late.module("vcc.engines.depth_views").DenserViews
-        self.samples = made(samples, self.plan.views_between, self.threads, IN_MEMORY)
+        denser = partial(late.module("vcc.engines.depth_views").DenserViews, self.given, between, self.threads)
         if whole is not None:
             # As few bytes as serve well, and as many as a block of one view takes.
+            self.samples = denser(held=0.0)  # of which only the grid is asked
             self.limit = max(IN_MEMORY, math.ceil(self.need.least_for_views / (1 - HELD)))
-        self.samples = made(samples, self.plan.views_between, self.threads, self.limit)
+        self.samples = denser(held=HELD * self.limit)
         self.limit = math.ceil(self.limit * (1 - HELD))
+
+
+def _with_border(block: Block, border: int, shape: tuple[int, ...]) -> Block:
+    """A block with so many views around it where it has neighbours in a light field of this shape."""
+    (a, b), (c, d) = block.rows, block.columns
+    return replace(
+        block,
+        rows=(max(a - border, 0), min(b + border, shape[0])),
+        columns=(max(c - border, 0), min(d + border, shape[1])),
+    )
+
+
+def _in_double(part: Partial) -> Partial:
+    """Sums of many parts are kept in double precision."""
+    if not isinstance(part.values, np.ndarray):
+        return part
+    difference = None if part.difference is None else part.difference.astype(np.float64)
+    return replace(part, values=part.values.astype(np.float64), difference=difference)
 
 
 class _Counted:

@@ -8,7 +8,10 @@ above a limit.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -25,7 +28,8 @@ from vcc.optics.faces import Element
 from vcc.optics.mask import Mask
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
-from vcc.plan.footprints.planes import Plane, depends_on_view_only, mask_lookup
+from vcc.plan.footprints.mask_textures import mask_lookup
+from vcc.plan.footprints.planes import Plane, depends_on_view_only
 from vcc.shapes.patterns import Pattern
 
 Field = TypeVar("Field", bound=InMemory)
@@ -55,16 +59,11 @@ def masked_at(
     check_samples(light_field.shape, memory_limit, "the masked light field")
     values = to_numpy(light_field.values)
     result = np.empty(values.shape, dtype=np.float32)
-    tables = [_weight_table(light_field, *plane) for plane in planes]
-    nv, nu, nt, ns = values.shape[:4]
-    k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
-    for j, i in np.ndindex(nv, nu):
+    weights = [_weights(light_field, *plane) for plane in planes]
+    for j, i in np.ndindex(values.shape[:2]):
         weight: Any = 1.0 / light_field.grid.full_scale
-        for table in tables:
-            # A texture that makes up for being looked up linearly may pass 0 beside an edge; light does not.
-            weight = weight * (
-                table[j, i] if isinstance(table, np.ndarray) else np.maximum(table.weights(j, i, k, l), 0.0)
-            )
+        for of_view in weights:
+            weight = weight * of_view(j, i)
         if values.ndim == 5 and np.ndim(weight):
             weight = weight[..., None]
         result[j, i] = values[j, i] * weight
@@ -81,27 +80,29 @@ def carried_to(
     """
     if z > train.sensor.z:
         raise InputError(f"z = {z * 1e3:g} mm lies behind the sensor at {train.sensor.z * 1e3:g} mm")
-    for stage in train.stages:
-        if stage.element.z > z or (before and stage.element.z == z):
-            break
+    passed = list(itertools.takewhile(lambda stage: _passed(stage, z, before), train.stages))
+    for stage in passed:
         if stage.faces.bending is not None:
             raise InputError(
                 f"{stage.element.label} is not affine: behind it the light field has no frame. Choose a z "
                 "before it, or look at the picture (camera.capture)"
             )
     planes: list[tuple[Pattern, tuple[float, float], Affine]] = []
-    for stage in train.stages:
-        if stage.element.z > z or (before and stage.element.z == z):
-            break
-        here = stage.arriving
+    for stage in passed:
         if stage.faces.pattern is not None:
-            planes.append((stage.faces.pattern, stage.element.decentre, here))
+            planes.append((stage.faces.pattern, stage.element.decentre, stage.arriving))
         if stage.faces.spread is not None:
-            arriving = transformed(masked_at(light_field, planes, memory_limit), here)
+            # At the diffuser, and back to the plane at which the masks to come are told from.
+            arriving = transformed(masked_at(light_field, planes, memory_limit), stage.arriving)
             planes = []
-            light_field = transformed(scattered_by(arriving, stage, memory_limit), here.inverse())
+            light_field = transformed(scattered_by(arriving, stage, memory_limit), stage.arriving.inverse())
     behind = masked_at(light_field, planes, memory_limit)
     return transformed(behind, train.rays_at(z, before=before))
+
+
+def _passed(stage: Stage, z: float, before: bool) -> bool:
+    """Whether light has met a stage at z: those exactly there too, unless asked for before them."""
+    return stage.element.z < z or (stage.element.z == z and not before)
 
 
 def transformed(light_field: Field, rays: Affine) -> Field:
@@ -109,15 +110,21 @@ def transformed(light_field: Field, rays: Affine) -> Field:
     return light_field.of(light_field.values, light_field.grid.moved(rays))
 
 
-def _weight_table(light_field: Field, pattern: Pattern, decentre: tuple[float, float], rays: Affine) -> Any:
-    """One weight for each view where the pattern tells views apart only, else a lookup for samples."""
+def _weights(
+    light_field: Field, pattern: Pattern, decentre: tuple[float, float], rays: Affine
+) -> Callable[[int, int], Any]:
+    """What a pattern lets pass of view (j, i): a number where it tells views apart only, else (rows, columns)."""
     nv, nu, nt, ns = light_field.shape[:4]
     plane = Plane.met_by(light_field.frame, rays, pattern, decentre, "pattern")
     index = np.stack(np.meshgrid(np.arange(float(nu)), np.arange(float(nv))), axis=-1)
     still = np.zeros((2, 2))
     if depends_on_view_only(plane, (nt, ns), still):
-        return plane.view_weights(index, np.zeros_like(index), still, (nt, ns))
-    return mask_lookup(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
+        shares = plane.view_weights(index, np.zeros_like(index), still, (nt, ns))
+        return lambda j, i: shares[j, i]
+    lookup = mask_lookup(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
+    k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
+    # A texture that makes up for being looked up linearly may pass 0 beside an edge; light does not.
+    return lambda j, i: np.maximum(lookup.weights(j, i, k, l), 0.0)
 
 
 def masked(light_field: Field, mask: Mask, memory_limit: int | None = None) -> Field:
@@ -160,14 +167,7 @@ def scattered_by(light_field: Field, stage: Stage, memory_limit: int | None = No
     scatter, label = stage.faces.spread, stage.element.label
     assert scatter is not None
     nv, nu, nt, ns = light_field.shape[:4]
-    frame = light_field.frame
-    travel = np.abs(frame.linear[:2, 2:]) @ np.array([ns, nt])
-    if (travel > 1e-6 * np.abs(frame.linear[:2, :2]).sum(axis=1)).any():
-        raise InputError(
-            f"{label} cannot scatter this light field within its views: the places of its rays depend on the "
-            "pixel, not on the view alone, so that a change of slope leads from one view to others. Resample it "
-            "first, to a frame whose places depend on (i, j) only: lf.resampled(frame, shape)"
-        )
+    _check_places_of_views(light_field, label)
     with stage.named():
         weights = _view_weights(scatter, light_field, stage.element.decentre)
     high, wide = (max(one.shape[axis] // 2 for row in weights for one in row) for axis in (0, 1))
@@ -191,6 +191,23 @@ def scattered_by(light_field: Field, stage: Stage, memory_limit: int | None = No
     return made
 
 
+def _check_places_of_views(light_field: InMemory, label: str) -> None:
+    """Refuse a light field whose views are not each in one place.
+
+    Raises:
+        InputError: see `scattered_by`.
+    """
+    rows, columns = light_field.shape[2:4]
+    linear = light_field.frame.linear
+    travel = np.abs(linear[:2, 2:]) @ np.array([columns, rows])
+    if (travel > 1e-6 * np.abs(linear[:2, :2]).sum(axis=1)).any():
+        raise InputError(
+            f"{label} cannot scatter this light field within its views: the places of its rays depend on the "
+            "pixel, not on the view alone, so that a change of slope leads from one view to others. Resample it "
+            "first, to a frame whose places depend on (i, j) only: lf.resampled(frame, shape)"
+        )
+
+
 def _view_weights(
     scatter: Scatter, light_field: Field, decentre: tuple[float, float]
 ) -> list[list[NDArray[np.float64]]]:
@@ -203,22 +220,25 @@ def _view_weights(
     index[..., 0], index[..., 1] = np.meshgrid(np.arange(nu), np.arange(nv))
     place = light_field.frame(index)[..., :2] - decentre
     shares, widths = scatter.at(place[..., 0], place[..., 1])
-    found: dict[tuple[int, float], NDArray[np.float64]] = {}  # many views have the same width
+
+    @cache  # many views have the same width
+    def kernel(n: int, width: float) -> NDArray[np.float64]:
+        return scatter.kernels[n].weights(width * steps_from_slopes)
 
     def mixed(share: NDArray[np.float64], width: float) -> NDArray[np.float64]:
-        parts = []
-        for n in np.flatnonzero(share).tolist():
-            if (n, width) not in found:
-                found[n, width] = scatter.kernels[n].weights(width * steps_from_slopes)
-            parts.append(share[n] * found[n, width])
-        rows, columns = (max(part.shape[axis] for part in parts) for axis in (0, 1))
-        total = np.zeros((rows, columns))
-        for part in parts:
-            top, left = (rows - part.shape[0]) // 2, (columns - part.shape[1]) // 2
-            total[top : top + part.shape[0], left : left + part.shape[1]] += part
-        return total
+        return _about_one_middle([share[n] * kernel(n, width) for n in np.flatnonzero(share).tolist()])
 
     return [[mixed(shares[j, i], float(widths[j, i])) for i in range(nu)] for j in range(nv)]
+
+
+def _about_one_middle(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """The sum of arrays of odd sizes that have their middle in common."""
+    rows, columns = (max(part.shape[axis] for part in parts) for axis in (0, 1))
+    total = np.zeros((rows, columns))
+    for part in parts:
+        top, left = (rows - part.shape[0]) // 2, (columns - part.shape[1]) // 2
+        total[top : top + part.shape[0], left : left + part.shape[1]] += part
+    return total
 
 
 def resampled(

@@ -21,8 +21,9 @@ from vcc.plan.footprints import against_sensor as masks
 from vcc.plan.footprints.cells import divide_samples, divide_views, tap_places
 from vcc.plan.footprints.coverage import missing_rays
 from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
+from vcc.plan.footprints.mask_textures import mask_lookup
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.planes import Plane, depends_on_view_only, mask_lookup, open_parts, tap_origin
+from vcc.plan.footprints.planes import Plane, depends_on_view_only, open_parts, tap_origin
 from vcc.plan.footprints.shares import SMALLEST_STEP
 from vcc.plan.footprints.words import coarse_textures, notes_of
 from vcc.plan.how import How

@@ -5,8 +5,9 @@ from __future__ import annotations
 from vcc.base.affine import Affine
 from vcc.optics.train import Train
 from vcc.plan.footprints.cells import CORRELATED, LARGEST_CHOSEN_REFINEMENT, CellDivision
+from vcc.plan.footprints.mask_textures import texture_error
 from vcc.plan.footprints.model import MaskLookup
-from vcc.plan.footprints.planes import Plane, texture_error
+from vcc.plan.footprints.planes import Plane
 from vcc.plan.how import LARGEST_REFINEMENT
 from vcc.plan.parallax_rule import BetweenViews
 
