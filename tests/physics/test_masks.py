@@ -320,18 +320,22 @@ def test_the_same_sheet_twice_is_its_square_where_cells_are_uniform(small_field)
     )
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_the_order_in_which_elements_are_given_is_irrelevant(small_field, engine):
+def test_the_order_in_which_elements_are_given_is_irrelevant(small_field):
     elements = [
         SMALL_LENS,
         vcc.Mask(pattern=CosineSum((7 * mm, 9 * mm)), z=20 * mm),
         vcc.Mask(pattern=np.array([[0.2, 1.0], [0.7, 0.4]]), width=14 * mm, z=33 * mm),
         vcc.Prism(deflection=(1e-3, -2e-3), z=20 * mm),
     ]
-    pictures = [capture(order, small_field, engine=engine) for order in itertools.permutations(elements)]
-    # Elements at one z are folded in the order given: the fold differs by rounding of float64, at most.
-    for picture in pictures[1:]:
-        np.testing.assert_allclose(picture, pictures[0], rtol=1e-5, atol=1e-7 * pictures[0].max())
+    cameras = [vcc.Camera(order, SMALL_SENSOR) for order in itertools.permutations(elements)]
+    plans = {camera.compile(small_field) for camera in cameras}
+    # Engines see plans alone. Only the mask and the prism at one z can be told apart: they come in the order given.
+    assert len(plans) <= 2
+    for engine in ENGINES:
+        first, *others = (cameras[0].capture(small_field, plan=plan, engine=engine).values for plan in plans)
+        # Elements at one z are folded in the order given: the fold differs by rounding of float64, at most.
+        for picture in others:
+            np.testing.assert_allclose(picture, first, rtol=1e-5, atol=1e-7 * first.max())
 
 
 def test_coplanar_elements_commute_exactly_in_the_fold():
