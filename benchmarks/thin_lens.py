@@ -253,7 +253,9 @@ def shifted_and_added(field: vcc.LightField, distance: float, shape: tuple[int, 
             continue
         # The middle of the view's picture is seen on the plane in focus at u/Z − s, in pixels of the sensor:
         down, across = (v / distance - t) / PIXEL, (u / distance - s) / PIXEL
-        moved = shared_out(shared_out(values[row, column].astype(np.float64), down, shape[0], 0), across, shape[1], 1)
+        moved = shared_out(
+            shared_out(values[row, column].astype(np.float64), down, shape[0], 0), across, shape[1], 1
+        )
         total += share * moved
         weight += share
     return total / weight

@@ -104,7 +104,9 @@ def test_cells_as_large_as_pixels_against_the_sensor_multiply_pixel_by_pixel(sma
 
 def in_fifths_of_pixels(scene: Scene, rings: int, spokes: int) -> np.ndarray:
     """The middle 35 × 35 pixels of the picture without a mask, in 5 × 5 parts each."""
-    return ThinLensCamera(FOCAL_LENGTH, round_stop(DIAMETER, rings, spokes), D, (175, 175), PITCH / 5).picture(scene)
+    return ThinLensCamera(FOCAL_LENGTH, round_stop(DIAMETER, rings, spokes), D, (175, 175), PITCH / 5).picture(
+        scene
+    )
 
 
 @pytest.fixture(scope="module")
@@ -334,7 +336,7 @@ def test_the_order_in_which_elements_are_given_is_irrelevant(small_field):
     ]
     cameras = [vcc.Camera(order, SMALL_SENSOR) for order in itertools.permutations(elements)]
     plans = {camera.compile(small_field) for camera in cameras}
-    # Engines see plans alone. Only the mask and the prism at one z can be told apart: they come in the order given.
+    # Engines see plans alone. Only the mask and the prism at one z can be told apart, being folded as given.
     assert len(plans) <= 2
     for engine in ENGINES:
         first, *others = (cameras[0].capture(small_field, plan=plan, engine=engine).values for plan in plans)

@@ -73,8 +73,8 @@ def test_views_are_the_true_ones_where_the_picture_shows_what_they_see():
         view, true, made_up = scene.render(camera), truth.render(camera), scene.uncovered(camera)
         # Of a wave of 16 pixels interpolation and the mean of 2 × 2 keep (1 − (π/16)²/3)(1 − (π/16)²/4) at least:
         # 2.3 % are lost, of waves with r.m.s. 0.125 (8 of contrast ½): 8e-6. Samples at halves of pixels tell a
-        # border's share of a pixel to ¼, 0.14 r.m.s., times the contrast of two waves, 0.125·√2, along 160 of 10800
-        # pixels: 1e-5. Together 47.5 dB; straight borders may lie badly all along, for which 45 dB leave 2.5 times
+        # border's share of a pixel to ¼, 0.14 r.m.s., times the contrast of two waves, 0.125·√2, along 160 of the
+        # 10800 pixels: 1e-5. Together 47.5 dB; straight borders may lie badly all along, for which 45 dB leave 2.5 times
         # their part.
         assert psnr(view, true, made_up <= 0.01) > 45
         # Waves that nobody saw: at worst those of another place, with twice their variance, 2·0.125²: 15 dB.
@@ -145,8 +145,8 @@ def test_mixed_pixels_make_no_halo():
     for _ in range(1):  # a pixel from the true disc
         clear[1:-1, 1:-1] &= clear[:-2, 1:-1] & clear[2:, 1:-1] & clear[1:-1, :-2] & clear[1:-1, 2:]
     assert view[..., 0][clear].max() < 0.02  # what has less than a fiftieth of the other side keeps its colour
-    # The disc's area: its rim's 94 pixels err by 0.14 r.m.s. each, as above, and round, by themselves: their mean by
-    # 0.015. Four times that, and the fiftieth of what keeps its colour, make 0.08 of a pixel all along.
+    # The disc's area: its rim's 94 pixels err by 0.14 r.m.s. each, as above, and as it is round, independently:
+    # their mean by 0.015. Four times that, and the fiftieth of what keeps its colour, make 0.08 of a pixel all along.
     assert view[..., 0].sum() == pytest.approx(math.pi * 15**2, abs=0.08 * 2 * math.pi * 15)
 
 
@@ -166,8 +166,8 @@ def test_small_cuts_in_near_things_do_not_hide_what_is_behind_their_outline():
     for place in ((0, 0), (4, 2), (2, 4)):
         view, true = scene.render(ARRAY.camera(*place)), truth.render(ARRAY.camera(*place))
         # Only borders differ, of colours 0.7, 0.5 and 0.3 apart, 0.53 r.m.s.: 4 · 40 pixels of the outline by a
-        # quarter at most, as above, and between the halves, which move against each other by a pixel, up to 40 as a
-        # whole: 50 of 10800 · 0.28 in all, 28.9 dB. A strip of 20 pixels in a wrong colour would leave 18 dB.
+        # quarter at most, as above, and between the halves, which move against each other by a pixel, up to 40 as
+        # a whole: 50 of 10800 · 0.28 in all, 28.9 dB. A strip of 20 pixels in a wrong colour would leave 18 dB.
         assert psnr(view, true) > 28.8
 
 
@@ -178,8 +178,8 @@ def test_smoothed_depth_maps_are_cut_too():
     sharp, soft = (
         DepthMapScene.for_cameras(picture, each, ARRAY).render(ARRAY.camera(2, 0)) for each in (depth, smooth)
     )
-    # Two borders of 40 pixels move by a pixel at most, and what was made up beside one, 40 rows of twice 3 pixels of
-    # parallax, may be of another place: 320 of 10800 pixels differ by two waves, 2·0.125².
+    # Two borders of 40 pixels move by a pixel at most, and what was made up beside one, 40 rows of twice 3 pixels
+    # of parallax, may be of another place: 320 of 10800 pixels differ by two waves, 2·0.125².
     assert psnr(sharp, soft) > 10 * math.log10(10800 / 320 / (2 * 0.125**2))
 
 
