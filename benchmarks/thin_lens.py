@@ -254,13 +254,15 @@ def shifted_and_added(field: vcc.LightField, distance: float, shape: tuple[int, 
             continue
         # The middle of the view's picture is seen on the plane in focus at u/Z − s, in pixels of the sensor:
         down, across = (v / distance - t) / PIXEL, (u / distance - s) / PIXEL
-        moved = _by_area(_by_area(values[row, column].astype(np.float64), down, shape[0], 0), across, shape[1], 1)
+        moved = shared_out(
+            shared_out(values[row, column].astype(np.float64), down, shape[0], 0), across, shape[1], 1
+        )
         total += share * moved
         weight += share
     return total / weight
 
 
-def _by_area(values: Array, shift: float, size: int, axis: int) -> Array:
+def shared_out(values: Array, shift: float, size: int, axis: int) -> Array:
     """Unit squares moved by some pixels and shared out to ``size`` unit squares about the same middle."""
     whole = math.floor(shift)
     part, first = shift - whole, (values.shape[axis] - size) // 2 - whole

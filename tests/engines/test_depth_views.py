@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 import vcc
 from vcc.base.units import mm
@@ -221,26 +222,29 @@ def test_a_map_of_the_middle_view_serves_all():
     np.testing.assert_allclose(one_picture, all_pictures, atol=1e-5 * all_pictures.max())
 
 
-def test_what_cannot_be_is_refused():
-    torch = pytest.importorskip("torch")
-    lf = field()
-    depth = {"between_views": "depth"}
-    with pytest.raises(vcc.InputError, match=r"takes NumPy arrays, not torch.Tensor"):
-        FAR_OUT_OF_FOCUS.capture(lf.replaced(torch.tensor(lf.values)), **depth)
-    with pytest.raises(vcc.InputError, match="made by rays"):
-        FAR_OUT_OF_FOCUS.capture(lf, method="rays", **depth)
-    with pytest.raises(vcc.InputError, match="scene_distance is for"):
-        FAR_OUT_OF_FOCUS.capture(lf, scene_distance=1.0, **depth)
-    with pytest.raises(vcc.InputError, match=r"disparity has the shape \(3, 3\)"):
-        field(disparity=np.zeros((3, 3)))
-    with pytest.raises(vcc.InputError, match="finite"):
-        field(disparity=np.full((40, 48), np.nan))
+def with_slopes_turned() -> vcc.LightField:
     c, s = np.cos(0.4), np.sin(0.4)
-    slopes_turned = np.eye(4)
-    slopes_turned[2:, 2:] = [[c, -s], [s, c]]
-    turned = replace(lf, frame=vcc.Affine.from_parts(slopes_turned, np.zeros(4)) @ lf.frame)
-    with pytest.raises(vcc.InputError, match="turns or mixes"):
-        FAR_OUT_OF_FOCUS.capture(turned, **depth)
-    even = vcc.LightField.from_views(np.ones((3, 3, 20, 20), np.float32), SPACING, SLOPE, FOCUS)
-    with pytest.raises(vcc.InputError, match="disparity=maps"):
-        FAR_OUT_OF_FOCUS.capture(even, **depth)
+    turned = np.eye(4)
+    turned[2:, 2:] = [[c, -s], [s, c]]
+    return replace(field(), frame=vcc.Affine.from_parts(turned, np.zeros(4)) @ FRAME)
+
+
+def without_detail() -> vcc.LightField:
+    return vcc.LightField.from_views(np.ones((3, 3, 20, 20), np.float32), SPACING, SLOPE, FOCUS)
+
+
+@pytest.mark.parametrize(
+    ("make", "options", "words"),
+    [
+        (lambda: field().replaced(torch.tensor(field().values)), {}, r"takes NumPy arrays, not torch.Tensor"),
+        (field, {"method": "rays"}, "made by rays"),
+        (field, {"scene_distance": 1.0}, "scene_distance is for"),
+        (lambda: field(disparity=np.zeros((3, 3))), {}, r"disparity has the shape \(3, 3\)"),
+        (lambda: field(disparity=np.full((40, 48), np.nan)), {}, "finite"),
+        (with_slopes_turned, {}, "turns or mixes"),
+        (without_detail, {}, "disparity=maps"),
+    ],
+)
+def test_what_cannot_be_is_refused(make, options, words):
+    with pytest.raises(vcc.InputError, match=words):
+        FAR_OUT_OF_FOCUS.capture(make(), between_views="depth", **options)

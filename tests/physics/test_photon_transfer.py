@@ -92,15 +92,21 @@ def test_the_library_s_own_curve_finds_the_same():
         assert 9 <= got.fitted.sum() < len(got.mean)
 
 
-def test_curves_that_cannot_be_measured():
-    with pytest.raises(vcc.InputError, match="raise it"):
-        vcc.photon_transfer(Electronics(black_level=1))
-    with pytest.raises(vcc.InputError, match="levels is a whole number, 4 or more, not 3"):
-        vcc.photon_transfer(Electronics(), levels=3)
-    with pytest.raises(vcc.InputError, match="two pixels"):
-        vcc.photon_transfer(Electronics(), shape=(1, 1))
-    with pytest.raises(vcc.InputError, match="exposure"):
-        vcc.photon_transfer(Electronics(), exposure=0)
+@pytest.mark.parametrize(
+    ("electronics", "options", "message"),
+    [
+        (Electronics(black_level=1), {}, "raise it"),
+        (Electronics(), {"levels": 3}, "levels is a whole number, 4 or more, not 3"),
+        (Electronics(), {"shape": (1, 1)}, "two pixels"),
+        (Electronics(), {"exposure": 0}, "exposure"),
+    ],
+)
+def test_curves_that_cannot_be_measured(electronics, options, message):
+    with pytest.raises(vcc.InputError, match=message):
+        vcc.photon_transfer(electronics, **options)
+
+
+def test_read_noise_below_the_rounding_is_not_told():
     coarse = vcc.photon_transfer(dataclasses.replace(SENSORS["default"], gain=0.05), shape=(64, 64))
     assert coarse.gain == pytest.approx(0.05, rel=0.1)
     with pytest.raises(vcc.InputError, match="rounding"):

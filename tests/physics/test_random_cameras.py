@@ -101,7 +101,7 @@ def test_stores_hold_what_memory_does(kind):
 
 @pytest.mark.parametrize("kind", AFFINE)
 def test_footprints_meet_brute_force(kind):
-    held([check for seed in (1, 2) for check in brute_force(drawn(kind, seed, 14))])
+    held([check for seed in (2, 3) for check in brute_force(drawn(kind, seed, 14))])
 
 
 @pytest.mark.parametrize("kind", BENT)

@@ -476,8 +476,14 @@ AWKWARD = [
 SMALL = replace(PICTURE, shape=(9, 10))
 
 
-@pytest.mark.parametrize("channels", [None, 1, 2, 3, 4, 5])
-@pytest.mark.parametrize("kind", ["uint8", "uint16", "float16", "float32", "float64"])
+# Channels of every type are held together in tests/engines/test_ray_agreement.py; here both are held to the plain.
+@pytest.mark.parametrize(
+    ("kind", "channels"),
+    [
+        *(("float32", channels) for channels in (None, 1, 2, 3, 4, 5)),
+        *((kind, channels) for kind in ("uint8", "uint16", "float16", "float64") for channels in (None, 3)),
+    ],
+)
 def test_every_type_and_number_of_channels_gives_the_plain_picture(kind, channels):
     whole = PLANES.light_field[4:12, 4:12, 20:76, 20:76]
     factors = np.linspace(0.3, 1.0, channels or 1)

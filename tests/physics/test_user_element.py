@@ -158,8 +158,9 @@ CAMERAS = {
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_every_engine_makes_the_same_picture(camera):
     sensor = replace(PICTURE, shape=(8, 9))
-    values = np.asarray(PLANES.light_field.values)[..., None] * np.array([1.0, 0.5, 0.2], dtype=np.float32)
-    lf = PLANES.light_field.replaced(values)
+    seen = PLANES.light_field[:, :, 24:72, 24:72]  # by so small a sensor
+    values = np.asarray(seen.values)[..., None] * np.array([1.0, 0.5, 0.2], dtype=np.float32)
+    lf = seen.replaced(values)
     plan = vcc.Camera(CAMERAS[camera], sensor).compile(lf, samples=64)
     pictures = {name: drive(plan, lf, How(engine=name)).values for name in ENGINES}
     expected = pictures["reference"]

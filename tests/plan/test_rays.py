@@ -206,22 +206,21 @@ def test_seeds_are_whole_numbers(seed):
         plan_of(LENS, seed=seed)
 
 
-def test_options_that_do_not_go_together():
-    camera = vcc.Camera([LENS], vcc.Sensor(D, (4, 4), 1 * mm))
-    with pytest.raises(vcc.InputError, match="method is 'auto'"):
-        camera.capture(field(), method="guess")
-    with pytest.raises(vcc.InputError, match="samples is for pictures made by rays"):
-        camera.capture(field(), samples=8)
-    with pytest.raises(vcc.InputError, match="tolerance is for pictures made by rays"):
-        camera.capture(field(), tolerance=0.1)
-    with pytest.raises(vcc.InputError, match="tolerance is a share"):
-        camera.capture(field(), method="rays", tolerance=0.0)
-    with pytest.raises(vcc.InputError, match=r"interpolation='cubic' is for pictures made by footprints"):
-        camera.capture(field(), method="rays", interpolation="cubic")
-    with pytest.raises(vcc.InputError, match=r"refine=2 is for"):
-        camera.capture(field(), method="rays", refine=2)
-    with pytest.raises(vcc.InputError, match="between_views is"):
-        camera.capture(field(), method="rays", between_views="maybe")
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"method": "guess"}, "method is 'auto'"),
+        ({"samples": 8}, "samples is for pictures made by rays"),
+        ({"tolerance": 0.1}, "tolerance is for pictures made by rays"),
+        ({"method": "rays", "tolerance": 0.0}, "tolerance is a share"),
+        ({"method": "rays", "interpolation": "cubic"}, "interpolation='cubic' is for pictures made by footprints"),
+        ({"method": "rays", "refine": 2}, "refine=2 is for"),
+        ({"method": "rays", "between_views": "maybe"}, "between_views is"),
+    ],
+)
+def test_options_that_do_not_go_together(options, message):
+    with pytest.raises(vcc.InputError, match=message):
+        vcc.Camera([LENS], vcc.Sensor(D, (4, 4), 1 * mm)).capture(field(), **options)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import pytest
 
 import vcc
 from vcc.base.units import mm, um
-from vcc.recover.defocus_depth import DefocusDepth, _beliefs, defocus_kernels, depth_from_defocus
+from vcc.recover.defocus_depth import DefocusDepth, defocus_kernels, depth_from_defocus
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Picture
 
@@ -232,10 +232,17 @@ def test_smoothing_keeps_borders_and_outvotes_a_stray_block() -> None:
         found.smoothed(cost=0)
 
 
-def test_messages_find_the_least_energy_of_a_chain() -> None:
-    """On a chain min-sum is exact: against all 3⁶ labellings."""
-    random = np.random.default_rng(4)
-    against, steps = random.random((3, 1, 6)), 0.4 * np.abs(np.subtract.outer(np.arange(3), np.arange(3)))
+def test_smoothing_finds_the_least_energy_of_a_chain() -> None:
+    """On a chain min-sum is exact: against all 3⁶ labellings.
+
+    Blocks half a block apart count in full, and neither the log(3 / 0.02) = 5 nats that a block may hold against a
+    candidate nor the log(3) = 1.1 of a border are reached.
+    """
+    against, steps = (
+        np.random.default_rng(4).random((3, 1, 6)),
+        0.4 * np.abs(np.subtract.outer(np.arange(3), np.arange(3))),
+    )
+    against -= against.min(axis=0)
     best = min(
         itertools.product(range(3), repeat=6),
         key=lambda labels: (
@@ -243,4 +250,9 @@ def test_messages_find_the_least_energy_of_a_chain() -> None:
             + sum(steps[a, b] for a, b in itertools.pairwise(labels))
         ),
     )
-    np.testing.assert_array_equal(_beliefs(against, steps, 60).argmin(axis=0)[0], best)
+    index = against.argmin(axis=0)
+    away = (1.2, 1.0, 0.9)
+    found = DefocusDepth(
+        np.array(away)[index], index, np.ones((1, 6)), -against, np.zeros(1), 24.0 * np.arange(6), 48, away
+    )
+    np.testing.assert_array_equal(found.smoothed(cost=0.4, sweeps=60).index[0], best)

@@ -35,7 +35,7 @@ def test_squares_are_shared_out_by_area(benchmark):
         row = np.repeat(values, fine, axis=1)
         moved = np.roll(row, round(shift * fine), axis=1)[:, 3 * fine : 9 * fine]
         expected = moved.reshape(9, 6, fine, 3).mean(axis=2)
-        np.testing.assert_allclose(benchmark._by_area(values, shift, 6, 1), expected, atol=1e-12)
+        np.testing.assert_allclose(benchmark.shared_out(values, shift, 6, 1), expected, atol=1e-12)
 
 
 def test_shift_and_add_is_a_camera_of_squares(benchmark):
