@@ -27,7 +27,7 @@ from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.points import table
 from vcc.plan.rays.sharpening import sharpening
 from vcc.plan.rays.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
-from vcc.plan.rays.windows import Aim, CellWindows, Window
+from vcc.plan.rays.windows import Aim, Window
 from vcc.shapes.lattice import CellApertures, CellBlock
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
 from vcc.shapes.sheets import Product
@@ -53,51 +53,17 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         InputError: an element that returns what it must not (named), or optics through which no bound on the rays
             can be found.
     """
-    samples = how.rays_a_pixel or DEFAULT_SAMPLES
-    motion, followed = _motion(grid, how.scene_distance)
-    if how.between_views == "none":
-        motion = np.zeros((2, 2))
-        followed = "each view stands for its cell of the aperture; views are not interpolated, as asked"
-    path = Path(train, grid, motion, samples)
+    motion, followed = _motion(grid, how)
+    path = Path(train, grid, motion, how.rays_a_pixel or DEFAULT_SAMPLES)
     taken, asked = aimed(path)
-    notes: list[str] = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {taken.aim.words}"]
-    made, index_from_ray = _steps(path, taken, notes)
-    vertical, horizontal = train.sensor.pitches
-    high, wide = train.sensor.sensitive_pitches
-    first = train.sensor.frame(np.zeros((1, 2)))[0]
+    notes = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {taken.aim.words}"]
+    core = _core(path, taken, how, notes)
     notes.append(followed)
-    if isinstance(taken.aim, CellWindows):
-        samples >>= taken.aim.halvings
-    before: tuple[Before, ...] = ()
-    if how.interpolation == "sharp":
-        before = (SharpenViews(sharpening(grid.sample)),)
-        notes.append(
-            "views are made sharper by what interpolating between their samples takes"
-            + (", and by what their pixels' own averaging took" if grid.sample == "mean" else "")
-        )
-    nv, nu, nt, ns = grid.shape[:4]
-    core = Rays(
-        raster_shape=train.sensor.shape,
-        first_pixel=(float(first[0]), float(first[1])),
-        pitch=(horizontal, vertical),
-        sensitive=(wide, high),
-        aim=taken.aim,
-        steps=tuple(made),
-        index_from_ray=index_from_ray,
-        motion=motion,
-        between_views=how.between_views == "auto",
-        views=(nv, nu, nt, ns),
-        scale=1.0,
-        samples=samples,
-        seed=how.seed,
-        points=table(how.seed, path.scatters, taken.aim.on_disc),
-        views_may_end=path.stop_at_views,
-    )
     plan = Plan(
         sensor_shape=train.sensor.shape,
         grid_shape=grid.shape[:4],
         core=core,
-        before=before,
+        before=_before(grid, how, notes),
         missing_reason="they fall outside the grid of views or outside the views' pictures",
         cautions=tuple(_cautions(train)),
         notes=tuple(notes),
@@ -107,6 +73,44 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
     missing = _missing(core, path, asked)
     more = f"the camera asks for light from {asked.aim.words}, of which the light field lacks {missing:.1%}"
     return replace(plan, missing_rays=missing, notes=(*plan.notes, more))
+
+
+def _core(path: Path, taken: Aimed, how: How, notes: list[str]) -> Rays:
+    """The rays that are aimed so."""
+    sensor = path.train.sensor
+    vertical, horizontal = sensor.pitches
+    first = sensor.frame(np.zeros((1, 2)))[0]
+    wide, high = path.pixel.tolist()
+    made, index_from_ray = _steps(path, taken, notes)
+    nv, nu, nt, ns = path.grid.shape[:4]
+    return Rays(
+        raster_shape=sensor.shape,
+        first_pixel=(float(first[0]), float(first[1])),
+        pitch=(horizontal, vertical),
+        sensitive=(wide, high),
+        aim=taken.aim,
+        steps=tuple(made),
+        index_from_ray=index_from_ray,
+        motion=path.motion,
+        between_views=how.between_views == "auto",
+        views=(nv, nu, nt, ns),
+        scale=1.0,
+        samples=path.samples >> taken.aim.halvings,
+        seed=how.seed,
+        points=table(how.seed, path.scatters, taken.aim.on_disc),
+        views_may_end=path.stop_at_views,
+    )
+
+
+def _before(grid: Grid, how: How, notes: list[str]) -> tuple[Before, ...]:
+    """What is done to views before rays look at them."""
+    if how.interpolation != "sharp":
+        return ()
+    notes.append(
+        "views are made sharper by what interpolating between their samples takes"
+        + (", and by what their pixels' own averaging took" if grid.sample == "mean" else "")
+    )
+    return (SharpenViews(sharpening(grid.sample)),)
 
 
 def _missing(core: Rays, path: Path, asked: Aimed) -> float:
@@ -316,11 +320,14 @@ def _sheet(given: object, met: _Met) -> steps.Texture:
 # --- between views ---
 
 
-def _motion(grid: Grid, scene_distance: float | None) -> tuple[Array, str]:
+def _motion(grid: Grid, how: How) -> tuple[Array, str]:
     """How a point of the scene's middle depth moves from view to view, and what is done with it, in words."""
+    if how.between_views == "none":
+        kept = "each view stands for its cell of the aperture; views are not interpolated, as asked"
+        return np.zeros((2, 2)), kept
     if max(grid.extent) <= 1:
         return np.zeros((2, 2)), "a single view: nothing between views"
-    known = vergences(grid, scene_distance)
+    known = vergences(grid, how.scene_distance)
     if known is None:
         return np.zeros((2, 2)), "views are interpolated in place: the pictures show no parallax to follow"
     motions = index_motions(grid.frame, known)

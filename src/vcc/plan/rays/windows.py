@@ -42,6 +42,9 @@ class Window:
     words: str
     slope_from_scatter: tuple[tuple[int, Array], ...] = ()
 
+    halvings: ClassVar[int] = 0
+    """All of a pixel's rays go through it."""
+
     @property
     def on_disc(self) -> bool:
         """Whether rays take points of the unit disc, not of the square."""
