@@ -74,8 +74,8 @@ def test_views_are_the_true_ones_where_the_picture_shows_what_they_see():
         # Of a wave of 16 pixels interpolation and the mean of 2 × 2 keep (1 − (π/16)²/3)(1 − (π/16)²/4) at least:
         # 2.3 % are lost, of waves with r.m.s. 0.125 (8 of contrast ½): 8e-6. Samples at halves of pixels tell a
         # border's share of a pixel to ¼, 0.14 r.m.s., times the contrast of two waves, 0.125·√2, along 160 of the
-        # 10800 pixels: 1e-5. Together 47.5 dB; straight borders may lie badly all along, for which 45 dB leave 2.5 times
-        # their part.
+        # 10800 pixels: 1e-5. Together 47.5 dB; straight borders may lie badly all along, for which 45 dB leave 2.5
+        # times their part.
         assert psnr(view, true, made_up <= 0.01) > 45
         # Waves that nobody saw: at worst those of another place, with twice their variance, 2·0.125²: 15 dB.
         assert psnr(view, true, made_up > 0.01) > 15
@@ -146,7 +146,7 @@ def test_mixed_pixels_make_no_halo():
         clear[1:-1, 1:-1] &= clear[:-2, 1:-1] & clear[2:, 1:-1] & clear[1:-1, :-2] & clear[1:-1, 2:]
     assert view[..., 0][clear].max() < 0.02  # what has less than a fiftieth of the other side keeps its colour
     # The disc's area: its rim's 94 pixels err by 0.14 r.m.s. each, as above, and as it is round, independently:
-    # their mean by 0.015. Four times that, and the fiftieth of what keeps its colour, make 0.08 of a pixel all along.
+    # their mean by 0.015. Four times that, and the fiftieth of what keeps its colour, make 0.08 of a pixel.
     assert view[..., 0].sum() == pytest.approx(math.pi * 15**2, abs=0.08 * 2 * math.pi * 15)
 
 
