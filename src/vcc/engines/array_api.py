@@ -23,6 +23,9 @@ from vcc.plan.footprints.shares import reach_in_pixels, shares
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
 
+copies = True
+"""Samples are converted as a whole; see `vcc.plan.protocol.Engine`."""
+
 
 def footprints(
     core: Footprints, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None

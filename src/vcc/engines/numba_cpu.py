@@ -39,6 +39,10 @@ MASK_LINES = 64
 """Lines of a mask that a thread samples at once."""
 
 
+copies = False
+"""Samples are read as they are; see `vcc.plan.protocol.Engine`."""
+
+
 def footprints(
     core: Footprints, values: NDArray[Any], *, beside: int = 0, threads: int, progress: Progress | None = None
 ) -> Partial:

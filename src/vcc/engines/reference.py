@@ -26,6 +26,10 @@ from vcc.plan.rays.model import Rays
 Array = NDArray[np.float64]
 
 
+copies = True
+"""Samples are converted as a whole; see `vcc.plan.protocol.Engine`."""
+
+
 def footprints(
     core: Footprints, values: NDArray[Any], *, beside: int = 0, threads: int, progress: Progress | None = None
 ) -> Partial:

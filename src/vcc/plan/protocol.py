@@ -82,6 +82,8 @@ class Engine(Protocol):
 
     footprints: Runner
     rays: Runner
+    copies: bool
+    """Whether all samples that it is given are converted first, which takes memory."""
 
     def takes(self, values: Any) -> bool:
         """Whether it computes with arrays of this kind."""

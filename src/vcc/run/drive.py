@@ -133,7 +133,7 @@ class Drive:
     def need(self) -> Need:
         """What blocks take of memory."""
         taken = self.engine.memory(self.plan.core, self.channels, self.threads)
-        return Need.of(self.plan, self.samples.grid, taken, self.name != "numba")
+        return Need.of(self.plan, self.samples.grid, taken, self.engine.copies)
 
     @cached_property
     def blocks(self) -> Blocks:
