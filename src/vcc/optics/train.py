@@ -46,12 +46,12 @@ class Stage:
             named = owned(self.faces.pattern, self.element.label)
             object.__setattr__(self, "faces", replace(self.faces, transmission=named))
 
-    @property
+    @cached_property
     def centred(self) -> Affine | None:
         """The affine deflection about the element's own middle, on rays of the camera."""
         return None if self.faces.affine is None else about(self.element.decentre, self.faces.affine)
 
-    @property
+    @cached_property
     def leaving(self) -> Affine:
         """Rays from the entrance plane to just behind this stage, folded as in ``arriving``."""
         return self.arriving if self.centred is None else self.centred @ self.arriving

@@ -34,8 +34,11 @@ def table(seed: int, scatters: Sequence[Scatter], disc: bool) -> NDArray[np.floa
         disc: whether rays are aimed at a disc.
     """
     dimensions = FIRST_COLUMNS + sum(2 + (scatter.weights is not None) for scatter in scatters)
+    first = _first_columns(dimensions, seed, disc)
+    if not scatters:
+        return first
     even = _sobol(dimensions, seed)
-    columns = [even[:, 0], even[:, 1], *(_on_disc(even[:, 2], even[:, 3]) if disc else even[:, 2:4].T)]
+    columns = list(first.T)
     next_one = FIRST_COLUMNS
     for scatter in scatters:
         xi, eta = (even[:, next_one + n] + 2.0 ** -(DIGITS + 1) for n in range(2))  # neither 0 nor 1
@@ -45,7 +48,17 @@ def table(seed: int, scatters: Sequence[Scatter], disc: bool) -> NDArray[np.floa
         if scatter.weights is not None:
             columns.append(even[:, next_one])
             next_one += 1
-    return np.stack(columns, axis=1).astype(np.float32)
+    return np.stack([column.astype(np.float32) for column in columns], axis=1)
+
+
+@lru_cache(maxsize=4)
+def _first_columns(dimensions: int, seed: int, disc: bool) -> NDArray[np.float32]:
+    """Places in the pixel and in the aim, (`TABLE`, `FIRST_COLUMNS`): the same for all cameras, so kept."""
+    even = _sobol(dimensions, seed)
+    aim = _on_disc(even[:, 2], even[:, 3]) if disc else even[:, 2:4].T
+    columns = np.stack([even[:, 0], even[:, 1], *aim], axis=1).astype(np.float32)
+    columns.flags.writeable = False
+    return columns
 
 
 @lru_cache(maxsize=4)
