@@ -39,11 +39,6 @@ def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Pr
     return traced(core, values, False, beside, progress)
 
 
-def takes(values: Any) -> bool:
-    """Those of any library that follows the standard, NumPy's too."""
-    return True
-
-
 def prepared(before: Sequence[operators.Before], values: Any, threads: int) -> Any:
     """Samples as a core takes them."""
     for operator in before:

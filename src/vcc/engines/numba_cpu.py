@@ -63,11 +63,6 @@ def rays(
     return rays_compiled.traced(core, values, beside, threads, progress)
 
 
-def takes(values: Any) -> bool:
-    """NumPy's."""
-    return values is None or isinstance(values, np.ndarray)
-
-
 def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:
     """Samples as a core takes them: what is sharpened is so by compiled loops, to the bit as plainly."""
     for operator in before:

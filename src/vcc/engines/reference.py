@@ -56,11 +56,6 @@ def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Pr
     return traced(core, values, True, beside, progress)
 
 
-def takes(values: Any) -> bool:
-    """NumPy's."""
-    return values is None or isinstance(values, np.ndarray)
-
-
 def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:
     """Samples as a core takes them, sharpened in double precision."""
     for operator in before:

@@ -103,12 +103,6 @@ class Plan(Value):
             block = operator.block(block)
         return block
 
-    def prepared(self, values: Any) -> Any:
-        """Samples as the core takes them."""
-        for operator in self.before:
-            values = operator.apply(values)
-        return values
-
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
         """The type that samples of a NumPy type have in memory, and what a number of theirs stands for."""
         factor = 1.0

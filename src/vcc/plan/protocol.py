@@ -85,10 +85,6 @@ class Engine(Protocol):
     copies: bool
     """Whether all samples that it is given are converted first, which takes memory."""
 
-    def takes(self, values: Any) -> bool:
-        """Whether it computes with arrays of this kind."""
-        ...
-
     def prepared(self, before: Sequence[Any], values: Any, threads: int) -> Any:
         """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it."""
         ...
