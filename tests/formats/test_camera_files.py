@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from small_views import moving_texture
+from small_views import moving_texture, png
 
 from vcc.base.errors import InputError, ResultWarning
 from vcc.formats import SparseViews, open_light_field, open_sparse_views, read_geometry, read_ground_truth
@@ -18,6 +18,7 @@ from vcc.light_field import LightField
 Views = NDArray[np.uint8]
 Write = Callable[..., Path]
 GIVEN = {"spacing": 2e-3, "slope_per_pixel": 1e-3, "focus_distance": 1.0}
+DEPTH, PITCH = 3.0, 2e-3  # metres; pixel pitch over focal length
 
 INRIA = """[intrinsics]
 focal_length_mm = 35
@@ -60,24 +61,80 @@ def cambridge(folder: Path, text: str = "cmera: Camera\nnum_x: 4\nnum_y: 3\nbase
     (folder / "param.txt").write_text(text)
 
 
-def test_cambridge(views: Views, folder_of: Write) -> None:
-    folder = folder_of(views, lambda j, i: f"{j:02d}_{i:02d}.png")
-    cambridge(folder)
-    np.save(folder / "disparity.npy", np.full((48, 64), 50.0))
-    info = read_geometry(folder)
-    assert info.spacing == (0.03, 0.02)
+def rendered(path: Path, rows: int, columns: int, base: tuple[float, float]) -> NDArray[np.uint8]:
+    """What the add-on renders of a plane, as its code places its cameras: each pixel looked up where its ray ends.
+
+    Blender's cameras look along −z with x to the right and y upwards. Returns the pictures in the order of a light
+    field, which has the upper left camera first.
+    """
+    texture = np.random.default_rng(7).integers(0, 256, (96, 128), np.uint8)
+    columns_of, rows_of = np.arange(64) - 31.5, np.arange(48) - 23.5
+    views = np.empty((rows, columns, 48, 64), np.uint8)
+    for s, t in np.ndindex(rows, columns):
+        x = -base[1] * (2 * t / (columns - 1) - 1) if columns > 1 else 0.0
+        y = base[0] * (2 * s / (rows - 1) - 1) if rows > 1 else 0.0
+        right = x + DEPTH * PITCH * columns_of
+        up = y - DEPTH * PITCH * rows_of[:, None]
+        along = np.rint(right / (DEPTH * PITCH) + 63.5).astype(int)
+        down = np.rint(47.5 - up / (DEPTH * PITCH)).astype(int)
+        picture = texture[down, along]
+        (path / f"{s:02}_{t:02}.png").write_bytes(png(picture))
+        views[rows - 1 - s, columns - 1 - t] = picture
+    return views
+
+
+def test_cambridge(tmp_path: Path) -> None:
+    """5 views of a row 4 steps of 2 pixels wide: base, half of that, is 4 pixels' worth of parallax."""
+    base = (2 * DEPTH * PITCH, 4 * DEPTH * PITCH)
+    views = rendered(tmp_path, 3, 5, base)
+    cambridge(tmp_path, f"cmera: Camera\nnum_x: 5\nnum_y: 3\nbase_x: {base[1]}\nbase_y: {base[0]}\n")
+    # The add-on: focal length · base_x · pixels / (sensor width · depth)
+    np.save(tmp_path / "disparity.npy", np.full((48, 64), base[1] / (PITCH * DEPTH)))
+    np.testing.assert_array_equal(views[1, 1, :, 2:], views[1, 2, :, :-2])  # what is at x is 2 pixels left, one on
+    np.testing.assert_array_equal(views[1, 1, 2:], views[2, 1, :-2])
+    info = read_geometry(tmp_path)
+    assert info.spacing == pytest.approx((base[0], base[1] / 2))
     assert info.focus_distance == math.inf
     assert info.unknown == ("slope_per_pixel",)
-    truth = read_ground_truth(folder).disparity
+    with pytest.warns(ResultWarning, match="rows and columns of views was reversed, because the positions"):
+        field = open_light_field(tmp_path, transfer="linear", slope_per_pixel=PITCH)
+    np.testing.assert_array_equal(field.values, views)
+    assert field.distance_of(2.0) == pytest.approx(DEPTH)
+    truth = read_ground_truth(tmp_path).disparity
     assert truth is not None
-    np.testing.assert_allclose(truth, 1.0)  # 50 pixels a metre, 0.02 m
+    np.testing.assert_allclose(truth, 2.0)
+
+
+def test_a_single_view_of_cambridge(tmp_path: Path) -> None:
+    cambridge(tmp_path, "num_x: 1\nnum_y: 1\nbase_x: 1\nbase_y: 1\n")
+    np.save(tmp_path / "disparity.npy", np.ones((48, 64)))
+    with pytest.raises(InputError, match="one view has no disparity"):
+        read_ground_truth(tmp_path)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(3, 1), (1, 3)])
+def test_one_row_or_column_of_cambridge(rows: int, columns: int, tmp_path: Path) -> None:
+    base = 2 * DEPTH * PITCH
+    views = rendered(tmp_path, rows, columns, (base, base))
+    cambridge(tmp_path, f"num_x: {columns}\nnum_y: {rows}\nbase_x: {2 * base}\nbase_y: {base}\n")
+    np.save(tmp_path / "disparity.npy", np.full((48, 64), 2 * base / (PITCH * DEPTH)))
+    info = read_geometry(tmp_path)
+    # With n = 3 neighbours are base apart: along the only axis there is.
+    assert info.spacing == pytest.approx((base, base) if columns == 1 else (2 * base, 2 * base))
+    with pytest.warns(ResultWarning, match="because the positions"):
+        field = open_light_field(tmp_path, transfer="linear", slope_per_pixel=PITCH)
+    np.testing.assert_array_equal(field.values, views)
+    np.testing.assert_allclose(read_ground_truth(tmp_path).disparity, 2.0 if columns == 1 else 4.0)
 
 
 def test_parallel_cameras_see_no_negative_disparity(views: Views, folder_of: Write) -> None:
-    """Blender's add-on counts its cameras from the lower right; parallel ones can only be so."""
-    folder = folder_of(views[::-1, ::-1], lambda j, i: f"{j:02d}_{i:02d}.png")
+    """Files that somebody has already put in order: counted from the upper left, whatever the add-on does."""
+    folder = folder_of(views, lambda j, i: f"{j:02d}_{i:02d}.png")
     cambridge(folder)
-    with pytest.warns(ResultWarning, match="stated to be parallel.*all negative.*was reversed"):
+    with (
+        pytest.warns(ResultWarning, match="stated to be parallel.*all negative.*was reversed"),
+        pytest.warns(ResultWarning, match="because the positions that the files state"),
+    ):
         field = open_light_field(folder, transfer="linear", slope_per_pixel=1e-3)
     np.testing.assert_array_equal(field.values, views)
 

@@ -67,7 +67,7 @@ def towards_positions(grid: ViewGrid) -> tuple[ViewGrid, str]:
     files = tuple(row[:: directions[1]] for row in grid.files[:: directions[0]])
     axes = " and ".join(name for name, way in zip(("rows", "columns"), directions, strict=True) if way < 0)
     remark = (
-        f"the order of the {axes} of views was reversed, because the positions in the names of the files run the "
+        f"the order of the {axes} of views was reversed, because the positions that the files state run the "
         'other way. To take them as they are, pass orientation="as-is"'
     )
     return replace(grid, files=files, geometry=replace(grid.geometry, directions=(1, 1))), remark
@@ -109,7 +109,7 @@ def _with_cameras(grid: ViewGrid, folder: Path) -> ViewGrid:
             return replace(grid, geometry=named)
     shape, geometry, where = hci.read_grid_shape(folder), hci.read_geometry(folder), hci.parameters_file(folder)
     if geometry is None and (stated := cambridge.read_parameters(folder)) is not None:
-        (shape, geometry), where = stated, folder / cambridge.PARAMETERS
+        shape, geometry, where = stated.views, stated.geometry, folder / cambridge.PARAMETERS
     if geometry is None or shape is None or where is None:
         return grid
     if shape != grid.shape:

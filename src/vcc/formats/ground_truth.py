@@ -46,7 +46,7 @@ def read_ground_truth(path: str | PathLike[str]) -> GroundTruth:
     HCI 2016                      ``gt_disp_lowres.pfm``, ``gt_depth_lowres.pfm``; with ``_CamNNN`` for each view
     HCI 2013                      ``/GT_DEPTH`` of ``lf.h5``
     INRIA                         ``disparity_<row>_<col>.npy`` for each view
-    Cambridge                     ``disparity.npy`` for views a metre apart, times base_x of ``param.txt``
+    Cambridge                     ``disparity.npy`` for views base_x apart, brought to the spacing of the views
     any                           a ``.pfm`` or ``.npy`` file, whose name tells which it is ("disp", "depth")
     ============================  ================================================================================
 
@@ -127,10 +127,11 @@ def _of_cambridge(folder: Path) -> GroundTruth | None:
     stated = cambridge.read_parameters(folder)
     if stated is None or not path.is_file():
         return None
-    spacing = stated[1].spacing
-    assert spacing is not None
-    # The file is for views one unit apart; these are base_x apart.
-    return GroundTruth(path.name, (_map(path) * np.float32(spacing[1])).astype(np.float32))
+    if stated.spacing is None:
+        raise InputError(f"{folder / cambridge.PARAMETERS} states one view, and one view has no disparity")
+    # The file is for two views base_x apart, which is half the width of all of them.
+    steps = stated.spacing[1] / stated.base[1]
+    return GroundTruth(path.name, (_map(path) * np.float32(steps)).astype(np.float32))
 
 
 def _stacked(files: dict[tuple[int, int], Path], shape: tuple[int, int]) -> NDArray[np.float32]:
