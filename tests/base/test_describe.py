@@ -1,15 +1,20 @@
 """Parameters in words: units that read well, and nothing longer than a line."""
 
+import importlib
+import inspect
 import math
-from dataclasses import dataclass, field
+import pkgutil
+import re
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 import numpy as np
 import pytest
 
 import vcc
-from vcc.base.describe import parameters_in_words
+from vcc.base.describe import in_brief, parameters_in_words
 from vcc.base.units import deg, mm, um
+from vcc.recover import focal_stack
 
 
 @dataclass(frozen=True)
@@ -90,3 +95,40 @@ def test_every_element_fits_a_line_of_a_wide_terminal():
     assert "rotation 1°" in elements[0].described()
     assert "9 numbers from 1 mm to 2 mm" in elements[0].described()
     assert "rotation 12.3457°" in elements[6].described()
+
+
+def dataclasses_with_arrays():
+    """Each dataclass of the package whose fields name arrays in their types."""
+    for module in pkgutil.walk_packages(vcc.__path__, "vcc."):
+        if module.name.endswith("__main__") or module.name.startswith(("vcc.cli", "vcc.gallery", "vcc.demo")):
+            continue
+        for each in vars(importlib.import_module(module.name)).values():
+            here = inspect.isclass(each) and each.__module__ == module.name and is_dataclass(each)
+            types = " ".join(str(part.type) for part in fields(each) if part.repr) if here else ""
+            if re.search(r"NDArray|\bArrays?\b", types) and "Callable" not in types and each.__name__[0] != "_":
+                yield each
+
+
+def test_nothing_that_holds_arrays_prints_them():
+    """What `dataclass` writes by itself prints every array in full."""
+    walls = [each.__qualname__ for each in dataclasses_with_arrays() if hasattr(each.__repr__, "__wrapped__")]
+    assert walls == []
+
+
+def test_long_values_are_told_in_brief():
+    stack = focal_stack(
+        vcc.LightField.from_views(
+            np.random.default_rng(3).random((3, 3, 24, 28, 3), np.float32), spacing=2e-3, slope_per_pixel=0.01
+        ),
+        [1.0, 2.0],
+    )
+    assert repr(stack).startswith("FocalStack(pictures=<2×24×28×3 float32 from ")
+    assert repr(stack).endswith("distances=(1.0, 2.0), frame=<Affine>)")
+    assert len(repr(stack)) < 300
+    assert len(repr(stack.all_in_focus())) < 400
+    assert in_brief(np.arange(3)) == "<3 int64 from 0 to 2>"
+    assert in_brief(np.float64(2)) == "np.float64(2.0)"
+    assert in_brief((1, np.zeros((0, 2)))) == "(1, <0×2 float64>)"
+    assert in_brief(list(range(7))) == "<7 of int>"
+    assert in_brief({"a": [1, "b"]}) == "{'a': [1, 'b']}"
+    assert in_brief((5,)) == "(5,)"

@@ -8,7 +8,6 @@ import textwrap
 from vcc.advice import explain_footprints, explain_rays, explain_store
 from vcc.advice.limits import sampling_limits
 from vcc.advice.words import in_words
-from vcc.base.units import short
 from vcc.fields.grid import SAMPLES_IN_WORDS, Grid
 from vcc.fields.samples import Samples
 from vcc.optics.train import Train
@@ -76,11 +75,6 @@ def _wrapped(text: str) -> str:
     return "\n".join(lines)
 
 
-def _place(z: float) -> str:
-    """The beginning of an element's line."""
-    return f"  z = {z * 1e3:9.6g} mm  "
-
-
 def _what(train: Train, grid: Grid) -> str:
     nv, nu, nt, ns = grid.shape[:4]
     lines = [
@@ -88,17 +82,7 @@ def _what(train: Train, grid: Grid) -> str:
         f"{grid.channels or 1} channel{'s' if (grid.channels or 1) > 1 else ''}, "
         f"{grid.kind} {SAMPLES_IN_WORDS[grid.sample]}; {grid.geometry}"
     ]
-    lines += [
-        f"{_place(element.z)}{element.kind}"
-        + (f' "{element.name}"' if element.name else "")
-        + (f", {element.described()}" if element.described() else "")
-        for element in train.elements
-    ]
-    rows, columns = train.sensor.shape
-    vertical, horizontal = train.sensor.pitches
-    pitch = short(vertical) if vertical == horizontal else f"{short(vertical)} × {short(horizontal)}"
-    lines.append(f"{_place(train.sensor.z)}sensor, {rows}×{columns} pixels of {pitch}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *train.listed()])
 
 
 def _limits(train: Train, grid: Grid, scene_distance: float | None) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.plan.parallax_rule import index_motions
 
 Array = NDArray[np.float64]
@@ -21,8 +22,8 @@ ROUNDING = 1e-9
 """Of a limit: what differs from it by less is at it."""
 
 
-@dataclass(frozen=True, eq=False)
-class ViewGaps:
+@dataclass(frozen=True, eq=False, repr=False)
+class ViewGaps(Brief):
     """How far apart on the sensor neighbouring views' pictures of a point are, by the point's distance.
 
     Args:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.analysis.deblurring import checked_power, expected_deblurring_error
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 
@@ -18,8 +19,8 @@ _BATCH = 2**22
 """Numbers in the kernels that are transformed together: 16 MiB in single precision."""
 
 
-@dataclass(frozen=True, eq=False)
-class OptimisedAperture:
+@dataclass(frozen=True, eq=False, repr=False)
+class OptimisedAperture(Brief):
     """The best pattern that a search met, and how it went.
 
     Args:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.optics import Scatter
 from vcc.optics.train import Stage, Train
@@ -37,8 +38,8 @@ NEARBY = 1e-3
 """Of a cell: how far from its middle the rays go that measure its box on the sensor."""
 
 
-@dataclass(frozen=True, eq=False)
-class Spot:
+@dataclass(frozen=True, eq=False, repr=False)
+class Spot(Brief):
     """Where light falls: places on the sensor (n, 2), widths of boxes (n, 2), weights (n,)."""
 
     places: Array

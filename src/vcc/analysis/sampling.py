@@ -26,7 +26,7 @@ COLUMNS = 100
 """Into which an advice's lines fit."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SamplingAdvice(SamplingLimits):
     """Limits of sampling, of paraxial optics and of diffraction, of one camera and one light field.
 
@@ -56,6 +56,9 @@ class SamplingAdvice(SamplingLimits):
     def plot(self) -> Figure:
         """Draw disparity and blur over distance, with the range free of ghosts, and bars of all lengths."""
         return plot_sampling(self)
+
+    def __repr__(self) -> str:
+        return str(self)
 
     def __str__(self) -> str:
         lines = [f"Light field: {self.light_field}", _capital(self.range_in_words())]

@@ -39,6 +39,45 @@ def parameters_in_words(thing: Any, leave_out: tuple[str, ...] = ()) -> str:
     return ", ".join(parts)
 
 
+class Brief:
+    """A base of dataclasses (``repr=False``) whose arrays and long lists are told by shape and range."""
+
+    def __repr__(self) -> str:
+        shown = (part for part in fields(self) if part.repr)  # type: ignore[arg-type]
+        values = ", ".join(f"{part.name}={in_brief(getattr(self, part.name))}" for part in shown)
+        return f"{type(self).__name__}({values})"
+
+
+def in_brief(value: Any) -> str:
+    """A value as Python shows it, but for arrays and long lists, of which shape, type and range are told.
+
+    Args:
+        value: of any type. Arrays of any library are known by their ``shape`` and ``dtype``.
+    """
+    shape, kind = getattr(value, "shape", None), getattr(value, "dtype", None)
+    if isinstance(value, np.ndarray) and value.ndim:
+        low_high = ""
+        if value.size and value.dtype.kind in "biuf":
+            # A quick look does not go through gigabytes.
+            low_high = f" from {value.min():.4g} to {value.max():.4g}" if value.size <= 10**7 else ""
+        return f"<{'×'.join(map(str, value.shape))} {value.dtype}{low_high}>"
+    if isinstance(shape, tuple) and kind is not None and shape:
+        return f"<{'×'.join(map(str, shape))} {kind}>"
+    if isinstance(value, tuple | list) and len(value) > LONGEST_LIST:
+        return f"<{len(value)} of {type(value[0]).__name__}>"
+    if isinstance(value, tuple) and type(value) is tuple and value:
+        inside = ", ".join(map(in_brief, value))
+        return f"({inside},)" if len(value) == 1 else f"({inside})"
+    if isinstance(value, list):
+        return f"[{', '.join(map(in_brief, value))}]"
+    if isinstance(value, dict):
+        if len(value) > LONGEST_LIST:
+            return f"<dictionary of {len(value)}>"
+        return "{" + ", ".join(f"{key!r}: {in_brief(each)}" for key, each in value.items()) + "}"
+    text = repr(value)
+    return text if "\n" not in text else f"<{type(value).__name__}>"  # a table of its own has no room in a line
+
+
 def kind_in_words(kind: type, gap: str = " ") -> str:
     """The name of a class in small letters: ``"lens array"`` for LensArray.
 

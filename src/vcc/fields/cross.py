@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Block, Grid, axes_agree
 from vcc.fields.parallax import Axis
@@ -37,8 +38,8 @@ class Views(Protocol):
         """The samples of a block, (v, u, t, s[, channels])."""
 
 
-@dataclass(frozen=True, eq=False)
-class Arm:
+@dataclass(frozen=True, eq=False, repr=False)
+class Arm(Brief):
     """The middle row of views or the middle column, as views are compared with one another.
 
     Args:

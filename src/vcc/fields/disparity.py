@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.fields.sampled import as_slice
@@ -21,8 +22,8 @@ OUTERMOST = 0.5
 """Per cent of a map's pixels at either end of its disparities that their range leaves out: what errs, errs far."""
 
 
-@dataclass(frozen=True, eq=False)
-class DisparityMaps:
+@dataclass(frozen=True, eq=False, repr=False)
+class DisparityMaps(Brief):
     """Maps of the disparities that some views of a light field show.
 
     Args:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 
 Axis = Literal["u", "v"]
@@ -40,8 +41,8 @@ _CLEAR_FAULT = 0.7  # and wrong: a wrong alarm would do harm to good data
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
-@dataclass(frozen=True, eq=False)
-class BlockDisparities:
+@dataclass(frozen=True, eq=False, repr=False)
+class BlockDisparities(Brief):
     """The disparities of blocks of the central view along one view axis.
 
     Args:

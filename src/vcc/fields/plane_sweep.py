@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.checks import above_zero
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
 from vcc.base.progress import Progress, tell
@@ -36,8 +37,8 @@ _TRUNCATION = 0.02  # of full scale, likewise: a difference that is no match, wh
 _SOFTNESSES = 9  # fractions of a pixel in sixteenths, up to a half
 
 
-@dataclass(frozen=True, eq=False)
-class Swept:
+@dataclass(frozen=True, eq=False, repr=False)
+class Swept(Brief):
     """What a sweep finds.
 
     Args:

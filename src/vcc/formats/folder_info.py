@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Sample, pair
 from vcc.files.pictures import read_picture
@@ -16,8 +17,8 @@ from vcc.formats.grid import DEFAULT_SPACING, Decoded, Geometry, ViewGrid
 from vcc.formats.hci import parameters_file
 
 
-@dataclass(frozen=True)
-class FolderInfo:
+@dataclass(frozen=True, repr=False)
+class FolderInfo(Brief):
     """What a folder of views, or a file with a light field, holds.
 
     Args:

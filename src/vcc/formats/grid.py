@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.base.words import first_few
@@ -67,8 +68,8 @@ class Geometry:
     sample: Sample = "mean"
 
 
-@dataclass(frozen=True, eq=False)
-class Decoded:
+@dataclass(frozen=True, eq=False, repr=False)
+class Decoded(Brief):
     """What one file (or a folder that is one thing) holds, before it is made a light field.
 
     Args:
@@ -108,8 +109,8 @@ def weights_apart(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.float3
     return values[..., :-1], values[..., -1].astype(np.float32) / np.float32(whole)
 
 
-@dataclass(frozen=True)
-class ViewGrid:
+@dataclass(frozen=True, repr=False)
+class ViewGrid(Brief):
     """A grid of views.
 
     Args:

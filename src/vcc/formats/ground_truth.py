@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.files.pfm import read_pfm
 from vcc.formats import cambridge, containers, hci
@@ -22,8 +23,8 @@ _PER_VIEW = re.compile(r"(disparity|depth)_(\d+)_(\d+)\.npy")
 _HCI_QUANTITY: dict[str, Quantity] = {"disp": "disparity", "depth": "depth"}
 
 
-@dataclass(frozen=True, eq=False)
-class GroundTruth:
+@dataclass(frozen=True, eq=False, repr=False)
+class GroundTruth(Brief):
     """What is true of each pixel, as far as files state it.
 
     Args:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.formats.grid import Decoded
 from vcc.formats.lytro_container import Container, begins_as_container, stated_at
@@ -70,8 +71,8 @@ class LytroGeometry:
     exit_pupil_distance: float | None = field(default=None, metadata={"unit": "length"})
 
 
-@dataclass(frozen=True, eq=False)
-class LytroRaw:
+@dataclass(frozen=True, eq=False, repr=False)
+class LytroRaw(Brief):
     """A raw recording of a Lytro camera: numbers proportional to light, one colour a pixel, behind microlenses.
 
     Args:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.words import first_few
 from vcc.fields.grid import Grid, Sample
@@ -16,8 +17,8 @@ from vcc.fields.sampled import as_slice
 from vcc.light_field import LightField
 
 
-@dataclass(frozen=True, eq=False)
-class SparseViews:
+@dataclass(frozen=True, eq=False, repr=False)
+class SparseViews(Brief):
     """Some of the views of a grid, each in its place.
 
     ``views[4, :]`` is the light field of a row that is complete, ``views[2:5, 3:6]`` that of a part; a part with

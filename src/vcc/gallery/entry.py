@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vcc.base.describe import Brief
 from vcc.base.progress import Progress as Progress
 from vcc.light_field import LightField
 from vcc.showcase.bench import Bench, built_in, from_someone
@@ -85,8 +86,8 @@ class Finding:
         return f"{self.value:.3g} {self.unit}".strip()
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Brief):
     """What came of a run.
 
     Args:

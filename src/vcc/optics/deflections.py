@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.shapes.lattice import Lattice
 
@@ -40,8 +41,8 @@ class Deflection(abc.ABC):
         return None
 
 
-@dataclass(frozen=True, eq=False)
-class CellDeflection(Deflection):
+@dataclass(frozen=True, eq=False, repr=False)
+class CellDeflection(Brief, Deflection):
     """Each cell of a lattice a lens and a prism of its own: Δs = −(x − x_cell)/f_cell + δs_cell.
 
     Cell (row, column) takes entry (row mod rows, column mod columns) of the tables.
@@ -90,8 +91,8 @@ class CellDeflection(Deflection):
         return float(s), float(t)
 
 
-@dataclass(frozen=True, eq=False)
-class FacetDeflection(Deflection):
+@dataclass(frozen=True, eq=False, repr=False)
+class FacetDeflection(Brief, Deflection):
     """Plane facets that meet in the middle: rays in the sector around a direction are bent by its slopes.
 
     Args:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.base.values import Value
@@ -19,8 +20,8 @@ from vcc.shapes.patterns import Bounded, Circle, Open, Pattern
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Diffuser(Element):
+@dataclass(frozen=True, repr=False)
+class Diffuser(Brief, Element):
     """A diffuser that scatters light alike wherever it is hit.
 
     L'(u, v, s, t) = ∫∫ D(δs, δt) L(u, v, s − δs, t − δt) dδs dδt: a ray keeps its place and leaves with its
@@ -89,8 +90,8 @@ class Diffuser(Element):
         return Faces(transmission=rim, scatter=self.kernel)
 
 
-@dataclass(frozen=True, eq=False)
-class CodedDiffuser(Value, Element):
+@dataclass(frozen=True, eq=False, repr=False)
+class CodedDiffuser(Brief, Value, Element):
     """A diffuser whose kernel varies over its surface: D(δs, δt | u, v) (paper, eq. 6).
 
     D(δ | u, v) = Σₙ weightₙ(u, v) · Dₙ(δ / w(u, v)) / w(u, v)²: kernels mixed by weights, stretched by w.

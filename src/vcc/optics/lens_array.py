@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
-from vcc.base.describe import parameters_in_words
+from vcc.base.describe import Brief, parameters_in_words
 from vcc.base.errors import InputError
 from vcc.base.values import Value
 from vcc.optics.deflections import CellDeflection
@@ -21,8 +21,8 @@ LARGEST_DISC = {"square": math.pi / 4, "hexagonal": math.pi / (2 * math.sqrt(3))
 """The share of a cell that the largest disc in it covers."""
 
 
-@dataclass(frozen=True)
-class LensArray(Element):
+@dataclass(frozen=True, repr=False)
+class LensArray(Brief, Element):
     """A sheet of equal lenslets side by side, on a square or hexagonal lattice, of one or several focal lengths.
 
     Within a cell centred at c the deflection is that of a thin lens: Δs = −(x − c)/f. With the sensor f behind,
@@ -144,8 +144,8 @@ class LensArray(Element):
         return 1.0 if self.fill_factor is None else min(math.sqrt(self.fill_factor / largest), 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class PrismArray(Value, Element):
+@dataclass(frozen=True, eq=False, repr=False)
+class PrismArray(Brief, Value, Element):
     """So many rows and columns of prisms side by side, each of its own deflection, opaque around them.
 
     With a focal length, each cell is a lens too: the lens-prism array with which Georgiev and Intwala (2006) take

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.units import short
 from vcc.base.values import Value
 from vcc.optics.faces import Element, Faces
 from vcc.optics.sensor import Sensor
@@ -87,6 +88,11 @@ def touch(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-12)
 
 
+def _place(z: float) -> str:
+    """The beginning of an element's line."""
+    return f"  z = {z * 1e3:9.6g} mm  "
+
+
 def _order(one: Element, other: Element) -> int:
     """−1 where light meets ``one`` first, 1 where ``other``: by z, and in one plane what is thin first."""
     difference = one.length - other.length if touch(one.z, other.z) else one.z - other.z
@@ -104,7 +110,7 @@ def about(middle: tuple[float, float], ray_map: Affine) -> Affine:
     return Affine.translation(x, y, 0, 0) @ ray_map @ Affine.translation(-x, -y, 0, 0)
 
 
-@dataclass(frozen=True, init=False, eq=False)
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Train(Value):
     """Elements along an axis and a sensor behind them: all that is true of a camera without computing a picture.
 
@@ -173,6 +179,22 @@ class Train(Value):
                 approach, leaving = Affine.identity(), stages[-1].leaving
             here += element.length
         return tuple(stages), Affine.propagation(_distance(here, self.sensor.z)) @ approach
+
+    def listed(self) -> list[str]:
+        """The elements in order and the sensor, a line each: place, kind, name and parameters."""
+        lines = []
+        for element in self.elements:
+            name, parameters = f' "{element.name}"' if element.name else "", element.described()
+            lines.append(f"{_place(element.z)}{element.kind}{name}" + (f", {parameters}" if parameters else ""))
+        rows, columns = self.sensor.shape
+        vertical, horizontal = self.sensor.pitches
+        pitch = short(vertical) if vertical == horizontal else f"{short(vertical)} × {short(horizontal)}"
+        return [*lines, f"{_place(self.sensor.z)}sensor, {rows}×{columns} pixels of {pitch}"]
+
+    def __repr__(self) -> str:
+        count = len(self.elements)
+        head = f"{type(self).__name__} of {count} element{'s' if count != 1 else ''} and a sensor"
+        return "\n".join([head, *self.listed()])
 
     @property
     def stages(self) -> tuple[Stage, ...]:

@@ -16,6 +16,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.fields.sampled import to_dtype
@@ -101,8 +102,8 @@ class SwapPixelAxes(Value):
         return kind, 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class BlurViews(Value):
+@dataclass(frozen=True, eq=False, repr=False)
+class BlurViews(Brief, Value):
     """Each view convolved with a kernel, a diffuser at the views; it grows by half the kernel on each side.
 
     Args:
@@ -253,8 +254,8 @@ than they were rounded, with room for values 4 times the range (the filter's are
 # --- after ---
 
 
-@dataclass(frozen=True, eq=False)
-class AlongAxes(Value):
+@dataclass(frozen=True, eq=False, repr=False)
+class AlongAxes(Brief, Value):
     """The raster filtered along its columns and along its rows, dark beyond its border.
 
     Args:
@@ -293,8 +294,8 @@ class AlongAxes(Value):
         return AlongAxes(np.convolve(self.down, other.down), np.convolve(self.across, other.across), words)
 
 
-@dataclass(frozen=True, eq=False)
-class Blur(Value):
+@dataclass(frozen=True, eq=False, repr=False)
+class Blur(Brief, Value):
     """The raster convolved with a kernel, dark beyond its border.
 
     Args:
@@ -325,8 +326,8 @@ class Blur(Value):
         return without_rounding(wide)
 
 
-@dataclass(frozen=True, eq=False)
-class OnSensor(Value):
+@dataclass(frozen=True, eq=False, repr=False)
+class OnSensor(Brief, Value):
     """The sensor's part of the raster, through what lies against the sensor.
 
     Args:

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.checks import above_zero
+from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class BetweenViews:
+@dataclass(frozen=True, repr=False)
+class BetweenViews(Brief):
     """The choice made.
 
     Args:

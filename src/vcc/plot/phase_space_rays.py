@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
 from vcc.fields.samples import InMemory
@@ -44,8 +45,8 @@ LARGEST_GRID = 2000
 """Cells a side of a slice across coordinates that the samples' grid does not run along."""
 
 
-@dataclass(frozen=True, eq=False)
-class PhaseSpacePicture:
+@dataclass(frozen=True, eq=False, repr=False)
+class PhaseSpacePicture(Brief):
     """A slice of a light field in two of its coordinates, at one plane.
 
     Args:
@@ -75,8 +76,8 @@ class PhaseSpacePicture:
         return float((values * self.filled).sum() * cell)
 
 
-@dataclass(frozen=True, eq=False)
-class Sheet:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sheet(Brief):
     """A 2-D slice at the entrance plane, in cells: the ray of place (a, b) is origin + a·first + b·second.
 
     Cell (n, m) reaches from (n, m) to (n + 1, m + 1).

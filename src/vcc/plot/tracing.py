@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.optics import Element, Faces, Scatter
 from vcc.optics.train import Stage, Train, about
 from vcc.shapes.kernels import Kernel
@@ -25,8 +26,8 @@ BINS = 257
 """Into which the reach of a kernel is divided to find its quantiles."""
 
 
-@dataclass(frozen=True, eq=False)
-class Paths:
+@dataclass(frozen=True, eq=False, repr=False)
+class Paths(Brief):
     """Where rays cross planes, and what is left of them.
 
     Args:

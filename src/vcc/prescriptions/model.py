@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import short
 from vcc.optics.first_order import FirstOrder, gap, refraction, surface_power
@@ -45,8 +46,8 @@ class Surface:
     number: int = 0
 
 
-@dataclass(frozen=True)
-class Prescription:
+@dataclass(frozen=True, repr=False)
+class Prescription(Brief):
     """The surfaces of a lens in air, in the order in which light meets them.
 
     Its first-order figures are those of `first_order`, which is what a camera takes: focal length, principal

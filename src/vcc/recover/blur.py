@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.checks import one_of
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
 from vcc.recover.recorded import numbers_of
@@ -30,8 +31,8 @@ SUM_TOLERANCE = 1e-6
 """How far from 1 a PSF, or the masks of a pixel, may sum to."""
 
 
-@dataclass(frozen=True, eq=False)
-class Blur:
+@dataclass(frozen=True, eq=False, repr=False)
+class Blur(Brief):
     """K and its adjoint by FFT, on a domain that holds all that can reach the recording.
 
     With periodic borders the domain is the recording itself. With unknown ones it is larger by the PSF, and only

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.recover.blur import Blur, Borders, channels_first, channels_last
@@ -35,8 +36,8 @@ _MISFIT = 0.05
 """Of the recording's contrast, how far a layer's PSF is wrong for other layers: only for where a solver starts."""
 
 
-@dataclass(frozen=True, eq=False)
-class Deblurred:
+@dataclass(frozen=True, eq=False, repr=False)
+class Deblurred(Brief):
     """What a solver found, and how it ended.
 
     Args:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.memory import check_memory
 from vcc.camera import Camera
@@ -37,8 +38,8 @@ _FINER = 4  # frequencies between those of a block, where expected spectra are c
 _SMALLEST_CHANGE = 0.01  # pixels by which the radii of neighbouring kernels must differ
 
 
-@dataclass(frozen=True, eq=False)
-class DefocusDepth:
+@dataclass(frozen=True, eq=False, repr=False)
+class DefocusDepth(Brief):
     """The distances of the blocks of a picture.
 
     Args:

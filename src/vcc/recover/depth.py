@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.checks import above_zero
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
 from vcc.base.progress import Progress
@@ -45,8 +46,8 @@ _SMOOTHING = (3 / 16, 10 / 16, 3 / 16)
 _ALIASED = np.float32(1e3)  # larger than the energy of any derivative
 
 
-@dataclass(frozen=True, eq=False)
-class DepthMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class DepthMap(Brief):
     """Where what each pixel of one view shows is.
 
     Args:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory, check_samples
 from vcc.base.progress import Progress, tell
@@ -31,8 +32,8 @@ _NOTHING_SHARP = 1e-12
 """Sharpness relative to the picture's power below which there is no detail to choose by: all pictures count."""
 
 
-@dataclass(frozen=True, eq=False)
-class AllInFocus:
+@dataclass(frozen=True, eq=False, repr=False)
+class AllInFocus(Brief):
     """What is sharp in any picture of a focal stack.
 
     Args:
@@ -48,8 +49,8 @@ class AllInFocus:
     sharpness: NDArray[np.float32]
 
 
-@dataclass(frozen=True, eq=False)
-class FocalStack:
+@dataclass(frozen=True, eq=False, repr=False)
+class FocalStack(Brief):
     """Pictures of one scene from one place, each focused on another distance.
 
     Args:

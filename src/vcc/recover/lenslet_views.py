@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
 from vcc.recover.lenslet_grid import LensletGrid
@@ -19,8 +20,8 @@ Whole = NDArray[np.int64]
 _ON_A_LENSLET = 1e-6  # of a step: what rounding leaves beside a lenslet is on it
 
 
-@dataclass(frozen=True, eq=False)
-class LensletViews:
+@dataclass(frozen=True, eq=False, repr=False)
+class LensletViews(Brief):
     """From micro-images to the pixels of a view: which three or four each pixel lies between, and how near.
 
     Args:

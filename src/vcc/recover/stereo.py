@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.camera import Camera
 from vcc.image import Image
@@ -27,8 +28,8 @@ _REFINEMENTS = 6
 _AHEAD = 0.05  # correlation by which the best match leads the next one, where it is trusted in full
 
 
-@dataclass(frozen=True, eq=False)
-class StereoDepth:
+@dataclass(frozen=True, eq=False, repr=False)
+class StereoDepth(Brief):
     """The distances of blocks of the half picture on the right of the sensor (x > 0, as light lands).
 
     Args:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.optics.electronics import Electronics
 from vcc.run.expose import checked_exposure, numbers_of
@@ -18,8 +19,8 @@ _QUANTISATION: Final = 1 / 12
 """Variance of rounding to whole numbers, DN² (EMVA 1288: σ_q²)."""
 
 
-@dataclass(frozen=True, eq=False)
-class PhotonTransfer:
+@dataclass(frozen=True, eq=False, repr=False)
+class PhotonTransfer(Brief):
     """Means and temporal variances of flat fields, and what EMVA 1288 reads from them.
 
     Args:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
-from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
+from vcc.base.describe import Brief, kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
 from vcc.base.values import Value
 from vcc.shapes.kernel_weights import FULL_STEP, axes_of, cells_on_lattice, deposited, refined, separable
@@ -250,8 +250,8 @@ class TopHat(Kernel):
         return (x * x + self.width**2 / 4) / self.width
 
 
-@dataclass(frozen=True)
-class Radial(Kernel):
+@dataclass(frozen=True, repr=False)
+class Radial(Brief, Kernel):
     """A round kernel: a density D(r) that depends on the change of slope r = √(δs² + δt²) only.
 
     Args:

@@ -15,6 +15,7 @@ from functools import cached_property, partial, reduce
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
 from vcc.shapes.patterns import (
@@ -61,8 +62,8 @@ class Shifted(Pattern):
         return self.pattern.mean(x, y, width, height)
 
 
-@dataclass(frozen=True, eq=False)
-class Tiles(Pattern):
+@dataclass(frozen=True, eq=False, repr=False)
+class Tiles(Brief, Pattern):
     """Uniform rectangles of any sizes side by side, opaque outside them: what `Cells` multiply to.
 
     Args:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.files.transfer import to_linear
 
@@ -21,8 +22,8 @@ MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply")
 _COSINE_OF_CREASE = math.cos(math.radians(30))
 
 
-@dataclass(frozen=True, eq=False)
-class Part:
+@dataclass(frozen=True, eq=False, repr=False)
+class Part(Brief):
     """Triangles that share a material, in the array's coordinates."""
 
     corners: NDArray[np.float32]

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.optics.train import Stage, Train
@@ -32,8 +33,8 @@ from vcc.shapes.sheets import clear_over
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Blurs:
+@dataclass(frozen=True, eq=False, repr=False)
+class Blurs(Brief):
     """What the diffusers of a camera come to.
 
     Args:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.shapes.patterns import Cells, Pattern
 from vcc.shapes.sheets import in_one_plane
 
@@ -17,8 +18,8 @@ PARTS_OF_A_CELL = 6
 """Parts each way by which the open part of a view's cell is found."""
 
 
-@dataclass(frozen=True, eq=False)
-class Plane:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plane(Brief):
     """An absorbing element as the samples meet it: place = at_index · (i, j, k, l) + offset, metres.
 
     Places are counted from the element's middle, which stands at ``decentre`` on the axis' plane.
@@ -87,8 +88,8 @@ def tap_origin(at_index: Array, offset: Array, index: Array, shift: Array, motio
     return np.asarray(index @ at_index[:, :2].T + shift @ view_step.T + offset)
 
 
-@dataclass(frozen=True, eq=False)
-class OpenParts:
+@dataclass(frozen=True, eq=False, repr=False)
+class OpenParts(Brief):
     """What of each tap's cell of the aperture is open.
 
     Args:

@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
+
 Array = NDArray[np.float64]
 
 REACH = {"nearest": 0.5, "linear": 1.0, "cubic": 2.0, "spline": 2.0}
@@ -116,8 +118,8 @@ def reach_in_pixels(interpolation: str, size: float) -> float:
     return reach + 1e-6  # a border reached by rounding is looked at, and gets the share that it deserves
 
 
-@dataclass(frozen=True)
-class Taps:
+@dataclass(frozen=True, repr=False)
+class Taps(Brief):
     """Shares as a table by pixel: pixel m gathers ``weights[..., m, n]`` of sample ``first[..., m] + n``.
 
     Args:
@@ -164,8 +166,8 @@ def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: i
     return Taps(first, np.ascontiguousarray(table, dtype=np.float32))
 
 
-@dataclass(frozen=True)
-class Division:
+@dataclass(frozen=True, repr=False)
+class Division(Brief):
     """Samples along one axis divided into finer ones: fine sample n takes shares of a few samples.
 
     Fine samples stand ``1/refine`` apart, from half a footprint before the first sample to half a footprint

@@ -14,6 +14,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.plan.rays import cell_windows
 from vcc.plan.rays.path import Path
@@ -31,8 +32,8 @@ WORTH_NARROWING = 0.7
 """Share of the solid angle asked for below which a smaller one is aimed at; likewise for windows of cells."""
 
 
-@dataclass(frozen=True, eq=False)
-class Aimed:
+@dataclass(frozen=True, eq=False, repr=False)
+class Aimed(Brief):
     """An aim, and for each leg the region (low, high) in which rays that are aimed so meet its stage, metres."""
 
     aim: Aim

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.windows import Aim, CellWindows
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Beam:
+@dataclass(frozen=True, eq=False, repr=False)
+class Beam(Brief):
     """All rays that are traced, in one plane: (x, y, s, t) = middle + basis · ξ + loose · η, all |ξ|, |η| ≤ 1.
 
     The four ξ are the places on the sensor and in the window aimed at; each η is what an array, a plate or a

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
@@ -17,8 +18,8 @@ from vcc.plan.rays.points import FIRST_COLUMNS, columns_of
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Leg:
+@dataclass(frozen=True, eq=False, repr=False)
+class Leg(Brief):
     """A stage, the way from behind it to the sensor undone, and the stop in its plane.
 
     Args:
@@ -44,8 +45,8 @@ class Leg:
         return bool(np.isfinite(self.stop[1] - self.stop[0]).all())
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
+@dataclass(frozen=True, eq=False, repr=False)
+class Path(Brief):
     """A camera from the sensor back to the light field, and what bounds its rays.
 
     Args:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.plan.rays.beam import Beam, beam_towards
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.windows import Aim
@@ -18,8 +19,8 @@ from vcc.plan.rays.windows import Aim
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Slack:
+@dataclass(frozen=True, eq=False, repr=False)
+class Slack(Brief):
     """How far rays can stray from where affine optics lead them, just behind each stage and at the entrance.
 
     As `Beam.loose` says it: columns whose sum, each taken −1 to 1 times, is how a ray strays in (x, y, s, t).

@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.lookup import bilinear
 from vcc.shapes.lattice import Lattice
 
 Array = NDArray[np.float64]
 
 
-@dataclass
-class Bundle:
+@dataclass(repr=False)
+class Bundle(Brief):
     """Rays in one plane: places x, y in metres, slopes s, t, and the share of light that each carries.
 
     ``points`` holds the numbers that belong to each ray, (..., columns of the plan's table).
@@ -135,8 +136,8 @@ def _lattice_numbers(lattice: Lattice, decentre: tuple[float, float]) -> tuple[i
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class CellsUnbend:
+@dataclass(frozen=True, eq=False, repr=False)
+class CellsUnbend(Brief):
     """Lenslets and prisms, each cell its own: slopes lose what the cells added to them."""
 
     lattice: Lattice
@@ -213,8 +214,8 @@ class BlockOfCells:
         packer.step(self.code, [layout, self.rows, self.columns], numbers)
 
 
-@dataclass(frozen=True, eq=False)
-class FacetsUnbend:
+@dataclass(frozen=True, eq=False, repr=False)
+class FacetsUnbend(Brief):
     """Plane facets that meet in the middle: slopes lose what the facets added to them."""
 
     directions: Array
@@ -236,8 +237,8 @@ class FacetsUnbend:
         packer.step(self.code, [len(self.directions), table], list(self.decentre))
 
 
-@dataclass(frozen=True, eq=False)
-class Texture:
+@dataclass(frozen=True, eq=False, repr=False)
+class Texture(Brief):
     """Numbers at regular points of a plane, interpolated linearly and held beyond the border.
 
     Args:
@@ -323,8 +324,8 @@ class Rectangle:
         packer.step(self.code, [], [*self.middle, *self.half])
 
 
-@dataclass(frozen=True, eq=False)
-class CellShares:
+@dataclass(frozen=True, eq=False, repr=False)
+class CellShares(Brief):
     """A mask of uniform rectangular cells, opaque outside them, with its sharp edges."""
 
     values: NDArray[np.float32]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.windows import Window
 from vcc.shapes.patterns import Circle
@@ -27,8 +28,8 @@ UNBOUNDED = 1e6
 """Metres, or slopes, by which no ray of a camera strays."""
 
 
-@dataclass(frozen=True, eq=False)
-class Bound:
+@dataclass(frozen=True, eq=False, repr=False)
+class Bound(Brief):
     """What rays must pass in one plane: |two coordinates − middle| ≤ half, and by how much more they can stray.
 
     Args:
@@ -80,8 +81,8 @@ class Bound:
         ]
 
 
-@dataclass(frozen=True, eq=False)
-class Strip:
+@dataclass(frozen=True, eq=False, repr=False)
+class Strip(Brief):
     """A bound of rays along one coordinate of one plane: |from_sensor · (x, y, s, t) − middle| ≤ half.
 
     Args:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.optics.deflections import CellDeflection
 
 Array = NDArray[np.float64]
@@ -16,8 +17,8 @@ SMALLEST_GAIN = 1e-12
 """Gains of cells are kept from 0, where a whole cell looks at one place: its bounds are then far outside."""
 
 
-@dataclass(frozen=True, eq=False)
-class Window:
+@dataclass(frozen=True, eq=False, repr=False)
+class Window(Brief):
     """Where to aim: a rectangle or a disc in a plane that the sensor's rays reach through affine optics.
 
     A ray from (x, y) on the sensor towards the window's point (a, b), −1 … 1 each, has the slopes
@@ -67,8 +68,8 @@ class Window:
         return s, t, np.full(s.shape, self.solid_angle)
 
 
-@dataclass(frozen=True, eq=False)
-class Sight:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sight(Brief):
     """How a place on the sensor, a place on a lens array and one at the stop beyond it hang together.
 
     All are along (x, y), which do not mix. A ray that passes a cell with centre c and power P at place a meets the
@@ -94,8 +95,8 @@ class Sight:
     beyond_offset: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Stop:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stop(Brief):
     """What a lens array's cells look at: a rectangle, or the ellipse in it.
 
     Args:
@@ -109,8 +110,8 @@ class Stop:
     disc: bool
 
 
-@dataclass(frozen=True, eq=False)
-class CellOpening:
+@dataclass(frozen=True, eq=False, repr=False)
+class CellOpening(Brief):
     """What of each cell of a lens array is open.
 
     Args:
