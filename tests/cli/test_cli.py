@@ -94,7 +94,7 @@ def test_info_says_what_is_known_and_what_is_assumed(folder):
     assert "1 mm  (not stated: assumed)" in result.stdout
     assert "pixels per view (measured)" in result.stdout
     assert "Note:" in result.stderr
-    assert "--spacing" in result.stderr
+    assert "--spacing" in result.stdout
     quick = run("info", "views", "--quick")
     assert "pixels per view" not in quick.stdout
     assert not quick.stderr

@@ -35,6 +35,7 @@ COMMANDS = {
         "vcc info views/",
         "vcc info views/ --quick",
         "vcc info views/ --picture grid.png",
+        'vcc info views/ --keep --spacing "2 mm" --slope-per-pixel 0.0012 --focus-distance "1.3 m"',
     ),
     "plot": (
         "Draw a camera from the side with rays, or a light field's way through it in phase space.",

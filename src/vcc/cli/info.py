@@ -1,7 +1,9 @@
 """``vcc info``: what a light field is."""
 
 import math
+import warnings
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,15 +11,15 @@ import numpy as np
 from cyclopts import Parameter
 from numpy.typing import NDArray
 
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import short
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
-from vcc.cli.options import LightFieldFile, Reading
+from vcc.cli.options import LightFieldFile, Reading, ViewCameras, told
 from vcc.cli.store_words import store_facts
 from vcc.cli.view_grid import Views, draw
-from vcc.fields.grid import SAMPLES_IN_WORDS
-from vcc.formats import FolderInfo, lytro_lfp, open_sparse_views, read_geometry
+from vcc.fields.grid import SAMPLES_IN_WORDS, pair
+from vcc.formats import FolderInfo, keep_geometry, lytro_lfp, open_sparse_views, read_geometry
 from vcc.formats.lytro_lfp import read_lytro
 from vcc.light_field import LightField
 from vcc.store import is_store, open_store
@@ -31,16 +33,24 @@ def info(
     *,
     quick: bool = False,
     picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    keep: bool = False,
+    cameras: ViewCameras = ViewCameras(),
 ) -> None:
     """Say what a light field is: views, cameras, disparities, brightness, and what its files leave open.
 
     Args:
         quick: Read one view only: nothing is measured, and no view compared.
         picture: Draw all views where their cameras stand, .png, .svg or .pdf.
+        keep: Write the cameras into the folder, as parameters.cfg, so that nothing is assumed when it is opened
+            again: what the options below say, else what the files state, else what is assumed.
     """
     if picture is not None:
         picture = check_output(picture, DRAWINGS)
     path = light_field.expanduser()
+    given = [*told(cameras), *(["--keep"] if keep else [])]
+    if given and (is_store(path) or lytro_lfp.recognised(path)):
+        what = "a store, which states its cameras" if is_store(path) else "a raw recording: it has no views yet"
+        raise InputError(f"{path} is {what}: leave out {', '.join(given)}")
     if lytro_lfp.recognised(path):
         if picture is not None:
             raise InputError(f"{path} is a raw recording of a Lytro camera: it has no grid of views to draw")
@@ -48,33 +58,53 @@ def info(
     elif is_store(path):
         lines = _of_a_store(path, quick, picture)
     else:
-        lines = _of_files(path, quick, picture)
+        kept = {"kept": f"{keep_geometry(path, **cameras.given())}"} if keep else {}
+        lines = _of_files(path, quick, picture, ViewCameras() if keep else cameras) | kept
     width = max(map(len, lines)) + 2
     show("\n".join(f"{name:<{width}}{value}" for name, value in lines.items()))
 
 
-def _of_files(path: Path, quick: bool, picture: Path | None) -> dict[str, str]:
+def _of_files(path: Path, quick: bool, picture: Path | None, cameras: ViewCameras) -> dict[str, str]:
     """Of a folder or a file, by names; measured, and drawn, by reading views."""
-    facts = read_geometry(path, sparse=True)
+    facts = _with(cameras, read_geometry(path, sparse=True))
     lines = _facts(facts)
     if quick and picture is None:
         return lines
+    with warnings.catch_warnings():  # of what is assumed, which the lines say
+        warnings.filterwarnings("ignore", message=".* do not state ", category=ResultWarning)
+        return lines | _measured(path, facts, quick, picture, cameras)
+
+
+def _measured(
+    path: Path, facts: FolderInfo, quick: bool, picture: Path | None, cameras: ViewCameras
+) -> dict[str, str]:
+    """What the views show, by names."""
+    lines = {}
     # Linear keeps the type of the files: disparities do not need light, and memory is short.
     if facts.missing:
-        sparse = open_sparse_views(path, transfer="linear")
+        sparse = open_sparse_views(path, transfer="linear", **cameras.given())
         held = dict(zip(sparse.places, sparse.pictures, strict=True))
         views = Views(held.get, sparse.shape, sparse.frame, facts.transfer)
         disparities = "" if quick else _sparse_disparities(sparse, facts)
     else:
-        whole = Reading(transfer="linear").in_memory(path)
+        whole = Reading(transfer="linear", **cameras.given()).in_memory(path)
         values = whole.values
         views = Views(lambda place: values[place], (facts.rows, facts.columns), whole.frame, facts.transfer)
         disparities = "" if quick else _disparities(whole, facts)
     if not quick:
-        lines |= {"disparities": disparities, "brightness": brightness(views.all(), facts.transfer)}
+        lines = {"disparities": disparities, "brightness": brightness(views.all(), facts.transfer)}
     if picture is not None:
         lines["picture"] = draw(views, path.resolve().name, picture, assumed="spacing" in facts.unknown)
     return lines
+
+
+def _with(cameras: ViewCameras, facts: FolderInfo) -> FolderInfo:
+    """Facts with what the user says of the cameras."""
+    given = cameras.given()
+    unknown = tuple(name for name in facts.unknown if name not in given)
+    if "spacing" in given:
+        given["spacing"] = pair(given["spacing"])
+    return replace(facts, **given, unknown=unknown)
 
 
 def _of_a_store(path: Path, quick: bool, picture: Path | None) -> dict[str, str]:
@@ -129,6 +159,10 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         "views are": ("parallel" if math.isinf(focus) else f"converge {short(focus)} away")
         + assumed("focus_distance"),
     }
+    if facts.unknown:
+        options = ", ".join(f"--{name.replace('_', '-')}" for name in facts.unknown)
+        keep = "; with --keep they are kept in the folder" if facts.files else ""
+        lines["assumed"] = f"distances and blur are only as right as this: give {options} if you know better{keep}"
     if facts.missing:
         lines["missing"] = _missing(facts.missing, facts.rows * facts.columns)
     if facts.disparity_range is not None:

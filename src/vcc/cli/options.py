@@ -190,25 +190,40 @@ def told(record: Any, *, but: tuple[str, ...] = ()) -> list[str]:
 
 @Parameter(name="*", group=READING)
 @dataclass(frozen=True, kw_only=True)
-class Reading:
-    """How a light field is read.
+class ViewCameras:
+    """The cameras of the views, as far as the user knows better than the files.
 
     Args:
-        transfer: How pixel values of the views stand for light: srgb, as pictures for people do, linear
-            (proportional to it), or auto: as the format says, srgb where it says nothing.
         spacing: Distance between neighbouring views with its unit, "1 mm"; two of them, "1 mm, 2 mm", are for rows
             and columns. Default: what the folder states.
         slope_per_pixel: Pixel pitch over focal length of the cameras, no unit. Default: what the folder states.
         focus_distance: Where the views converge, "1.2 m", or inf if they are parallel. Default: what the folder
             states.
+    """
+
+    spacing: Lengths | None = None
+    slope_per_pixel: float | None = None
+    focus_distance: Length | None = None
+
+    def given(self) -> dict[str, Any]:
+        """What is given, by name."""
+        chosen = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return {name: value for name, value in chosen.items() if value is not None}
+
+
+@Parameter(name="*", group=READING)
+@dataclass(frozen=True, kw_only=True)
+class Reading(ViewCameras):
+    """How a light field is read.
+
+    Args:
+        transfer: How pixel values of the views stand for light: srgb, as pictures for people do, linear
+            (proportional to it), or auto: as the format says, srgb where it says nothing.
         orientation: Order of the views. auto checks it by parallax and puts it right; as-is takes the files as
             they are.
     """
 
     transfer: Literal["auto", "srgb", "linear"] = "auto"
-    spacing: Lengths | None = None
-    slope_per_pixel: float | None = None
-    focus_distance: Length | None = None
     orientation: Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"] = "auto"
 
     def light_field(self, path: Path) -> LightField | StoredLightField:
@@ -222,16 +237,12 @@ class Reading:
                 raise InputError(f"{path} is a store, which states its cameras: leave out {', '.join(names)}")
             return open_store(path)
         with progress("Reading views") as advance:
-            return open_light_field(path, progress=advance, **self._given())
+            return open_light_field(path, progress=advance, **self.given())
 
     def in_memory(self, path: Path) -> LightField:
         """The light field that is asked for, all of it read."""
         field = self.light_field(path)
         return field if isinstance(field, LightField) else field.read()
-
-    def _given(self) -> dict[str, Any]:
-        chosen = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return {name: value for name, value in chosen.items() if value is not None}
 
 
 @Parameter(name="*", group=MAKING)

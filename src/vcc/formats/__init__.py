@@ -3,6 +3,7 @@
 from vcc.formats.containers import read_container
 from vcc.formats.folder_info import FolderInfo
 from vcc.formats.ground_truth import GroundTruth, read_ground_truth
+from vcc.formats.keeping import keep_geometry
 from vcc.formats.lytro_lfp import LytroRaw, read_lytro
 from vcc.formats.reading import open_light_field, open_sparse_views, read_geometry
 from vcc.formats.sparse import SparseViews
@@ -14,6 +15,7 @@ __all__ = [
     "LytroRaw",
     "SavedLightField",
     "SparseViews",
+    "keep_geometry",
     "open_light_field",
     "open_sparse_views",
     "read_container",

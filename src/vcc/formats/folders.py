@@ -100,25 +100,42 @@ def _reordered(grid: ViewGrid, order: Order) -> ViewGrid:
 
 
 def _with_cameras(grid: ViewGrid, folder: Path) -> ViewGrid:
-    """The grid with the cameras that names or a file of the folder state, where its own format has none."""
-    if grid.geometry != Geometry():
+    """The grid with the cameras that names or a file of the folder state, where its own format has none.
+
+    ``parameters.cfg`` goes before names: somebody put it there. What names say of the order of views stays.
+    """
+    if grid.format == hci.KIND:
         return grid
+    named = _by_names(grid, folder)
+    shape, geometry, where = hci.read_grid_shape(folder), hci.read_geometry(folder), hci.parameters_file(folder)
+    if geometry is None or shape is None or where is None:
+        return replace(grid, geometry=named)
+    _check_shape(grid, folder, shape, where.name)
+    known, true = named.directions, named.directions_are_true
+    return replace(grid, geometry=replace(geometry, directions=known, directions_are_true=true))
+
+
+def _by_names(grid: ViewGrid, folder: Path) -> Geometry:
+    """The cameras that the names of views state, or ``param.txt``."""
+    if grid.geometry != Geometry():
+        return grid.geometry
     for read in (camera_names.read_geometry, stanford.read_geometry):
         named = read(grid)
         if named is not None:
-            return replace(grid, geometry=named)
-    shape, geometry, where = hci.read_grid_shape(folder), hci.read_geometry(folder), hci.parameters_file(folder)
-    if geometry is None and (stated := cambridge.read_parameters(folder)) is not None:
-        shape, geometry, where = stated.views, stated.geometry, folder / cambridge.PARAMETERS
-    if geometry is None or shape is None or where is None:
-        return grid
-    if shape != grid.shape:
+            return named
+    stated = cambridge.read_parameters(folder)
+    if stated is None:
+        return Geometry()
+    _check_shape(grid, folder, stated.views, cambridge.PARAMETERS)
+    return stated.geometry
+
+
+def _check_shape(grid: ViewGrid, folder: Path, stated: tuple[int, int], name: str) -> None:
+    if stated != grid.shape:
         raise InputError(
-            f"{folder} has a grid of {grid.shape[0]}×{grid.shape[1]} views ({grid.format}), and {where.name} "
-            f"states {shape[0]}×{shape[1]}: its baseline would be wrong for them. Correct {where.name} or move it "
-            "away"
+            f"{folder} has a grid of {grid.shape[0]}×{grid.shape[1]} views ({grid.format}), and {name} "
+            f"states {stated[0]}×{stated[1]}: its baseline would be wrong for them. Correct {name} or move it away"
         )
-    return replace(grid, geometry=geometry)
 
 
 def _nothing_found(folder: Path) -> InputError:

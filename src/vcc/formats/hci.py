@@ -14,9 +14,13 @@ from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.fields.grid import Sample
+from vcc.formats.cameras import Cameras
 from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
 
 PARAMETERS = "parameters.cfg"
+KIND = "HCI 4D light-field benchmark"
+_FOCAL_LENGTH = 100 * mm
+"""What we write: only its ratio to the sensor's size is known, and HCI's scenes have 100 mm."""
 
 _NAME = re.compile(r"input_Cam(\d+)", re.IGNORECASE)
 
@@ -38,7 +42,7 @@ def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
     rows, columns = stated or _square(list(numbered.values()), folder)
     places = [Place(number // columns, number % columns, file) for file, number in numbered.items()]
     files = arrange(places, folder, (range(rows), range(columns)), sparse=sparse)
-    return ViewGrid("HCI 4D light-field benchmark", files, read_geometry(folder) or Geometry())
+    return ViewGrid(KIND, files, read_geometry(folder) or Geometry())
 
 
 def read_grid_shape(folder: Path) -> tuple[int, int] | None:
@@ -61,7 +65,8 @@ def read_geometry(folder: Path) -> Geometry | None:
 
     spacing = baseline_mm, slope per pixel = sensor_size_mm / focal_length_mm / max(W, H), and
     focus_distance_m of 0 stands for parallel cameras. Disparity, pixels per view, is then
-    b·f_px·(1/Z − 1/F), positive = nearer than the focus distance.
+    b·f_px·(1/Z − 1/F), positive = nearer than the focus distance. Rows of views that stand another distance apart
+    than columns have it in baseline_y_mm, an entry of ours.
 
     Raises:
         InputError: the file cannot be understood.
@@ -76,6 +81,9 @@ def read_geometry(folder: Path) -> Geometry | None:
     width = positive("intrinsics", "image_resolution_x_px")
     height = positive("intrinsics", "image_resolution_y_px")
     baseline = positive("extrinsics", "baseline_mm") * mm
+    between_rows = baseline
+    if not math.isnan(_number(settings, "extrinsics", "baseline_y_mm", folder, needed=False)):
+        between_rows = positive("extrinsics", "baseline_y_mm") * mm
     sensor = positive("intrinsics", "sensor_size_mm") * mm
     focal_length = positive("intrinsics", "focal_length_mm") * mm
     focus = _number(settings, "extrinsics", "focus_distance_m", folder)
@@ -83,13 +91,62 @@ def read_geometry(folder: Path) -> Geometry | None:
     low = _number(settings, "meta", "disp_min", folder, needed=False)
     high = _number(settings, "meta", "disp_max", folder, needed=False)
     return Geometry(
-        spacing=(baseline, baseline),
+        spacing=(between_rows, baseline),
         slope_per_pixel=sensor / focal_length / max(width, height),
         focus_distance=focus if focus > 0 else math.inf,
         disparity_range=(low, high) if low <= high else None,  # NaN where not stated
         picture_shape=(int(height), int(width)),
         sample=_sample(settings, folder),
     )
+
+
+def parameters_text(
+    views: tuple[int, int],
+    picture: tuple[int, int],
+    cameras: Cameras,
+    scene: str,
+    *,
+    disparity_range: tuple[float, float] | None = None,
+    sample: Sample = "mean",
+) -> str:
+    """The text of a ``parameters.cfg`` that `read_geometry` reads as these cameras.
+
+    Args:
+        views: (rows, columns).
+        picture: (height, width) of a view, pixels, which are square.
+        cameras: of the views.
+        scene: its name.
+        disparity_range: (lowest, highest), pixels per view, where known.
+        sample: what a sample is.
+    """
+    rows, columns = views
+    height, width = picture
+    between_rows, baseline = cameras.spacing
+    sensor = cameras.slope_per_pixel[1] * max(width, height) * _FOCAL_LENGTH
+    lines = [
+        "[intrinsics]",
+        f"focal_length_mm = {_FOCAL_LENGTH / mm!r}",
+        f"image_resolution_x_px = {width}",
+        f"image_resolution_y_px = {height}",
+        f"sensor_size_mm = {sensor / mm!r}",
+        "",
+        "[extrinsics]",
+        f"num_cams_x = {columns}",
+        f"num_cams_y = {rows}",
+        f"baseline_mm = {baseline / mm!r}",
+        *([f"baseline_y_mm = {between_rows / mm!r}"] if between_rows != baseline else []),
+        f"focus_distance_m = {0.0 if cameras.are_parallel else cameras.focus_distance!r}",
+        *(f"center_cam_{name} = 0.0" for name in ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")),
+        "",
+        "[meta]",
+        f"scene = {' '.join(scene.split())}",
+    ]
+    if disparity_range is not None:
+        low, high = map(float, disparity_range)
+        lines += [f"disp_min = {low!r}", f"disp_max = {high!r}"]
+    if sample != "mean":
+        lines.append(f"sample = {sample}")
+    return "\n".join(lines) + "\n"
 
 
 def parameters_file(folder: Path) -> Path | None:

@@ -129,7 +129,7 @@ def open_light_field(
     else:
         grid = find_grid(path, views, order, options=options)
         opened = _opened_folder(grid, path, given, transfer, orientation, progress)
-    light_field, remarks = _put_in_order(opened, orientation, given)
+    light_field, remarks = _put_in_order(opened, path, orientation, given)
     for remark in filter(None, remarks):
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
     return light_field
@@ -166,7 +166,8 @@ def open_sparse_views(
     pictures = read_views(
         grid.present, info.picture_shape, _STORED[info.bits], linear=transfer == "linear", progress=progress
     )
-    if remark := assumed_remark(info, grid.geometry, [name for name in info.unknown if name not in given.names]):
+    assumed = [name for name in info.unknown if name not in given.names]
+    if remark := assumed_remark(info, path, grid.geometry, assumed):
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
     frame = cameras.frame((*grid.shape, *info.picture_shape))
     return SparseViews(pictures, tuple(grid.present), grid.shape, frame, info.disparity_range, info.sample)
@@ -280,7 +281,7 @@ def _opened_folder(
 
 
 def _put_in_order(
-    opened: _Opened, orientation: OrientationChoice, given: Given
+    opened: _Opened, path: Path, orientation: OrientationChoice, given: Given
 ) -> tuple[LightField, tuple[str, ...]]:
     """The light field with its views in the order that is asked for, and what to say of it."""
     info, cameras, seen = opened.info, opened.cameras, opened.seen
@@ -305,7 +306,7 @@ def _put_in_order(
         return light_field, remarks
     assumed = [name for name in info.unknown if name not in given.names]
     vergence = vergence_remark(_shown(light_field, seen)) if cameras.are_parallel else ""
-    return light_field, (*remarks, assumed_remark(info, opened.stated, assumed), vergence)
+    return light_field, (*remarks, assumed_remark(info, path, opened.stated, assumed), vergence)
 
 
 def _shown(light_field: LightField, seen: _Seen) -> tuple[float, float] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from vcc.base.units import short
 from vcc.formats.folder_info import FolderInfo
@@ -10,11 +11,12 @@ from vcc.formats.grid import Geometry
 from vcc.formats.orientation import VISIBLE_DISPARITY
 
 
-def assumed_remark(info: FolderInfo, stated: Geometry, assumed: Sequence[str]) -> str:
+def assumed_remark(info: FolderInfo, path: Path, stated: Geometry, assumed: Sequence[str]) -> str:
     """What had to be assumed, and how to state it; empty for nothing.
 
     Args:
         info: what the folder or file holds.
+        path: which it is.
         stated: what its format states of the cameras.
         assumed: names of what neither it nor the user says.
     """
@@ -31,6 +33,16 @@ def assumed_remark(info: FolderInfo, stated: Geometry, assumed: Sequence[str]) -
         f"the files ({info.format}) do not state {', '.join(assumed)}; taken are "
         f"{', '.join(texts[name] for name in assumed)}. Distances and blur are only as right as these: "
         f"pass {', '.join(f'{name}=…' for name in assumed)} (lengths in metres) if you know better"
+        f"{_how_to_keep(info, path)}"
+    )
+
+
+def _how_to_keep(info: FolderInfo, path: Path) -> str:
+    """Folders can keep it, files cannot."""
+    return (
+        f'. vcc info "{path}" --keep writes them into the folder, and nothing is assumed again'
+        if info.files
+        else ""
     )
 
 

@@ -9,7 +9,7 @@ import shutil
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -19,14 +19,13 @@ import numpy as np
 from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress, tell
-from vcc.base.units import mm
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
 from vcc.files.pictures import Exposure, save_picture, write_codes
 from vcc.formats import arrays, eslf, lftoolbox, video
 from vcc.formats.cameras import Cameras, cameras_of
 from vcc.formats.exposing import Codes, stored_view
-from vcc.formats.hci import PARAMETERS
+from vcc.formats.hci import PARAMETERS, parameters_text
 from vcc.store import save_store
 
 Kind = Literal["zarr", "hci", "views", "mat", "eslf", "mp4", "npz"]
@@ -46,8 +45,6 @@ _HOW: dict[Kind, str] = {
     "mat": "Light Field Toolbox .mat with its intrinsics, lossless",
     "eslf": "one picture of tiled views (ESLF), sRGB; it holds no geometry",
 }
-_FOCAL_LENGTH = 100 * mm
-"""What parameters.cfg gives: only its ratio to the sensor's size is known, and HCI's scenes have 100 mm."""
 _PNG_LEVEL = 4  # a third of the usual level's time, for 5 % more bytes
 _POINTS_UNSAID = (
     "nothing here says that its samples are values at points, and they are read back as means over pixels: "
@@ -318,29 +315,15 @@ def _parameters(grid: Grid, cameras: Cameras, path: Path, kind: str) -> tuple[st
             f"{PARAMETERS} cannot hold its cameras, and there is none. Open it with spacing=({dv!r}, {du!r}), "
             f"slope_per_pixel=({pt!r}, {ps!r}), focus_distance={cameras.focus_distance!r}{more}"
         )
-    rows, columns, height, width = grid.shape[:4]
-    focus = 0.0 if cameras.are_parallel else cameras.focus_distance
-    sensor = cameras.slope_per_pixel[1] * max(width, height) * _FOCAL_LENGTH
-    lines = [
-        "[intrinsics]",
-        f"focal_length_mm = {_FOCAL_LENGTH / mm!r}",
-        f"image_resolution_x_px = {width}",
-        f"image_resolution_y_px = {height}",
-        f"sensor_size_mm = {sensor / mm!r}",
-        "",
-        "[extrinsics]",
-        f"num_cams_x = {columns}",
-        f"num_cams_y = {rows}",
-        f"baseline_mm = {cameras.spacing[1] / mm!r}",
-        f"focus_distance_m = {focus!r}",
-        *(f"center_cam_{name} = 0.0" for name in ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")),
-        "",
-        "[meta]",
-        f"scene = {' '.join(path.name.split())}",
-    ]
-    if grid.disparity_range is not None:
-        low, high = map(float, grid.disparity_range)
-        lines += [f"disp_min = {low!r}", f"disp_max = {high!r}"]
-    if grid.sample != "mean":
-        lines.append(f"sample = {grid.sample}")
-    return "\n".join(lines) + "\n", ""
+    # Square cameras may differ by rounding, of which the file is to say nothing.
+    alike = replace(cameras, spacing=(cameras.spacing[1], cameras.spacing[1]))
+    views, picture = grid.shape[:2], grid.shape[2:4]
+    text = parameters_text(
+        (views[0], views[1]),
+        (picture[0], picture[1]),
+        alike,
+        path.name,
+        disparity_range=grid.disparity_range,
+        sample=grid.sample,
+    )
+    return text, ""

@@ -1,0 +1,76 @@
+"""What is known of a folder's cameras kept in the folder, in the file that readers look for."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+from vcc.base.errors import InputError
+from vcc.files.atomic import atomic_path
+from vcc.formats import containers, hci
+from vcc.formats.folder_info import Given, cameras_for, info_of_grid
+from vcc.formats.folders import find_grid
+from vcc.formats.numbered import Order
+
+
+def keep_geometry(
+    path: str | PathLike[str],
+    *,
+    spacing: float | tuple[float, float] | None = None,
+    slope_per_pixel: float | None = None,
+    focus_distance: float | None = None,
+    views: tuple[int, int] | None = None,
+    order: Order | None = None,
+) -> Path:
+    """Write the cameras of a folder of views as its ``parameters.cfg``: opened again, nothing is assumed.
+
+    What is not given here is taken as `open_light_field` takes it: what the files state, else a default, and a
+    comment in the file says which these are.
+
+    Args:
+        path: the folder. Views may be missing from it.
+        spacing: distance between neighbouring views, metres, one number or (dv, du).
+        slope_per_pixel: pixel pitch over focal length of the cameras.
+        focus_distance: where the views converge, metres; ``math.inf`` if they are parallel.
+        views: (rows, columns) of views, for running numbers.
+        order: of running numbers.
+
+    Returns:
+        The file that was written.
+
+    Raises:
+        InputError: a file, which has no place for it; a folder with a camera file already, or whose files state
+            all where nothing is given; a folder that cannot be written to; what `open_light_field` refuses.
+    """
+    folder = Path(path).expanduser()
+    if containers.container_of(folder) is not None:
+        raise InputError(
+            f"{folder} is one file, beside which no camera file is read: make a store of it, which states its "
+            "cameras (vcc convert, or vcc.store.save_store)"
+        )
+    grid = find_grid(folder, views, order, sparse=True)
+    there = hci.parameters_file(folder)
+    if there is not None:
+        raise InputError(f"{there} states the cameras already: correct what it says, or move it away first")
+    info, given = info_of_grid(grid), Given(spacing, slope_per_pixel, focus_distance)
+    if not info.unknown and not given.names:
+        raise InputError(
+            f"{folder}: its files ({info.format}) state all of its cameras, so there is nothing to keep"
+        )
+    cameras = cameras_for(info, grid.geometry, given, folder)
+    assert cameras is not None  # no folder states a frame
+    text = hci.parameters_text(
+        grid.shape,
+        (info.height, info.width),
+        cameras,
+        folder.resolve().name,
+        disparity_range=info.disparity_range,
+        sample=info.sample,
+    )
+    assumed = [name for name in info.unknown if name not in given.names]
+    if assumed:
+        text = f"# Assumed, since neither the files nor anybody said it: {', '.join(assumed)}\n{text}"
+    file = folder / hci.PARAMETERS
+    with atomic_path(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return file
