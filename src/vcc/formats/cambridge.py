@@ -19,10 +19,10 @@ _LINE = re.compile(r"\s*(num_x|num_y|base_x|base_y)\s*[:=]?\s*(\S+)\s*")
 class Parameters:
     """What ``param.txt`` states.
 
-    Camera t of T in a row stands base_x·(2t/(T − 1) − 1) to the left of the middle, and rows go upwards alike: base
-    is half the width of all cameras together. Source: CamPoses in util.py of
-    gfxdisp/Blender-addon-light-field-camera, alike in all its versions; its README calls base the distance between
-    neighbours, which it is for 3 views only.
+    Camera t of T in a row stands base_x·(2t/(T − 1) − 1) to the left of the middle, and rows go upwards alike:
+    base is half the width of all cameras together. Source: CamPoses in util.py of
+    gfxdisp/Blender-addon-light-field-camera, alike in all its versions; its README calls base the distance
+    between neighbours, which it is for 3 views only.
 
     Args:
         views: (rows, columns) of views.
