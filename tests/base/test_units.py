@@ -45,7 +45,7 @@ def test_common_units_are_read_as_code_writes_them():
     [
         (50, "length", 'f is 50: a length needs a unit, written as text, e.g. "50 mm"'),
         (0.5, "angle", 'f is 0.5: an angle needs a unit, written as text, e.g. "2 deg"'),
-        (None, "length", "f is None: a length needs a unit"),
+        (None, "length", "f is null: a length needs a unit"),
         ("50", "length", 'f is "50": a length needs a unit, e.g. "50 mm"'),
         ("0.5", "angle", 'f is "0.5": an angle needs a unit'),
         ("50 s", "length", 'f is "50 s", which is not a length; write it like "50 mm"'),

@@ -13,7 +13,7 @@ import pytest
 import vcc
 from command_line import KNOWN, refused, run, write_views
 from vcc.cli.app import COMMANDS, RENDERERS
-from vcc.cli.console import as_options
+from vcc.cli.console import _Foretold, as_options
 from vcc.plan.how import How
 
 CAMERA = """
@@ -76,6 +76,33 @@ def test_progress_is_asked_for_where_work_is_long(folder, monkeypatch):
 
     monkeypatch.setattr(camera_verbs, "SAMPLES_WORTH_A_BAR", 0)
     assert run("capture", "camera.toml", "views", "-o", "picture.npy", *KNOWN).exit_code == 0
+
+
+def test_long_work_that_nobody_watches_says_once_how_long_it_takes(capsys):
+    now = [0.0]
+    foretold = _Foretold("Rendering views", lambda: now[0])
+    for second in range(60):
+        now[0] = float(second)
+        foretold(second, 400)
+    assert capsys.readouterr().err == "Rendering views: about 7 min to go\n"  # after 5 s, 5 of 400: 395 s
+    begun_before = _Foretold("Rendering views", lambda: now[0])
+    begun_before(390, 400)
+    now[0] += 10
+    begun_before(392, 400)
+    assert capsys.readouterr().err == "Rendering views: about 40 s to go\n"
+    short = _Foretold("Rendering views", lambda: now[0])
+    now[0] += 6
+    short(390, 400)
+    assert capsys.readouterr().err == ""
+
+
+def test_the_shell_completes_commands_and_options():
+    code = "from vcc.cli.app import app; print(app.generate_completion(prog_name='vcc', shell='bash'))"
+    script = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    asked = 'COMP_WORDS=({}); COMP_CWORD=$(( ${{#COMP_WORDS[@]}} - 1 )); _vcc; echo "${{COMPREPLY[@]}}"\n'
+    lines = script + asked.format("vcc cap") + asked.format("vcc capture --interp")
+    shown = subprocess.run(["bash", "-c", lines], capture_output=True, text=True, check=True).stdout
+    assert shown == "capture\n--interpolation\n"
 
 
 def test_explain_prints_the_plan(folder):

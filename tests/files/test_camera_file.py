@@ -449,6 +449,13 @@ MASK = r'element 2 \(mask "code"\): pattern'
         ("[elements]\nz = 1\n" + SENSOR, r"each element starts with a line \[\[elements\]\]"),
         ("[[element]]\nz = 1\n" + SENSOR, r'unknown table "element": did you mean "elements"\?'),
         (element(None) + SENSOR, 'element 1 has no kind: add kind = … with one of "biprism", "coded_diff'),
+        (element("stop") + SENSOR, 'element 1: kind "stop" is not known; known are "biprism", "coded_diffuser", '),
+        (one("lens", z="true", focal_length='"5 mm"'), r"element 1 \(lens\): z is true: a length needs a unit"),
+        (one("mask", pattern="[[0, 1]]"), r'give its width in metres, e.g. width = "30 mm"'),
+        (
+            mask('"circle"'),
+            r'there is no file "circle" in .*; a pattern is written by name: \{ name = "circle"',
+        ),
         (element("lense") + SENSOR, 'element 1: kind "lense" is not known: did you mean "lens"'),
         (element("xyz") + SENSOR, 'kind "xyz" is not known; known are "biprism", .*"pyramid"$'),
         ("[[elements]]\nkind = 5\n" + SENSOR, "element 1: kind is 5: write it as text"),
@@ -467,14 +474,14 @@ MASK = r'element 2 \(mask "code"\): pattern'
         (element(focal_length='"0 mm"') + SENSOR, "element 1 .*: focal_length of lens .* not be 0"),
         (
             element(focal_length='"5 mm"', decentre='"1 mm"') + SENSOR,
-            r'decentre is \'1 mm\': it is a list of 2, like \["1 mm", "1 mm"\]',
+            r'decentre is "1 mm": it is a list of 2, like \["1 mm", "1 mm"\]',
         ),
         (
             element(focal_length='"5 mm"', decentre='["1 mm", 2]') + SENSOR,
             "decentre, number 2 of 2, is 2: a length needs a unit",
         ),
         (element(focal_length='"5 mm"', name=5) + SENSOR, "name is 5: it is text in quotes"),
-        (element("prism", deflection="[1, '0']") + SENSOR, "number 2 of 2, is '0': it is a number"),
+        (element("prism", deflection="[1, '0']") + SENSOR, 'number 2 of 2, is "0": it is a number'),
         (LENS.replace("0 mm", "60 mm") + SENSOR, "camera.toml: .* stands behind the sensor"),
         (mask('"lost.png"'), MASK + ': there is no file "lost.png" in '),
         (mask('"camera.toml"'), MASK + r": .*camera.toml has the ending \".toml\""),
@@ -489,7 +496,7 @@ MASK = r'element 2 \(mask "code"\): pattern'
         (mask("{ name = 'mura', prime = 9.5 }"), r"prime is 9.5: it is a whole number"),
         (
             mask("{ name = 'bounded', width = '1 mm', height = '1 mm', pattern = 'a.png' }"),
-            r"pattern \(bounded\): pattern is 'a.png': write a pattern by name",
+            r'pattern \(bounded\): pattern is "a.png": write a pattern by name',
         ),
         (
             LENS + SENSOR.replace("48 um", "0 um"),
@@ -507,7 +514,7 @@ MASK = r'element 2 \(mask "code"\): pattern'
             one("diffuser", kernel='{ name = "mura", prime = 7 }'),
             'kernel: name "mura" is not known; known are "gauss',
         ),
-        (one("diffuser", kernel='{ name = "gaussian", sigma = "1 mm" }'), "sigma is '1 mm': it is a number$"),
+        (one("diffuser", kernel='{ name = "gaussian", sigma = "1 mm" }'), 'sigma is "1 mm": it is a number$'),
         (
             one("diffuser", kernel='{ name = "gaussian", sigma = [1, 2, 3] }'),
             r"sigma is .*a list of 2, like \[0, 0\]",
@@ -519,15 +526,15 @@ MASK = r'element 2 \(mask "code"\): pattern'
         (one("diffuser", kernel="[[1, 2]]", slope_pitch="0.1"), r"element 1 \(diffuser\): .* sums to 3"),
         (
             one("coded_diffuser", kernels='[{ name = "gaussian", sigma = "x" }]', width='"1 mm"'),
-            r"kernels, number 1 of 1, \(gaussian\): sigma is 'x': it is a number",
+            r'kernels, number 1 of 1, \(gaussian\): sigma is "x": it is a number',
         ),
         (
             one("coded_diffuser", kernels='"x"', width='"1 mm"'),
-            r"kernels is 'x': write a kernel by name, like \{ name",
+            r'kernels is "x": write a kernel by name, like \{ name',
         ),
         (
             one("phase_plate", surface='"x.png"'),
-            r"surface is 'x.png': write a surface by name, like \{ name = \"cubic",
+            r'surface is "x.png": write a surface by name, like \{ name = "cubic',
         ),
         (
             one("phase_plate", surface="{ strength = 1 }"),
@@ -535,7 +542,7 @@ MASK = r'element 2 \(mask "code"\): pattern'
         ),
         (
             one("phase_plate", surface='{ name = "zernike", coefficients = "1 um", diameter = "1 mm" }'),
-            r'coefficients is \'1 um\': it is a list, like \["1 mm", "1 mm"\]',
+            r'coefficients is "1 um": it is a list, like \["1 mm", "1 mm"\]',
         ),
         (
             one("phase_plate", surface='{ name = "zernike", coefficients = ["1 um", 2], diameter = "1 mm" }'),
@@ -573,11 +580,11 @@ MASK = r'element 2 \(mask "code"\): pattern'
         (one("first_order", lens_file="5"), "lens_file is 5: it is text in quotes"),
         (one("first_order", lens_file='"a.dat"', f_numer="2"), 'unknown field "f_numer": did you mean "f_number"'),
         (one("first_order", lens_file='"a.dat"', glasses="5"), "glasses is 5: it is a table of fields"),
-        (one("first_order", lens_file='"a.dat"', glasses='{ K7 = "x" }'), "glasses: K7 is 'x': it is a number"),
+        (one("first_order", lens_file='"a.dat"', glasses='{ K7 = "x" }'), 'glasses: K7 is "x": it is a number'),
         (SENSOR + "electronics = 5\n", "sensor: electronics is 5: it is a table of fields"),
         (
             SENSOR + "[sensor.electronics]\nwell = 5\n",
-            'sensor: electronics has an unknown field "well": did you mean',
+            'sensor: electronics has an unknown field "well"; known are "quantum_efficiency", ',
         ),
         (
             SENSOR + "[sensor.electronics]\nwavelength = 5e-7\n",

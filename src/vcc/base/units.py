@@ -7,6 +7,7 @@ Everything inside this library is in metres, radians and seconds; slopes are dim
 from __future__ import annotations
 
 import functools
+import json
 import math
 import re
 from typing import Any, Final
@@ -65,7 +66,8 @@ def parse(text: object, dimension: str, what: str) -> float:
     """
     kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
     if not isinstance(text, str):
-        raise InputError(f'{what} is {text!r}: {kind} needs a unit, written as text, e.g. "{example}"')
+        given = json.dumps(text, ensure_ascii=False, default=str)  # as camera files write it
+        raise InputError(f'{what} is {given}: {kind} needs a unit, written as text, e.g. "{example}"')
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:
         raise InputError(f'{what} is "{text}", which is not {kind}; write it like "{example}"')

@@ -177,6 +177,10 @@ app.command(
         place=len(COMMANDS),
     )
 )
+app.register_install_completion_command(
+    help="Let the shell complete commands, options and files: bash, zsh or fish, whichever this is.",
+    group="Options",
+)
 
 
 def main() -> None:

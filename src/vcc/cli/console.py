@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -62,7 +63,9 @@ def show(message: str) -> None:
 
 @contextmanager
 def progress(task: str) -> Iterator[Progress]:
-    """A bar on standard error while something runs, if people watch; yields what to call to move it.
+    """What to call while something long runs, yielded: it moves a bar on standard error, if people watch.
+
+    Where nobody does (a log, a job on a cluster), one line says how long it will take, if that is long.
 
     Args:
         task: what is being done, in a few words.
@@ -71,9 +74,49 @@ def progress(task: str) -> Iterator[Progress]:
     from rich.progress import Progress as Bars
 
     console = Console(stderr=True)
-    with Bars(console=console, transient=True, disable=not console.is_terminal) as bar:
+    if not console.is_terminal:
+        yield _Foretold(task)
+        return
+    with Bars(console=console, transient=True) as bar:
         running = bar.add_task(task, total=None)
         yield lambda done, total: bar.update(running, completed=done, total=total)
+
+
+SOON, LONG = 5.0, 30.0
+"""Seconds of work after which its time is foretold, and from which on that is worth a line."""
+
+
+class _Foretold:
+    """Progress that says once how long it will take, when that can be told and is long.
+
+    Args:
+        task: what is being done, in a few words.
+        clock: seconds that go by.
+    """
+
+    def __init__(self, task: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self._task, self._clock, self._told = task, clock, False
+        self._began = clock()
+        self._before: int | None = None  # what was done already when work began
+
+    def __call__(self, done: int, total: int) -> None:
+        """Take note, and tell if it is time."""
+        if self._before is None:
+            self._before = done if done > 1 else 0
+        passed, made = self._clock() - self._began, done - self._before
+        if self._told or passed < SOON or made <= 0:
+            return
+        self._told, left = True, passed * (total - done) / made
+        if left >= LONG:
+            say(f"{self._task}:", "", f"about {_in_words(left)} to go")
+
+
+def _in_words(seconds: float) -> str:
+    """A time that is foretold, in two digits at most."""
+    if seconds < 90:
+        return f"{max(1, round(seconds / 10)) * 10} s"
+    minutes = seconds / 60
+    return f"{minutes:.0f} min" if minutes < 90 else f"{minutes / 60:.1f} h"
 
 
 DRAWINGS = (".png", ".svg", ".pdf")

@@ -31,16 +31,26 @@ from vcc.files.camera_families import (
     unit_of,
 )
 from vcc.files.pictures import read_grey
+from vcc.files.toml_words import as_toml, in_toml
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.shapes.patterns import Pattern
+
+LIKELY = 0.75
+"""How alike a name must be to a known one to be a slip of it: "lense" for "lens", but not "stop" for "prism"."""
 
 _ARRAY_LIKE = set(get_args(ArrayLike))
 
 
 def read_train(path: str | PathLike[str]) -> Train:
     """The optical train that a TOML file describes; see `vcc.camera_file.load_camera`."""
-    file = Path(path).expanduser()
+    try:
+        return _read(Path(path).expanduser())
+    except InputError as error:
+        raise InputError(as_toml(str(error))) from None
+
+
+def _read(file: Path) -> Train:
     tables = _read_toml(file)
     _check_keys(tables, {"elements", "sensor"}, {"sensor"}, f"{file}", "table")
     elements = tables.get("elements", [])
@@ -104,7 +114,7 @@ def _comes_from_file(kind: type, given: Mapping[str, Any], place: str) -> bool:
 def _known(name: object, choices: Mapping[str, Any], what: str) -> Any:
     """The choice of that name, in which capitals, spaces, "-" and "_" do not matter."""
     if not isinstance(name, str):
-        raise InputError(f"{what} is {name!r}: write it as text, one of {listed(choices)}")
+        raise InputError(f"{what} is {in_toml(name)}: write it as text, one of {listed(choices)}")
     plain = {_plain(choice): choice for choice in choices}
     if _plain(name) in plain:
         return choices[plain[_plain(name)]]
@@ -116,7 +126,8 @@ def _plain(name: str) -> str:
 
 
 def _nearest(name: str, choices: Iterable[str]) -> str:
-    close = difflib.get_close_matches(name.lower(), list(choices), n=1, cutoff=0.5)
+    """What may have been meant where that is likely, a slip of the keys; else all that there is."""
+    close = difflib.get_close_matches(name.lower(), list(choices), n=1, cutoff=LIKELY)
     if close:
         return f': did you mean "{close[0]}"?'
     return f"; known are {listed(choices)}"
@@ -167,6 +178,7 @@ def _read_value(given: Any, hint: Any, unit: str | None, what: str, folder: Path
     ):
         return _read_named(given, family, arrays, what, folder)
     if arrays:
+        _check_no_name(given, family, what, folder)
         return read_array(given, unit, family is not None and family.base is Pattern, what, folder)
     if items and (isinstance(given, list) or not {int, float, str} & set(choices)):
         return _read_list(given, items, unit, what, folder)
@@ -184,10 +196,21 @@ def _read_value(given: Any, hint: Any, unit: str | None, what: str, folder: Path
     return _read_plain(given, choices, what)
 
 
+def _check_no_name(given: Any, family: Family | None, what: str, folder: Path) -> None:
+    """Refuse the name of a pattern where text is that of a file."""
+    if family is None or not isinstance(given, str) or (folder / given).exists():
+        return
+    if given in {**family.names, **family.arrays}:
+        raise InputError(
+            f"{what}: there is no file {in_toml(given)} in {folder}; a {family.noun} is written by name: "
+            f"{{ name = {in_toml(given)}, … }}"
+        )
+
+
 def _checked_table(given: Any, what: str) -> Mapping[str, Any]:
     if not isinstance(given, dict):
         raise InputError(
-            f"{what} is {given!r}: it is a table of fields, in braces or below a line of its own, such as "
+            f"{what} is {in_toml(given)}: it is a table of fields, in braces or below a line of its own, such as "
             f"[sensor.electronics]"
         )
     return given
@@ -207,7 +230,9 @@ def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, 
         if str in alternatives(hints[0]):
             example = '"…"'
         example = example if family is None else family.example
-        raise InputError(f"{what} is {given!r}: it is a list{wanted}, like [{', '.join([example] * len(hints))}]")
+        raise InputError(
+            f"{what} is {in_toml(given)}: it is a list{wanted}, like [{', '.join([example] * len(hints))}]"
+        )
     return tuple(
         _read_value(value, hint, unit, f"{what}, number {number} of {len(hints)},", folder)
         for number, (value, hint) in enumerate(zip(given, hints, strict=True), start=1)
@@ -222,13 +247,13 @@ def _read_plain(given: Any, choices: tuple[Any, ...], what: str) -> Any:
         return float(given)
     names = {int: "a whole number", float: "a number", str: "text in quotes", bool: "true or false"}
     wanted = " or ".join(names[choice] for choice in choices if choice in names)
-    raise InputError(f"{what} is {given!r}: it is {wanted or 'something that a camera file cannot hold'}")
+    raise InputError(f"{what} is {in_toml(given)}: it is {wanted or 'something that a camera file cannot hold'}")
 
 
 def _read_named(given: Any, family: Family, arrays: bool, what: str, folder: Path) -> Any:
     """A thing by name; where a field takes arrays, also a name that stands for one."""
     if not isinstance(given, dict):
-        raise InputError(f"{what} is {given!r}: write a {family.noun} by name, like {family.example}")
+        raise InputError(f"{what} is {in_toml(given)}: write a {family.noun} by name, like {family.example}")
     extra = family.arrays if arrays else {}
     if "name" not in given:
         raise InputError(f"{what} has no name: add name = … with one of {listed([*family.names, *extra])}")
@@ -260,7 +285,8 @@ def read_array(given: Any, unit: str | None, transmission: bool, what: str, fold
             unit, '[["1 deg", "2 deg"]]'
         )
         raise InputError(
-            f"{what} is {given!r}: it is the name of a file, or rows of equally many numbers, like {example}"
+            f"{what} is {in_toml(given)}: it is the name of a file, or rows of equally many numbers, "
+            f"like {example}"
         )
     return values
 
