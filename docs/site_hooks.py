@@ -19,6 +19,8 @@ ROOT = Path(__file__).parents[1]
 ELSEWHERE = "repository"
 """The site's folder for files of the repository that pages link to."""
 COMMAND_LINE = "<!-- the command line's help -->"
+WIDEST_COMMAND = 90
+"""Characters of a line of shell on the page of commands."""
 _LINK = re.compile(r"(\]\()([^)\s]+)(\))")
 
 
@@ -109,6 +111,18 @@ def _command_line() -> str:
     for group, listed in (("vcc", COMMANDS), ("vcc synth", RENDERERS)):
         for name, (_, *examples) in listed.items():
             usage = re.compile(rf"```console\n{group} {name}[ \n].*?```\n", re.DOTALL)
-            shown = "\nFor example:\n\n```\n" + "\n".join(examples) + "\n```\n"
+            shown = "\nFor example:\n\n```\n" + "\n".join(map(_broken, examples)) + "\n```\n"
             text = usage.sub(lambda found, shown=shown: found[0] + shown, text, count=1)
     return text
+
+
+def _broken(command: str) -> str:
+    """A command on lines that a page has room for, broken before options."""
+    first, *options = re.split(r" (?=--?[a-z])", command)
+    lines = [first]
+    for option in options:
+        if len(lines[-1]) + len(option) > WIDEST_COMMAND:
+            lines.append(f"    {option}")
+        else:
+            lines[-1] += f" {option}"
+    return " \\\n".join(lines)

@@ -3,10 +3,11 @@
 The reference names all that is public, and the gallery's pages are those of its cameras as they are now.
 """
 
+import contextlib
+import functools
 import importlib
 import inspect
 import pkgutil
-import pydoc
 import re
 import runpy
 import warnings
@@ -182,11 +183,26 @@ def public_names():
         yield f"vcc.{name}", getattr(vcc, name)
 
 
-def test_the_reference_has_every_public_name():
+def located(name):
+    """What the site shows under a name: a module goes before what its package calls the same."""
+    parts = name.split(".")
+    for cut in range(len(parts), 0, -1):
+        with contextlib.suppress(ModuleNotFoundError):
+            module = importlib.import_module(".".join(parts[:cut]))
+            return functools.reduce(lambda held, part: getattr(held, part, None), parts[cut:], module)
+    return None
+
+
+@pytest.fixture(scope="module")
+def documented():
+    """What the reference names."""
     pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "reference").glob("*.md"))
     shown = re.findall(r"^::: (\S+)$", pages, re.M)
     assert len(shown) == len(set(shown))
-    documented = {name: pydoc.locate(name) for name in shown}
+    return {name: located(name) for name in shown}
+
+
+def test_the_reference_has_every_public_name(documented):
     assert [name for name, found in documented.items() if found is None] == []
     things = {id(found) for found in documented.values()}
     # A module is there with all that it holds, or name by name.
@@ -198,9 +214,24 @@ def test_the_reference_has_every_public_name():
         for name, thing in public_names()
         if id(thing) not in things
         and name not in documented
-        and not (inspect.ismodule(thing) and any(each.startswith(f"{thing.__name__}.") for each in shown))
+        and not (inspect.ismodule(thing) and any(each.startswith(f"{thing.__name__}.") for each in documented))
     }
     assert missing == set(), "name them in docs/reference"
+
+
+def test_the_reference_shows_no_module_in_place_of_the_function_of_its_name(documented):
+    for name, found in documented.items():
+        parent, _, last = name.rpartition(".")
+        if inspect.ismodule(found) and parent:
+            held = getattr(importlib.import_module(parent), last)
+            assert held is found, f"{name} is a module on the site: say {name}.{last}"
+
+
+def test_no_docstring_has_a_table_that_markdown_does_not_know(documented):
+    for name, found in documented.items():
+        inside = vars(found).values() if inspect.ismodule(found) or inspect.isclass(found) else ()
+        for thing in (found, *inside):
+            assert not re.search(r"^\s*=+ +=+", inspect.getdoc(thing) or "", re.M), name
 
 
 @pytest.mark.parametrize("module", ["patterns", "kernels", "surfaces"])

@@ -89,12 +89,10 @@ class Image:
     ) -> SavedPicture:
         """Write the picture; the ending of ``path`` chooses the format.
 
-        ======================  ==================================================================
-        ``.png``                sRGB, 8 bits (or 16): for people
-        ``.tif``, ``.tiff``     sRGB, 16 bits (or 8)
-        ``.exr``                linear float32, values untouched; channels R, G, B or Y
-        ``.npy``                linear float32, values untouched
-        ======================  ==================================================================
+        - ``.png``: sRGB, 8 bits (or 16), for people
+        - ``.tif``, ``.tiff``: sRGB, 16 bits (or 8)
+        - ``.exr``: linear float32, values untouched; channels R, G, B or Y
+        - ``.npy``: linear float32, values untouched
 
         Args:
             path: where to.

@@ -56,12 +56,10 @@ class Recording(RawPicture):
     def demosaiced(self, method: Demosaicing | None = None) -> Image:
         """The picture in all channels, of a recording through a colour filter, in the unit of `image`.
 
-        ==============  ============================================================================
-        ``"menon"``     Menon et al. (2007), edges followed by direction; Bayer tiles. The default there.
-        ``"malvar"``    Malvar et al. (2004), linear with gradients of the other channels; Bayer tiles
-        ``"bilinear"``  each channel by itself, the nearest samples weighted by distance (normalised
-                        convolution, Knutsson & Westin 1993); any tile. The default for other tiles.
-        ==============  ============================================================================
+        - ``"menon"``: Menon et al. (2007), edges followed by direction; Bayer tiles. The default there.
+        - ``"malvar"``: Malvar et al. (2004), linear with gradients of the other channels; Bayer tiles.
+        - ``"bilinear"``: each channel by itself, the nearest samples weighted by distance (normalised
+          convolution, Knutsson & Westin 1993); any tile. The default for other tiles.
 
         The first two are those of the package colour-demosaicing, an optional one; all work on linear irradiance,
         in which grey light has the same value in every channel.

@@ -43,13 +43,11 @@ class GroundTruth(Brief):
 def read_ground_truth(path: str | PathLike[str]) -> GroundTruth:
     """The true disparities or depths in a light field's folder or file.
 
-    ============================  ================================================================================
-    HCI 2016                      ``gt_disp_lowres.pfm``, ``gt_depth_lowres.pfm``; with ``_CamNNN`` for each view
-    HCI 2013                      ``/GT_DEPTH`` of ``lf.h5``
-    INRIA                         ``disparity_<row>_<col>.npy`` for each view
-    Cambridge                     ``disparity.npy`` for views base_x apart, brought to the spacing of the views
-    any                           a ``.pfm`` or ``.npy`` file, whose name tells which it is ("disp", "depth")
-    ============================  ================================================================================
+    - HCI 2016: ``gt_disp_lowres.pfm``, ``gt_depth_lowres.pfm``; with ``_CamNNN`` for each view
+    - HCI 2013: ``/GT_DEPTH`` of ``lf.h5``
+    - INRIA: ``disparity_<row>_<col>.npy`` for each view
+    - Cambridge: ``disparity.npy`` for views base_x apart, brought to the spacing of the views
+    - any: a ``.pfm`` or ``.npy`` file, whose name tells which it is ("disp", "depth")
 
     Args:
         path: the folder, the light field's file, or the file with the truth itself.

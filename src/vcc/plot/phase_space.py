@@ -194,7 +194,8 @@ def phase_space_stages(
 ) -> list[PhaseSpacePicture]:
     """The numbers that `plot_phase_space_stages` draws: rasters of radiance at each plane, by traced rays.
 
-    Args: as there, and
+    Args:
+        camera: through which the light field goes; this and what follows as there.
         rays: about how many are traced, 1 or more.
 
     Raises:

@@ -25,19 +25,17 @@ class Zernike(Surface):
     of the Optical Society of America 66, 1976, eq. 1 and table I): over it, the root mean square of a path is
     √(Σ aⱼ²) with piston (j = 1) left out. ρ = r/R, and θ runs from x towards y, which is downwards here.
 
-    === =================== =========================
-    j   name                Zⱼ
-    === =================== =========================
-    1   piston              1
-    2   tilt along x        2ρ cos θ
-    3   tilt along y        2ρ sin θ
-    4   defocus             √3 (2ρ² − 1)
-    5   oblique astigmatism √6 ρ² sin 2θ
-    6   astigmatism         √6 ρ² cos 2θ
-    7   coma along y        √8 (3ρ³ − 2ρ) sin θ
-    8   coma along x        √8 (3ρ³ − 2ρ) cos θ
-    11  spherical           √5 (6ρ⁴ − 6ρ² + 1)
-    === =================== =========================
+    | j  | name                | Zⱼ                   |
+    |----|---------------------|----------------------|
+    | 1  | piston              | 1                    |
+    | 2  | tilt along x        | 2ρ cos θ             |
+    | 3  | tilt along y        | 2ρ sin θ             |
+    | 4  | defocus             | √3 (2ρ² − 1)         |
+    | 5  | oblique astigmatism | √6 ρ² sin 2θ         |
+    | 6  | astigmatism         | √6 ρ² cos 2θ         |
+    | 7  | coma along y        | √8 (3ρ³ − 2ρ) sin θ  |
+    | 8  | coma along x        | √8 (3ρ³ − 2ρ) cos θ  |
+    | 11 | spherical           | √5 (6ρ⁴ − 6ρ² + 1)   |
 
     Beyond the disc the same polynomials go on, and grow fast.
 
