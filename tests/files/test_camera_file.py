@@ -604,17 +604,17 @@ def test_says_what_is_wrong_and_where(written, toml, message):
 
 def test_a_mask_file_that_cannot_be_read(tmp_path, written):
     (tmp_path / "broken.npy").write_bytes(b"no array")
-    with pytest.raises(InputError, match=MASK + ": broken.npy could not be read"):
+    with pytest.raises(InputError, match=MASK + r": .*broken.npy holds no numbers"):
         written(mask('"broken.npy"'))
     np.save(tmp_path / "complex.npy", np.array([[1j]]))
-    with pytest.raises(InputError, match=MASK + ": complex.npy .* it holds complex128, not real numbers"):
+    with pytest.raises(InputError, match=MASK + r": .*complex.npy holds complex128, not real numbers"):
         written(mask('"complex.npy"'))
 
 
 def test_no_such_file_and_no_text(tmp_path):
     with pytest.raises(InputError, match=r"there is no camera file .*lost\.toml"):
         load_camera(tmp_path / "lost.toml")
-    with pytest.raises(InputError, match="could not be read"):
+    with pytest.raises(InputError, match=r"there is no camera file .*: it is a folder"):
         load_camera(tmp_path)
     (tmp_path / "picture.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="not a text file"):

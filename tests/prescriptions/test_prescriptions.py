@@ -375,7 +375,7 @@ def test_other_files(file, tmp_path):
     with pytest.raises(InputError, match=r"there is no lens prescription .*missing\.dat"):
         vcc.load_lens(tmp_path / "missing.dat")
     (tmp_path / "folder.zmx").mkdir()
-    with pytest.raises(InputError, match=r"folder\.zmx could not be read"):
+    with pytest.raises(InputError, match=r"no lens prescription .*folder\.zmx: it is a folder"):
         vcc.load_lens(tmp_path / "folder.zmx")
 
 

@@ -262,7 +262,7 @@ def test_bad_input(options, message):
 
 
 def test_bad_scenes(folder):
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="there is no scene file"):
         MitsubaRenderer(folder / "none.xml", variant=PLAIN)
     for text, message in (("<scene", "is no XML"), ('<scene version="3.0.0"><bsdf type="nope"/></scene>', "nope")):
         (folder / "bad.xml").write_text(text)

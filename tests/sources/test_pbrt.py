@@ -168,7 +168,7 @@ def test_scenes_that_cannot_be_wrapped(tmp_path, head, message):
 
 
 def test_bad_input(tmp_path):
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="there is no scene file"):
         PbrtScene.read(tmp_path / "none.pbrt")
     with pytest.raises(InputError, match="has no WorldBegin"):
         PbrtScene.read(written(tmp_path, world=""))

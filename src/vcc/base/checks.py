@@ -354,7 +354,7 @@ def within(place: str) -> Iterator[None]:
         yield
     except InputError as error:
         said = str(error)
-        raise InputError(said if place in said else f"{place}: {said}") from None
+        raise InputError(said if place in said else f"{place}: {said}") from error.__cause__
 
 
 @contextmanager

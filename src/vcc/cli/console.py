@@ -53,6 +53,7 @@ def as_options(message: str) -> str:
     """
     message = message.replace("(lengths in metres)", '(lengths with a unit: "50 mm")')
     message = message.replace("focus_distance=… (metres)", 'focus_distance=… (a length: "1.2 m")')
+    message = message.replace("files_outside=True", "--files-outside")
     return _LIBRARY_OPTION.sub(lambda match: f"--{match[1].replace('_', '-')} ", message)
 
 

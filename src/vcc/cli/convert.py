@@ -39,7 +39,8 @@ class AnyReading(Reading):
     @property
     def layout(self) -> dict[str, Any]:
         """What of it says how a file is laid out."""
-        asked = {"views": self.views, "order": self.order, "every": self.every}
+        outside = self.files_outside or None
+        asked = {"views": self.views, "order": self.order, "every": self.every, "files_outside": outside}
         return {name: value for name, value in asked.items() if value is not None}
 
 

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.reading import expanded, reading, shown
 from vcc.base.units import short
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
@@ -46,22 +47,39 @@ def info(
     """
     if picture is not None:
         picture = check_output(picture, DRAWINGS)
-    path = light_field.expanduser()
+    show(describe(light_field, quick=quick, picture=picture, keep=keep, cameras=cameras))
+
+
+def describe(
+    light_field: Path,
+    *,
+    quick: bool = False,
+    picture: Path | None = None,
+    keep: bool = False,
+    cameras: ViewCameras = ViewCameras(),
+) -> str:
+    """What ``vcc info`` says of a path; for the arguments see `info`.
+
+    Raises:
+        InputError: what its reader says, or an option that does not fit it.
+    """
+    path = expanded(light_field)
     given = [*told(cameras), *(["--keep"] if keep else [])]
     if given and (is_store(path) or lytro_lfp.recognised(path)):
         what = "a store, which states its cameras" if is_store(path) else "a raw recording: it has no views yet"
         raise InputError(f"{path} is {what}: leave out {', '.join(given)}")
-    if lytro_lfp.recognised(path):
-        if picture is not None:
-            raise InputError(f"{path} is a raw recording of a Lytro camera: it has no grid of views to draw")
-        lines = _lytro_facts(path)
-    elif is_store(path):
-        lines = _of_a_store(path, quick, picture)
-    else:
-        kept = {"kept": f"{keep_geometry(path, **cameras.given())}"} if keep else {}
-        lines = _of_files(path, quick, picture, ViewCameras() if keep else cameras) | kept
+    with reading(path, "a light field"):
+        if lytro_lfp.recognised(path):
+            if picture is not None:
+                raise InputError(f"{path} is a raw recording of a Lytro camera: it has no grid of views to draw")
+            lines = _lytro_facts(path)
+        elif is_store(path):
+            lines = _of_a_store(path, quick, picture)
+        else:
+            kept = {"kept": f"{keep_geometry(path, **cameras.given())}"} if keep else {}
+            lines = _of_files(path, quick, picture, ViewCameras() if keep else cameras) | kept
     width = max(map(len, lines)) + 2
-    show("\n".join(f"{name:<{width}}{value}" for name, value in lines.items()))
+    return "\n".join(f"{name:<{width}}{shown(value)}" for name, value in lines.items())
 
 
 def _of_files(path: Path, quick: bool, picture: Path | None, cameras: ViewCameras) -> dict[str, str]:

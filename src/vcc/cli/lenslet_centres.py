@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.reading import check_file, expanded, read_text, reading
 from vcc.cli.raw_recordings import RawRecording
+from vcc.files.npy import read_npy
 from vcc.recover import LensletGrid
 
 _ORDERS = {"x y": "x-y", "row column": "row-column", "row col": "row-column"}
@@ -31,7 +33,7 @@ def grid_of(path: Path, order: str | None, first: int, bright: RawRecording) -> 
     Raises:
         InputError: no such list, one that cannot be read, that lies outside of the recording, or is no lattice.
     """
-    listed, said = _listed(path.expanduser())
+    listed, said = _listed(expanded(path))
     if order is not None and said not in (None, order):
         raise InputError(f'the first line of {path} says "{said}": leave out --centres-order')
     places = listed - first
@@ -69,12 +71,11 @@ def _mean_light(light: NDArray[np.float64], places: NDArray[np.float64]) -> floa
 
 def _listed(path: Path) -> tuple[NDArray[np.float64], str | None]:
     """(n, 2) numbers, and the order that a first line of names states."""
-    if not path.is_file():
-        raise InputError(f"there is no list of centres {path}")
+    check_file(path, "list of centres")
     said = None
-    try:
+    with reading(path, "a list of centres, two numbers each"):
         if path.suffix.lower() == ".npy":
-            found = np.load(path, allow_pickle=False)
+            found = read_npy(path, "list of centres")
         elif path.suffix.lower() == ".mat":
             from scipy.io import loadmat
 
@@ -87,17 +88,13 @@ def _listed(path: Path) -> tuple[NDArray[np.float64], str | None]:
                 )
             found = next(iter(lists.values()))
         elif path.suffix.lower() in (".csv", ".txt"):
-            lines = path.read_text(encoding="utf-8").replace(",", " ").replace(";", " ").strip().splitlines()
+            lines = read_text(path).replace(",", " ").replace(";", " ").strip().splitlines()
             names = tuple(lines[0].lower().split()) if lines else ()
             header = bool(names) and not any(character.isdigit() for character in lines[0])
             said = _ORDERS.get(" ".join(names))
             found = np.array([[float(each) for each in line.split()] for line in lines[header:]])
         else:
             raise InputError(f"{path} is no list of centres: its name must end in .csv, .txt, .npy or .mat")
-    except InputError:
-        raise
-    except Exception as error:  # each library has its own types for a damaged file
-        raise InputError(f"{path} cannot be read as a list of centres, two numbers each: {error}") from None
     if found.ndim < 2 or found.shape[-1] != 2 or found.dtype.kind not in "uif":
         raise InputError(
             f"{path} must hold two numbers for each centre, and holds an array of shape {found.shape}"

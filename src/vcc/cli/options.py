@@ -221,10 +221,12 @@ class Reading(ViewCameras):
             (proportional to it), or auto: as the format says, srgb where it says nothing.
         orientation: Order of the views. auto checks it by parallax and puts it right; as-is takes the files as
             they are.
+        files_outside: Let a views.csv name files outside of its folder. Only for lists that you trust.
     """
 
     transfer: Literal["auto", "srgb", "linear"] = "auto"
     orientation: Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"] = "auto"
+    files_outside: bool = False
 
     def light_field(self, path: Path) -> LightField | StoredLightField:
         """The light field that is asked for, with a progress bar; a store is opened, not read.

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.reading import expanded
 from vcc.cli.options import Size
 from vcc.files.pictures import READ_ENDINGS, read_picture
 from vcc.formats.lytro_lfp import read_lytro
@@ -81,7 +82,7 @@ def read_raw(path: Path, camera: Train | None, color_filter: str | None, black: 
     Raises:
         InputError: a file that cannot be read, or a colour filter other than the camera's or the file's.
     """
-    path = path.expanduser()
+    path = expanded(path)
     if path.suffix.lower() in _LYTRO:
         lytro = read_lytro(path)
         if color_filter not in (None, lytro.color_filter):

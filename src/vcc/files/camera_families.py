@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from vcc import optics
 from vcc.base.describe import kind_in_words
 from vcc.base.errors import InputError
+from vcc.base.reading import expanded
 from vcc.optics import Element, FirstOrder
 from vcc.prescriptions import load_lens
 from vcc.shapes import height_maps, kernels, lattice, patterns, surfaces, zernike
@@ -138,7 +139,7 @@ class _LensFile:
             for field in dataclasses.fields(self)[1:]
             if getattr(self, field.name) is not None
         }
-        lens = load_lens(folder / Path(self.lens_file).expanduser(), **given)
+        lens = load_lens(folder / expanded(self.lens_file), **given)
         return dataclasses.replace(lens, source=self.lens_file)
 
     @classmethod

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import inspect
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base import checks, units
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.reading import check_file, expanded, in_words, read_bytes, reading
 from vcc.files.camera_families import (
     ELEMENT_KINDS,
     FROM_FILES,
@@ -30,6 +32,7 @@ from vcc.files.camera_families import (
     parameters_of,
     unit_of,
 )
+from vcc.files.npy import read_npy
 from vcc.files.pictures import read_grey
 from vcc.files.toml_words import as_toml, in_toml
 from vcc.optics.sensor import Sensor
@@ -44,14 +47,15 @@ _ARRAY_LIKE = set(get_args(ArrayLike))
 
 def read_train(path: str | PathLike[str]) -> Train:
     """The optical train that a TOML file describes; see `vcc.camera_file.load_camera`."""
+    file = expanded(path)
     try:
-        return _read(Path(path).expanduser())
+        with reading(file, "a camera file"):
+            return _train_of(_read_toml(file), file)
     except InputError as error:
-        raise InputError(as_toml(str(error))) from None
+        raise InputError(as_toml(str(error))) from error.__cause__
 
 
-def _read(file: Path) -> Train:
-    tables = _read_toml(file)
+def _train_of(tables: Mapping[str, Any], file: Path) -> Train:
     _check_keys(tables, {"elements", "sensor"}, {"sensor"}, f"{file}", "table")
     elements = tables.get("elements", [])
     if not isinstance(elements, list) or not all(isinstance(entry, dict) for entry in elements):
@@ -66,17 +70,14 @@ def _read(file: Path) -> Train:
 
 def _read_toml(file: Path) -> dict[str, Any]:
     try:
-        content = file.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        raise InputError(f"there is no camera file {file}") from None
+        content = read_bytes(file, "camera file").decode("utf-8")
     except UnicodeDecodeError:
         raise InputError(f"{file} is not a text file in UTF-8, as TOML is") from None
-    except OSError as error:
-        raise InputError(f"{file} could not be read: {error.strerror or error}") from None
     try:
         return tomllib.loads(content)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file} is not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits
+        reason = in_words(error) if isinstance(error, RecursionError) else error
+        raise InputError(f"{file} is not valid TOML: {reason}") from None
 
 
 def _read_element(entry: Mapping[str, Any], number: int, file: Path) -> Any:
@@ -274,7 +275,7 @@ def _read_affine(given: Any, what: str, folder: Path) -> Affine:
 def read_array(given: Any, unit: str | None, transmission: bool, what: str, folder: Path) -> NDArray[np.float64]:
     """Numbers from a file beside the camera file, or rows of them; where they have a unit, each with its own."""
     if isinstance(given, str):
-        return _read_array_file(folder / Path(given).expanduser(), given, unit, transmission, what)
+        return _read_array_file(folder / expanded(given), given, unit, transmission, what)
     with_units = given if unit is None else _with_units(given, unit, what)
     try:
         values = np.array(with_units, dtype=np.float64)
@@ -304,20 +305,20 @@ def _read_array_file(
 
     Where they are transmissions, whole numbers in a .npy are a share of their full scale too, as in a picture.
     """
-    if not file.is_file():
+    if not os.path.lexists(file):
         raise InputError(f'{what}: there is no file "{name}" in {file.parent}')
     ending = file.suffix.lower()
-    try:
+    with checks.within(what):
+        check_file(file)
         if ending == ".csv":
-            return np.loadtxt(file, delimiter=",", dtype=np.float64, ndmin=2)
+            with reading(file, "a table of numbers"):
+                return np.loadtxt(file, delimiter=",", dtype=np.float64, ndmin=2)
         if ending == ".npy":
-            values = np.load(file, allow_pickle=False)
+            values = read_npy(file)
             if values.dtype.kind not in "fiub":
-                raise ValueError(f"it holds {values.dtype}, not real numbers")
+                raise InputError(f"{file} holds {values.dtype}, not real numbers")
             if values.dtype.kind == "f" or not transmission:
                 return np.asarray(values, dtype=np.float64)
-    except (ValueError, OSError, EOFError) as error:
-        raise InputError(f"{what}: {name} could not be read: {error}") from None
     if unit is not None:
         raise InputError(
             f"{what} is {name}: only .npy and .csv hold numbers with a unit, in SI ({units.SI_NAMES[unit]}s)"

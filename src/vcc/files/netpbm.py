@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 
 _SPACE = rb"(?:\s|#[^\n]*\n)+"
-_HEADER = re.compile(rb"P([56])" + _SPACE + rb"(\d+)" + _SPACE + rb"(\d+)" + _SPACE + rb"(\d+)\s")
+_HEADER = re.compile(rb"P([56])" + _SPACE + rb"(\d{1,18})" + _SPACE + rb"(\d{1,18})" + _SPACE + rb"(\d{1,9})\s")
 
 
 def read_netpbm(path: Path) -> NDArray[Any]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import re
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.reading import expanded, read_bytes
 
-_HEADER = re.compile(rb"(P[fF])\s+(\d+)\s+(\d+)\s+(\S+)[ \t\r]*\n")
+_HEADER = re.compile(rb"(P[fF])\s+(\d{1,18})\s+(\d{1,18})\s+(\S+)[ \t\r]*\n")
 
 
 def read_pfm(path: str | PathLike[str]) -> NDArray[np.float32]:
@@ -21,10 +21,8 @@ def read_pfm(path: str | PathLike[str]) -> NDArray[np.float32]:
     Raises:
         InputError: no such file, another format, or one that is truncated.
     """
-    path = Path(path).expanduser()
-    if not path.is_file():
-        raise InputError(f"there is no file {path}")
-    data = path.read_bytes()
+    path = expanded(path)
+    data = read_bytes(path)
     match = _HEADER.match(data)
     scale = math.nan
     if match is not None:

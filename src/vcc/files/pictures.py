@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.reading import check_file
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
 from vcc.files.netpbm import read_netpbm
+from vcc.files.npy import read_npy
 
 READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
 """The endings that `read_picture` knows."""
@@ -60,12 +62,13 @@ def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
             f'{path} has the ending "{ending}", which is not a picture that can be read: '
             f"{', '.join(READ_ENDINGS)} can"
         )
-    if not path.is_file():
-        raise InputError(f"there is no picture file {path}")
+    check_file(path, "picture file")
     try:
         samples = _READERS[ending](path)
-    except (_Unsuitable, InputError) as error:
+    except _Unsuitable as error:
         raise InputError(f"{path}: {error}") from None
+    except InputError as error:
+        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
     except Exception as error:  # each library has its own types for a damaged file
         raise InputError(
             f"{path} cannot be read as a picture: it is truncated, damaged or not a "
@@ -84,7 +87,7 @@ def read_png_into(path: Path, out: NDArray[Any]) -> bool:
     Returns:
         False, with anything in ``out``, for whatever is not such a PNG: `read_picture` reads it, or says why not.
     """
-    if path.suffix.lower() != ".png" or out.dtype not in (np.uint8, np.uint16):
+    if path.suffix.lower() != ".png" or out.dtype not in (np.uint8, np.uint16) or not path.is_file():
         return False
     import imagecodecs
 
@@ -413,8 +416,7 @@ def _read_exr(path: Path) -> NDArray[Any]:
 
 
 def _read_npy(path: Path) -> NDArray[Any]:
-    samples: NDArray[Any] = np.load(path, allow_pickle=False)
-    return samples
+    return read_npy(path)
 
 
 _NOT_OPAQUE = (

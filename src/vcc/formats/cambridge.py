@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from vcc.base.errors import InputError
+from vcc.base.reading import read_bytes
 from vcc.formats.grid import Geometry
 
 PARAMETERS = "param.txt"
@@ -56,9 +58,9 @@ def read_parameters(folder: Path) -> Parameters | None:
         InputError: a quantity that is missing or impossible.
     """
     path = folder / PARAMETERS
-    if not path.is_file():
+    if not os.path.lexists(path):
         return None
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = read_bytes(path).decode("utf-8", errors="replace")
     stated = {match[1]: match[2] for line in text.splitlines() if (match := _LINE.fullmatch(line))}
     if not stated:
         return None  # some other file of this common name

@@ -8,11 +8,12 @@ from types import ModuleType
 from typing import Any
 
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
+from vcc.base.reading import check_path, expanded, reading
 from vcc.formats import arrays, eslf, hci_2013, lftoolbox, lytro_lfp, plenoptomos_vox, video, viewer_zip
 from vcc.formats.grid import Decoded
 
-CONTAINERS: tuple[ModuleType, ...] = (
+_MODULES = (
     # Each is a module with `recognised(path: Path) -> bool`, quick and by the ending or the first bytes, and
     # `read(path: Path, *, …) -> Decoded`; keyword arguments of `read` are options that `open_light_field(path, …)`
     # passes on, but for `progress`, which it takes if it has something to say. The first that recognises a path
@@ -26,11 +27,18 @@ CONTAINERS: tuple[ModuleType, ...] = (
     viewer_zip,
     eslf,
 )
+CONTAINERS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
+"""The modules that read them, by their names."""
 
 
 def container_of(path: Path) -> ModuleType | None:
-    """The module that reads this file or folder; None if none does."""
-    return next((module for module in CONTAINERS if module.recognised(path)), None)
+    """The module that reads this file or folder; None if none does.
+
+    Raises:
+        InputError: there is no such file or folder, or it cannot be read.
+    """
+    check_path(path, "folder or file")
+    return next((module for module in CONTAINERS.values() if module.recognised(path)), None)
 
 
 def read_container(path: Path, progress: Progress | None = None, **options: Any) -> Decoded:
@@ -45,11 +53,15 @@ def read_container(path: Path, progress: Progress | None = None, **options: Any)
         InputError: no such file, a format that is not known, an option that its reader does not take, or what the
             reader says.
     """
-    module = container_of(path)
-    if module is None:
-        if not path.exists():
-            raise InputError(f"there is no file {path}")
-        raise InputError(f"{path} is in no format that is known")
+    path = expanded(path)
+    with reading(path, "a light field"):
+        module = container_of(path)
+        if module is None:
+            raise InputError(f"{path} is in no format that is known")
+        return _read(module, path, progress, options)
+
+
+def _read(module: ModuleType, path: Path, progress: Progress | None, options: dict[str, Any]) -> Decoded:
     parameters = inspect.signature(module.read).parameters
     taken = [key for key in parameters if key not in ("path", "progress")]
     for option in options:
@@ -59,6 +71,6 @@ def read_container(path: Path, progress: Progress | None = None, **options: Any)
     if "progress" in parameters:
         options["progress"] = progress
     decoded: Decoded = module.read(path, **options)
-    if progress is not None and "progress" not in parameters:
-        progress(1, 1)
+    if "progress" not in parameters:
+        tell(progress, 1, 1)
     return decoded

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.reading import check_path
 from vcc.formats import cambridge, camera_names, hci, numbered, rowcol, stanford, views_csv
 from vcc.formats.grid import Geometry, ViewGrid
 from vcc.formats.numbered import ORDERS, Order
 
-_FINDERS = (views_csv.find, hci.find, camera_names.find, stanford.find, rowcol.find)
-"""The formats in the order in which they are tried."""
+_FINDERS = (hci.find, camera_names.find, stanford.find, rowcol.find)
+"""The formats in the order in which they are tried, behind a list of views."""
 
 
 def find_grid(
@@ -22,6 +24,7 @@ def find_grid(
     order: Order | None = None,
     *,
     sparse: bool = False,
+    files_outside: bool = False,
     options: Collection[str] = (),
 ) -> ViewGrid:
     """The grid of views in a folder, from the first format that fits.
@@ -31,13 +34,14 @@ def find_grid(
         views: see `vcc.formats.open_light_field`.
         order: likewise.
         sparse: leave None where a view is missing, instead of refusing the folder.
+        files_outside: see `vcc.formats.open_light_field`.
         options: names of others, which no folder takes.
 
     Raises:
         InputError: no such folder, no views in it, views that are missing or too many, or impossible options.
     """
     _check(folder, views, order, options)
-    for find in _FINDERS:
+    for find in (partial(views_csv.find, anywhere=files_outside), *_FINDERS):
         grid = find(folder, sparse=sparse)
         # A single "row" whose size is not as told is a running number after another number.
         if grid is None or (find is rowcol.find and views not in (None, grid.shape) and 1 in grid.shape):
@@ -74,9 +78,7 @@ def towards_positions(grid: ViewGrid) -> tuple[ViewGrid, str]:
 
 
 def _check(folder: Path, views: tuple[int, int] | None, order: Order | None, options: Collection[str]) -> None:
-    if not folder.exists():
-        raise InputError(f"there is no folder or file {folder}")
-    if not folder.is_dir():
+    if not check_path(folder, "folder or file"):
         raise InputError(
             f"{folder} is a file in no format that is known. A light field is opened from a folder with a picture "
             "for each view, or from one of the files that docs/files.md lists"

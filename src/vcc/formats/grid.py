@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -20,6 +20,9 @@ from vcc.fields.grid import Sample
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")
 """The endings of the files that views may be stored in."""
+
+MOST_PLACES = 2**20
+"""Of a grid of which views are missing: a name with a wrong number could claim any."""
 
 DEFAULT_SPACING = 1 * mm
 """The view spacing taken where nothing states one, metres."""
@@ -159,7 +162,7 @@ def pictures_in(folder: Path) -> list[Path]:
 def arrange(
     places: Iterable[Place],
     folder: Path,
-    numbers: tuple[Sequence[int], Sequence[int]] | None = None,
+    numbers: tuple[range, range] | None = None,
     *,
     sparse: bool = False,
 ) -> tuple[tuple[Path | None, ...], ...]:
@@ -192,6 +195,12 @@ def arrange(
     _refuse_extra(at, rows, columns, folder)
     if not sparse:
         _refuse_missing(at, rows, columns, folder)
+    elif length(rows) * length(columns) > MOST_PLACES:
+        raise InputError(
+            f"{folder} has {len(at)} views in a grid of {length(rows)}×{length(columns)}, and a grid with views "
+            f"missing has at most {MOST_PLACES:,} places: is a number wrong? The highest are row {rows[-1]} and "
+            f"column {columns[-1]}"
+        )
     return tuple(tuple(at.get((row, column)) for column in columns) for row in rows)
 
 
@@ -202,28 +211,29 @@ def _counted(numbers: list[int]) -> range:
     return range(low, high + 1, step)
 
 
-def _refuse_extra(
-    at: dict[tuple[int, int], Path], rows: Sequence[int], columns: Sequence[int], folder: Path
-) -> None:
+def length(numbers: range) -> int:
+    """How many numbers, also where they are more than `len` can say."""
+    return max(0, (numbers.stop - numbers.start + numbers.step - 1) // numbers.step)
+
+
+def _refuse_extra(at: dict[tuple[int, int], Path], rows: range, columns: range, folder: Path) -> None:
     extra = [where for where in at if where[0] not in rows or where[1] not in columns]
     if extra:
         raise InputError(
-            f"{folder} has {len(extra)} views outside its grid of {len(rows)}×{len(columns)} views, for instance "
-            f"{at[extra[0]].name} at (row {extra[0][0]}, column {extra[0][1]}). "
+            f"{folder} has {len(extra)} views outside its grid of {length(rows)}×{length(columns)} views, for "
+            f"instance {at[extra[0]].name} at (row {extra[0][0]}, column {extra[0][1]}). "
             "Move them away or correct the size of the grid"
         )
 
 
-def _refuse_missing(
-    at: dict[tuple[int, int], Path], rows: Sequence[int], columns: Sequence[int], folder: Path
-) -> None:
-    total = len(rows) * len(columns)
+def _refuse_missing(at: dict[tuple[int, int], Path], rows: range, columns: range, folder: Path) -> None:
+    total = length(rows) * length(columns)
     if len(at) == total:
         return
     missing = ((row, column) for row in rows for column in columns if (row, column) not in at)
     count = total - len(at)
     raise InputError(
-        f"{folder} has {len(at)} of the {total} views of its {len(rows)}×{len(columns)} grid; "
+        f"{folder} has {len(at)} of the {total} views of its {length(rows)}×{length(columns)} grid; "
         f"{count} are missing, by (row, column): {first_few(missing, count)}. Incomplete grids are no "
         "light field: add the missing files, or open those that there are with vcc.formats.open_sparse_views"
     )

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.reading import check_path, expanded, reading
+from vcc.files.npy import read_npy
 from vcc.files.pfm import read_pfm
 from vcc.formats import cambridge, containers, hci
 
@@ -56,11 +58,12 @@ def read_ground_truth(path: str | PathLike[str]) -> GroundTruth:
         InputError: no such file, none of these in the folder, maps of different sizes or missing ones, a damaged
             file, or a name that does not tell what it holds.
     """
-    path = Path(path).expanduser()
-    if not path.exists():
-        raise InputError(f"there is no file or folder {path}")
-    if path.is_dir():
-        return _of_folder(path)
+    path = expanded(path)
+    with reading(path, "true disparities or depths"):
+        return _of_folder(path) if check_path(path, "file or folder") else _of_file(path)
+
+
+def _of_file(path: Path) -> GroundTruth:
     if path.suffix.lower() in (".pfm", ".npy"):
         return _made(path.name, _named_quantity(path), _map(path))
     decoded = containers.read_container(path)
@@ -155,21 +158,13 @@ def _stacked(files: dict[tuple[int, int], Path], shape: tuple[int, int]) -> NDAr
 
 def _map(path: Path) -> NDArray[np.float32]:
     """One map, shape (t, s)."""
-    reader: Callable[[Path], NDArray[Any]] = read_pfm if path.suffix.lower() == ".pfm" else _read_npy
+    reader: Callable[[Path], NDArray[Any]] = read_pfm if path.suffix.lower() == ".pfm" else read_npy
     values = np.squeeze(reader(path))
     if values.ndim != 2 or values.dtype.kind not in "fui":
         raise InputError(
             f"{path} holds an array of shape {values.shape} and type {values.dtype}, not one map of numbers"
         )
     return values.astype(np.float32)
-
-
-def _read_npy(path: Path) -> NDArray[Any]:
-    try:
-        values: NDArray[Any] = np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
-        raise InputError(f"{path} cannot be read as a NumPy array: {error}. Copy it again") from None
-    return values
 
 
 def _named_quantity(path: Path) -> Quantity:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.reading import read_bytes, read_text
 from vcc.base.units import mm
 from vcc.fields.grid import Sample
 from vcc.formats.cameras import Cameras
@@ -154,11 +155,7 @@ def parameters_file(folder: Path) -> Path | None:
     path = folder / PARAMETERS
     if path.is_file():
         return path
-    others = [
-        file
-        for file in sorted(folder.glob("*.cfg"))
-        if "[extrinsics]" in file.read_text(encoding="utf-8", errors="replace")
-    ]
+    others = [file for file in sorted(folder.glob("*.cfg")) if b"[extrinsics]" in read_bytes(file, "camera file")]
     if len(others) > 1:
         raise InputError(
             f"{folder} has {len(others)} camera files, {', '.join(file.name for file in others)}. "
@@ -183,8 +180,8 @@ def _settings(folder: Path) -> configparser.ConfigParser | None:
         return None
     settings = configparser.ConfigParser(interpolation=None, strict=False)
     try:
-        settings.read_string(path.read_text(encoding="utf-8"))
-    except (configparser.Error, UnicodeDecodeError) as error:
+        settings.read_string(read_text(path, "camera file"))
+    except configparser.Error as error:
         raise InputError(f"{path} cannot be read as an HCI camera file: {' '.join(str(error).split())}") from None
     return settings
 

@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 from vcc.base.errors import InputError
+from vcc.base.reading import expanded, reading
 from vcc.files.atomic import atomic_path
 from vcc.formats import containers, hci
 from vcc.formats.folder_info import Given, cameras_for, info_of_grid
@@ -42,7 +43,17 @@ def keep_geometry(
         InputError: a file, which has no place for it; a folder with a camera file already, or whose files state
             all where nothing is given; a folder that cannot be written to; what `open_light_field` refuses.
     """
-    folder = Path(path).expanduser()
+    folder = expanded(path)
+    with reading(folder, "a folder of views"):
+        text = _text(folder, Given(spacing, slope_per_pixel, focus_distance), views, order)
+    file = folder / hci.PARAMETERS
+    with atomic_path(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return file
+
+
+def _text(folder: Path, given: Given, views: tuple[int, int] | None, order: Order | None) -> str:
+    """What ``parameters.cfg`` of a folder is to say."""
     if containers.container_of(folder) is not None:
         raise InputError(
             f"{folder} is one file, beside which no camera file is read: make a store of it, which states its "
@@ -52,7 +63,7 @@ def keep_geometry(
     there = hci.parameters_file(folder)
     if there is not None:
         raise InputError(f"{there} states the cameras already: correct what it says, or move it away first")
-    info, given = info_of_grid(grid), Given(spacing, slope_per_pixel, focus_distance)
+    info = info_of_grid(grid)
     if not info.unknown and not given.names:
         raise InputError(
             f"{folder}: its files ({info.format}) state all of its cameras, so there is nothing to keep"
@@ -70,7 +81,4 @@ def keep_geometry(
     assumed = [name for name in info.unknown if name not in given.names]
     if assumed:
         text = f"# Assumed, since neither the files nor anybody said it: {', '.join(assumed)}\n{text}"
-    file = folder / hci.PARAMETERS
-    with atomic_path(file) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return file
+    return text

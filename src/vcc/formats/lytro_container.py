@@ -13,11 +13,11 @@ It is a header, a table of contents in JSON and blobs that the table calls by th
 from __future__ import annotations
 
 import hashlib
-import json
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from vcc.base.errors import InputError
+from vcc.base.reading import check_file, read_json
 
 _FILE = bytes.fromhex("894C46500D0A1A0A")
 _CONTENTS = bytes.fromhex("894C464D0D0A1A0A")
@@ -42,8 +42,7 @@ class Container:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        if not path.is_file():
-            raise InputError(f"there is no file {path}")
+        check_file(path)
         self._file: BinaryIO = path.open("rb")
         try:
             self._size = path.stat().st_size
@@ -86,13 +85,7 @@ class Container:
 
     def json(self, name: str, what: str) -> dict[str, Any]:
         """The JSON object that a section holds."""
-        try:
-            found = json.loads(self.bytes_of(name, what).rstrip(b"\0"))
-        except ValueError as error:  # not JSON, or not UTF-8
-            raise self.fault(f"{what} is not JSON: {error}") from None
-        if not isinstance(found, dict):
-            raise self.fault(f"{what} is not a JSON object")
-        return found
+        return read_json(self.bytes_of(name, what).rstrip(b"\0"), f"{self.path}: {what}")
 
     def _walk(self) -> str:
         """Find all sections; returns the name of the table of contents."""
@@ -128,10 +121,3 @@ class Container:
         if contents is None:
             raise self.fault("it has no table of contents. Copy it again from where it came from")
         return contents
-
-
-def stated_at(tree: Any, *keys: str) -> Any:
-    """What stands in a tree of JSON under these keys; None if nothing does."""
-    for key in keys:
-        tree = tree.get(key) if isinstance(tree, dict) else None
-    return tree

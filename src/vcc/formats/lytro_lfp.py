@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.reading import expanded, reading, stated_at
 from vcc.formats.grid import Decoded
-from vcc.formats.lytro_container import Container, begins_as_container, stated_at
+from vcc.formats.lytro_container import Container, begins_as_container
 
 ENDINGS = (".lfp", ".lfr", ".lfx")
 
@@ -191,7 +192,8 @@ def read_lytro(path: str | PathLike[str]) -> LytroRaw:
             recording (Lytro's web files hold only pictures made of one), metadata that cannot be understood, or
             an unknown packing.
     """
-    with Container(Path(path).expanduser()) as container:
+    path = expanded(path)
+    with reading(path, "a raw recording of a Lytro camera"), Container(path) as container:
         image = _Recording(container)
         return LytroRaw(
             mosaic=unpack(image.packed(), image.bits, image.shape),
@@ -330,7 +332,7 @@ class _Recording:
         corner = self._stated("mosaic", "upperLeftPixel")
         if corner is None:
             return packing.color_filter
-        if corner not in _CORNERS:
+        if not isinstance(corner, str) or corner not in _CORNERS:
             raise self._container.fault(
                 f'the upper left pixel of its colour filter is "{corner}"; {", ".join(_CORNERS)} are known'
             )
@@ -340,9 +342,13 @@ class _Recording:
         value = stated_at(self.metadata, *keys)
         if value is None:
             return None
-        if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+        try:
+            number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
             raise self._container.fault(f"{'.'.join(keys)} of its metadata is {value!r}, not a number")
-        return float(value)
+        return number
 
     def _length(self, *keys: str) -> float | None:
         """A number above 0, in metres if it is a length."""

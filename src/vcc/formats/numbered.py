@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.words import first_few
 from vcc.files.pictures import read_picture
-from vcc.formats.grid import ViewGrid, pictures_in
+from vcc.formats.grid import MOST_PLACES, ViewGrid, pictures_in
 
 Order = Literal["row-major", "column-major", "serpentine", "serpentine-columns"]
 
@@ -123,15 +123,15 @@ def _line(
             f"{folder} has {len(numbered)} of {count} numbered views, from {first} to {last}, and which of the "
             "others are missing cannot be known. Add them, or list those that there are in a views.csv"
         )
-    line = [numbered.get(first + n * step) for n in range(count)]
-    missing = [first + n * step for n, file in enumerate(line) if file is None]
-    if missing and not sparse:
+    missing = count - len(numbered)
+    if missing and (not sparse or count > MOST_PLACES):
+        named = (number for number in range(first, first + count * step, step) if number not in numbered)
+        way_out = "Add them, or open those that there are with vcc.formats.open_sparse_views"
         raise InputError(
-            f"{folder} has {len(numbered)} of {count} numbered views; {len(missing)} are missing: "
-            f"{first_few(missing, len(missing))}. Add "
-            "them, or open those that there are with vcc.formats.open_sparse_views"
+            f"{folder} has {len(numbered)} of {count} numbered views; {missing} are missing: "
+            f"{first_few(named, missing)}. {way_out if not sparse else 'Is a number wrong?'}"
         )
-    return line
+    return [numbered.get(first + n * step) for n in range(count)]
 
 
 @dataclass(frozen=True)

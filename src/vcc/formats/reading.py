@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.errors import ResultWarning
 from vcc.base.progress import Progress
+from vcc.base.reading import expanded, reading
 from vcc.fields import parallax
 from vcc.fields.disparity import Disparities
 from vcc.fields.grid import Grid
@@ -42,6 +43,7 @@ def read_geometry(
     views: tuple[int, int] | None = None,
     order: Order | None = None,
     sparse: bool = False,
+    files_outside: bool = False,
     **options: Any,
 ) -> FolderInfo:
     """What a folder of views or a file holds: format, sizes and cameras.
@@ -56,15 +58,18 @@ def read_geometry(
         views: see `open_light_field`.
         order: likewise.
         sparse: list missing views in ``missing`` instead of refusing the folder.
+        files_outside: see `open_light_field`.
         options: likewise.
 
     Raises:
         InputError: what `open_light_field` says of folders and files.
     """
-    path = Path(path).expanduser()
-    if containers.container_of(path) is not None:
-        return info_of_file(_decoded(path, views, order, None, options))
-    return info_of_grid(find_grid(path, views, order, sparse=sparse, options=options))
+    path = expanded(path)
+    with reading(path, "a light field"):
+        if containers.container_of(path) is not None:
+            return info_of_file(_decoded(path, views, order, None, _with(options, files_outside)))
+        grid = find_grid(path, views, order, sparse=sparse, files_outside=files_outside, options=options)
+        return info_of_grid(grid)
 
 
 def open_light_field(
@@ -77,6 +82,7 @@ def open_light_field(
     orientation: OrientationChoice = "auto",
     views: tuple[int, int] | None = None,
     order: Order | None = None,
+    files_outside: bool = False,
     progress: Progress | None = None,
     **options: Any,
 ) -> LightField:
@@ -104,6 +110,8 @@ def open_light_field(
         views: (rows, columns) of views, for running numbers and for single pictures of tiled views.
         order: how views are counted: "row-major", "column-major", "serpentine" (every other row reversed) or
             "serpentine-columns". Running numbers without it are arranged so that neighbours differ least.
+        files_outside: let a ``views.csv`` name files outside of its folder (``../a.png``, ``/data/a.png``). Only
+            for lists that you trust: one that came with a folder could name any picture of yours.
         progress: called as progress(done, total) after each picture.
         options: what the reader of a file's format takes beside, see docs/files.md.
 
@@ -122,14 +130,16 @@ def open_light_field(
     """
     checks.one_of("transfer", transfer, get_args(Transfer))
     checks.one_of("orientation", orientation, get_args(OrientationChoice))
-    path = Path(path).expanduser()
+    path = expanded(path)
     given = Given(spacing, slope_per_pixel, focus_distance)
-    if containers.container_of(path) is not None:
-        opened = _opened_file(_decoded(path, views, order, progress, options), path, given, transfer)
-    else:
-        grid = find_grid(path, views, order, options=options)
-        opened = _opened_folder(grid, path, given, transfer, orientation, progress)
-    light_field, remarks = _put_in_order(opened, path, orientation, given)
+    with reading(path, "a light field"):
+        if containers.container_of(path) is not None:
+            decoded = _decoded(path, views, order, progress, _with(options, files_outside))
+            opened = _opened_file(decoded, path, given, transfer)
+        else:
+            grid = find_grid(path, views, order, files_outside=files_outside, options=options)
+            opened = _opened_folder(grid, path, given, transfer, orientation, progress)
+        light_field, remarks = _put_in_order(opened, path, orientation, given)
     for remark in filter(None, remarks):
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
     return light_field
@@ -144,6 +154,7 @@ def open_sparse_views(
     focus_distance: float | None = None,
     views: tuple[int, int] | None = None,
     order: Order | None = None,
+    files_outside: bool = False,
     progress: Progress | None = None,
 ) -> SparseViews:
     """The views there are of a folder whose grid is not complete; for the arguments see `open_light_field`.
@@ -157,15 +168,16 @@ def open_sparse_views(
         InputError: what `open_light_field` says, but for missing views; or a path that is a file.
     """
     checks.one_of("transfer", transfer, get_args(Transfer))
-    path = Path(path).expanduser()
+    path = expanded(path)
     given = Given(spacing, slope_per_pixel, focus_distance)
-    grid = find_grid(path, views, order, sparse=True)
-    info = info_of_grid(grid)
-    cameras = cameras_for(info, grid.geometry, given, path)
-    assert cameras is not None  # no folder states a frame
-    pictures = read_views(
-        grid.present, info.picture_shape, _STORED[info.bits], linear=transfer == "linear", progress=progress
-    )
+    with reading(path, "views of a light field"):
+        grid = find_grid(path, views, order, sparse=True, files_outside=files_outside)
+        info = info_of_grid(grid)
+        cameras = cameras_for(info, grid.geometry, given, path)
+        assert cameras is not None  # no folder states a frame
+        pictures = read_views(
+            grid.present, info.picture_shape, _STORED[info.bits], linear=transfer == "linear", progress=progress
+        )
     assumed = [name for name in info.unknown if name not in given.names]
     if remark := assumed_remark(info, path, grid.geometry, assumed):
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
@@ -212,6 +224,11 @@ class _Opened:
     truth: NDArray[Any] | None
     seen: _Seen
     remark: str
+
+
+def _with(options: dict[str, Any], files_outside: bool) -> dict[str, Any]:
+    """Options for the reader of a file, which refuses what means nothing to it."""
+    return {**options, "files_outside": True} if files_outside else options
 
 
 def _decoded(

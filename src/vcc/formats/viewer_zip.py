@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
+from vcc.base.reading import most_unpacked, read_bytes
 from vcc.base.units import mm
 from vcc.files.pictures import read_picture
 from vcc.formats.grid import Decoded, Geometry, Place, arrange
@@ -113,7 +114,7 @@ class _Folder:
     def list_text(self) -> tuple[str, bytes]:
         lists = _lists_in(self.path) if self.path.is_dir() else [self.path]
         _check_one([file.name for file in lists], self.path)
-        return lists[0].name, lists[0].read_bytes()
+        return lists[0].name, read_bytes(lists[0], "list of views")
 
     def picture(self, name: str) -> NDArray[Any]:
         return read_picture(self._root / _inside(name, self.path))[0]
@@ -146,6 +147,14 @@ class _Zip:
             raise InputError(str(error).replace(str(unpacked), f"{self.path}: {member}")) from None
 
     def _bytes(self, member: str) -> bytes:
+        found = self._archive.getinfo(member)
+        most = most_unpacked(found.compress_size)
+        if found.file_size > most:
+            raise InputError(
+                f"{self.path}: {member} unpacks to {found.file_size / 1e6:,.0f} MB from "
+                f"{found.compress_size / 1e6:.3g} MB, and no list or picture is packed so well. If it is sound, "
+                "unpack the archive and open its folder"
+            )
         try:
             return self._archive.read(member)
         except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, ValueError) as error:
@@ -182,6 +191,8 @@ def _lists_in(folder: Path) -> list[Path]:
 def _is_list(file: Path) -> bool:
     """Whether the root element of an XML file is that of a list."""
     try:
+        if not file.is_file():
+            return False
         with file.open("rb") as text:
             for _, element in ElementTree.iterparse(text, events=("start",)):
                 return bool(element.tag == "lightfield")
@@ -237,7 +248,10 @@ def _grid(positions: list[float], axis: str, path: Path) -> tuple[list[int], flo
     """The row (or column) of each position on a regular grid, and the grid's step (0 for a single row)."""
     at = np.array(positions)
     sorted_ = np.sort(at)
-    gaps = np.diff(sorted_)
+    with np.errstate(over="ignore"):
+        gaps = np.diff(sorted_)
+    if not np.isfinite(gaps).all():
+        raise InputError(f"{path}: the views lie from {sorted_[0]:g} to {sorted_[-1]:g} along {axis}, on no grid")
     if not gaps.size or gaps.max() <= 1e-9 * max(1.0, float(np.abs(at).max())):
         return [0] * len(at), 0.0
     breaks = np.flatnonzero(gaps > _SAME_STEP * gaps.max())

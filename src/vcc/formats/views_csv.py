@@ -5,31 +5,40 @@ each view.
 from __future__ import annotations
 
 import csv
+import io
+import os
 from pathlib import Path
 
 from vcc.base.errors import InputError
+from vcc.base.reading import is_file, read_text
 from vcc.formats.grid import Place, ViewGrid, arrange
 
 NAME = "views.csv"
 
 
-def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
+def find(folder: Path, *, sparse: bool = False, anywhere: bool = False) -> ViewGrid | None:
     """The grid that the folder's ``views.csv`` lists; None if there is no such file.
 
     Row 0 is at the top, column 0 at the left; files are named relative to the folder.
 
+    Args:
+        folder: where the list is.
+        sparse: leave None where a view is missing, instead of refusing the grid.
+        anywhere: allow files outside of the folder. A list that came with a folder could else name any picture of
+            whoever opens it.
+
     Raises:
-        InputError: another header, a number that is not whole, a file that is not there, or a grid
-            that `vcc.formats.grid.arrange` refuses.
+        InputError: another header, a number that is not whole, a file that is not there or not in the folder, or a
+            grid that `vcc.formats.grid.arrange` refuses.
     """
     table = folder / NAME
-    if not table.is_file():
+    if not os.path.lexists(table):
         return None
+    text = read_text(table, "list of views")
     try:
-        with table.open(newline="", encoding="utf-8-sig") as file:
-            lines = list(csv.reader(file, skipinitialspace=True))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{table} is not a table in UTF-8 text: {error}") from None
+        lines = list(csv.reader(io.StringIO(text, newline=""), skipinitialspace=True))
+    except csv.Error as error:
+        raise InputError(f"{table} is not a table: {error}") from None
     numbered = [(number, line) for number, line in enumerate(lines, 1) if any(line)]
     if not numbered:
         raise InputError(f'{table} is empty; its first line is "row,col,file"')
@@ -41,15 +50,20 @@ def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
         )
     order = [header.index(name) for name in ("row", column_name, "file")]
     places = [_place(line, order, f"{table}, line {number}") for number, line in numbered[1:]]
-    places = [Place(place.row, place.column, folder / place.file) for place in places]
-    for place in places:
-        if not place.file.is_file():
-            raise InputError(
-                f"{table} lists {place.file.name} for (row {place.row}, column {place.column}), "
-                "and there "
-                f"is no such file in {folder}. Add it or correct the list"
-            )
-    return ViewGrid("list of views (views.csv)", arrange(places, folder, sparse=sparse))
+    found = [Place(place.row, place.column, _file(place, folder, anywhere)) for place in places]
+    return ViewGrid("list of views (views.csv)", arrange(found, folder, sparse=sparse))
+
+
+def _file(place: Place, folder: Path, anywhere: bool) -> Path:
+    listed = f"{folder / NAME} lists {place.file} for (row {place.row}, column {place.column})"
+    if not anywhere and (place.file.is_absolute() or ".." in place.file.parts):
+        raise InputError(
+            f"{listed}, which is not in {folder}. If you trust the list, pass files_outside=True; else move the "
+            "file there"
+        )
+    if not is_file(folder / place.file):
+        raise InputError(f"{listed}, and there is no such file in {folder}. Add it or correct the list")
+    return folder / place.file
 
 
 def _place(line: list[str], order: list[int], where: str) -> Place:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from os import PathLike
-from pathlib import Path
 
 from vcc.base.errors import InputError
+from vcc.base.reading import expanded, read_bytes, reading
 from vcc.optics.first_order import FirstOrder
 from vcc.prescriptions import pbrt, zemax
 from vcc.prescriptions.glasses import D_LINE, Glasses
@@ -35,19 +35,16 @@ def read_prescription(
             paraxial reduction here (asphere, mirror, coordinate break …) or whose glass is not known. The
             message names the file and the surface or line.
     """
-    file = Path(path).expanduser()
+    file = expanded(path)
     reader = _READERS.get(file.suffix.lower())
     if reader is None:
         raise InputError(
             f"{file} is not a lens prescription that can be read: known are .dat (PBRT) and .zmx (Zemax)"
         )
-    try:
-        content = file.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"there is no lens prescription {file}") from None
-    except OSError as error:
-        raise InputError(f"{file} could not be read: {error.strerror or error}") from None
-    return reader(content, file, Glasses(wavelength, dict(glasses or {})))
+    content = read_bytes(file, "lens prescription")
+    named = Glasses(wavelength, dict(glasses or {}))
+    with reading(file, "a lens prescription"):
+        return reader(content, file, named)
 
 
 def load_lens(
@@ -86,6 +83,7 @@ def load_lens(
         InputError: see `read_prescription` and `Prescription.first_order`.
     """
     prescription = read_prescription(path, wavelength=wavelength, glasses=glasses)
-    return prescription.first_order(
-        z=z, stop_diameter=stop_diameter, f_number=f_number, rims=rims, decentre=decentre, name=name
-    )
+    with reading(path, "a lens"):
+        return prescription.first_order(
+            z=z, stop_diameter=stop_diameter, f_number=f_number, rims=rims, decentre=decentre, name=name
+        )

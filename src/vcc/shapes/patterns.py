@@ -524,6 +524,10 @@ def overlap_share(centre: Array, length: Array | float, sheet: float) -> Array:
     return np.asarray(np.clip(covered / length, 0.0, 1.0))
 
 
+LARGEST_MURA = 4093
+"""Cells a side of the largest MURA that is made, 134 MB of them."""
+
+
 def mura(prime: int) -> NDArray[np.float64]:
     """A modified uniformly redundant array: prime × prime cells of 0 and 1, half of them open.
 
@@ -531,15 +535,20 @@ def mura(prime: int) -> NDArray[np.float64]:
     the prime (Gottesman and Fenimore 1989, eq. 13).
 
     Args:
-        prime: a prime number of cells a side, 5 or more.
+        prime: a prime number of cells a side, 5 to `LARGEST_MURA`.
 
     Raises:
-        InputError: not a prime of 5 or more.
+        InputError: not a prime of 5 or more, or a larger one.
     """
-    if prime < 5 or any(prime % divisor == 0 for divisor in range(2, math.isqrt(prime) + 1)):
+    prime = checks.whole_number_between("prime of a MURA", prime, 5)
+    if prime > LARGEST_MURA:
+        raise InputError(
+            f"a MURA of {prime}×{prime} cells takes {8 * prime**2 / 1e9:,.3g} GB: prime is at most {LARGEST_MURA}"
+        )
+    if any(prime % divisor == 0 for divisor in range(2, math.isqrt(prime) + 1)):
         raise InputError(f"a MURA has a prime number of cells a side, 5 or more, not {prime}")
     residues = {n * n % prime for n in range(1, prime)}
-    sign = np.array([1 if n in residues else -1 for n in range(prime)])
+    sign = np.array([1 if n in residues else -1 for n in range(prime)], np.int8)
     cells = (sign[:, None] * sign[None, :] == 1).astype(np.float64)
     cells[0, :] = 0.0
     cells[1:, 0] = 1.0

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.reading import check_file, expanded, is_file, read_bytes, reading
 from vcc.files.transfer import to_linear
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply")
@@ -62,17 +63,14 @@ def loaded(meshes: Any) -> tuple[list[str], list[Any]]:
 def _read(path: Path) -> Any:
     import trimesh
 
+    path = expanded(path)
     if path.suffix.lower() not in MESH_ENDINGS:
         raise InputError(f'{path} has the ending "{path.suffix}"; meshes are read from {", ".join(MESH_ENDINGS)}')
-    if not path.is_file():
-        raise InputError(f"there is no mesh file {path}")
-    if path.suffix.lower() == ".obj":
-        _check_materials(path)
-    try:
+    check_file(path, "mesh file")
+    with reading(path, "a mesh"):
+        if path.suffix.lower() == ".obj":
+            _check_materials(path)
         scene = trimesh.load_scene(path)
-    except Exception as error:  # each of its readers has its own types for a damaged file
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path} cannot be read as a mesh: it is damaged or incomplete ({reason})") from error
     scene.metadata["ending"] = path.suffix.lower()
     return scene
 
@@ -80,15 +78,15 @@ def _read(path: Path) -> Any:
 def _check_materials(path: Path) -> None:
     """Refuse an OBJ whose material file or pictures are missing: it would be drawn grey without a word."""
     for library in _named_in(path, "mtllib"):
-        if not library.is_file():
+        if not is_file(library):
             raise InputError(f"{path} names the material file {library.name}, which is not beside it")
         for picture in _named_in(library, "map_Kd"):
-            if not picture.is_file():
+            if not is_file(picture):
                 raise InputError(f"{library} names the picture {picture.name}, and there is no {picture}")
 
 
 def _named_in(path: Path, word: str) -> list[Path]:
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    lines = read_bytes(path).decode("utf-8", errors="replace").splitlines()
     rests = [
         line.split(maxsplit=1)[1].strip() for line in lines if line.split()[:1] == [word] and len(line.split()) > 1
     ]

@@ -7,7 +7,6 @@ top) in units of the tangent of half the field of view, which is 1 for 90°.
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import math
 import os
@@ -27,6 +26,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.reading import expanded, is_file, read_bytes, reading, unpacked_gzip
 from vcc.sources.views import ViewCamera
 
 Matrix = NDArray[Any]
@@ -37,6 +37,7 @@ _KEPT_OF_CAMERA = ("shutteropen", "shutterclose")
 _GONE_FROM_FILM = ("xresolution", "yresolution", "cropwindow", "pixelbounds", "filename")
 _NUMBERS = {"Translate": 3, "Scale": 3, "Rotate": 4, "LookAt": 9, "Transform": 16, "ConcatTransform": 16}
 _DEEPEST_INCLUDE = 32
+_MOST_INCLUDES = 10_000
 
 
 def pbrt_program() -> Path | None:
@@ -110,19 +111,18 @@ class PbrtScene:
             InputError: no such file, no ``WorldBegin``, no ``Camera`` or more than one, an animated camera, or a
                 head that is no PBRT.
         """
-        path = Path(fspath(path)).expanduser().absolute()
-        if not path.is_file():
-            raise InputError(f"{path}: there is no such file")
-        head, world = _split(_text(path), path)
-        directives = tuple(_directives(head, path, path.parent, 0))
-        cameras = sum(directive.name == "Camera" for directive in directives)
-        if cameras != 1:
-            raise InputError(
-                f"{path} has {cameras or 'no'} Camera before WorldBegin: one says where the views are"
-            )
-        scene = cls(path, directives, world)
-        scene.camera_from_world()  # refuses what moves
-        return scene
+        path = expanded(path).absolute()
+        with reading(path, "a scene of PBRT"):
+            head, world = _split(_text(path), path)
+            directives = tuple(_directives(head, path, path.parent, 0, []))
+            cameras = sum(directive.name == "Camera" for directive in directives)
+            if cameras != 1:
+                raise InputError(
+                    f"{path} has {cameras or 'no'} Camera before WorldBegin: one says where the views are"
+                )
+            scene = cls(path, directives, world)
+            scene.camera_from_world()  # refuses what moves
+            return scene
 
     def camera_from_world(self) -> Matrix:
         """4×4, the transformation at the ``Camera`` directive.
@@ -207,7 +207,7 @@ class PbrtScene:
             found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
             if path.name.endswith((".pbrt", ".pbrt.gz")):
                 named = (self.path.parent / match[1] for match in _STRING.finditer(_text(path)))
-                waiting += [file for file in named if _is_file(file)]
+                waiting += [file for file in named if is_file(file)]
         return dict(sorted(found.items()))
 
 
@@ -318,18 +318,8 @@ def _read_exr(path: Path) -> NDArray[np.float32]:
 
 
 def _text(path: Path) -> str:
-    data = path.read_bytes()
-    if path.suffix == ".gz":
-        data = gzip.decompress(data)
+    data = unpacked_gzip(path, "scene file") if path.suffix == ".gz" else read_bytes(path, "scene file")
     return data.decode("utf-8", errors="surrogateescape")
-
-
-def _is_file(path: Path) -> bool:
-    """Whether it is one; what is no path at all is not."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
 
 
 def _split(text: str, path: Path) -> tuple[str, str]:
@@ -340,10 +330,10 @@ def _split(text: str, path: Path) -> tuple[str, str]:
     raise InputError(f"{path} has no WorldBegin: give the scene's main file, as PBRT version 4 has it")
 
 
-def _directives(text: str, path: Path, folder: Path, depth: int) -> Iterator[Directive]:
-    """The directives of a text, included files in their place."""
-    if depth > _DEEPEST_INCLUDE:
-        raise InputError(f"{path} includes itself")
+def _directives(text: str, path: Path, folder: Path, depth: int, included: list[Path]) -> Iterator[Directive]:
+    """The directives of a text, included files in their place; those files are added to ``included``."""
+    if depth > _DEEPEST_INCLUDE or len(included) > _MOST_INCLUDES:
+        raise InputError(f"{path} includes itself, or is included {len(included)} times and more")
     words: list[str] = []
     for match in [*_TOKEN.finditer(text), None]:
         token = match[0] if match is not None else ""
@@ -359,9 +349,10 @@ def _directives(text: str, path: Path, folder: Path, depth: int) -> Iterator[Dir
                 yield directive
             else:
                 file = folder / directive.kind
-                if not file.is_file():
+                if not is_file(file):
                     raise InputError(f"{path} includes {directive.kind}, and {file} is not there")
-                yield from _directives(_text(file), file, folder, depth + 1)
+                included.append(file)
+                yield from _directives(_text(file), file, folder, depth + 1, included)
         if match is not None:
             words.append(token)
 

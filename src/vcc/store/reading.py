@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
+import os
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,6 +17,16 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress, tell
+from vcc.base.reading import (
+    check_path,
+    expanded,
+    in_words,
+    read_bytes,
+    read_json,
+    reading,
+    shown,
+    stated_at,
+)
 from vcc.base.words import first_few
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, told_along_u
@@ -35,6 +45,8 @@ MEASURED_BYTES = 2**26
 """Views from which disparities are measured are cut to a band of rows if they take more than this as stored."""
 MEASURED_REACH = 3
 """How many views on either side of the middle one disparities are measured from; see `vcc.fields.parallax`."""
+MOST_VIEWS = 2**18
+"""Of a store: which of them are there is looked up one by one, and metadata may state any number."""
 NOT_THERE = 2**64 - 1
 """How the index of a Zarr shard says that a chunk was never written."""
 
@@ -186,7 +198,10 @@ class StoredLightField(OnGrid):
 
     def missing(self) -> list[tuple[int, int]]:
         """(row, column) of the views that are not there."""
-        return [(j, i) for j, i in np.ndindex(*self.shape[:2]) if not self.view_file(j, i).is_file()]
+        folder, key = f"{self.path / ARRAY}{os.sep}", self.array.metadata.encode_chunk_key
+        rest = (0,) * (len(self.shape) - 2)
+        # Text, as a path for each of many views takes four times as long.
+        return [at for at in np.ndindex(*self.shape[:2]) if not os.path.isfile(folder + key((*at, *rest)))]  # noqa: PTH113
 
     def check_complete(self) -> None:
         """Refuse a light field of which views are missing, before long work on it.
@@ -230,15 +245,18 @@ class StoredLightField(OnGrid):
                 + ("Copy or make the store again" if self.complete else self._count_words(self.missing()))
             )
         try:
-            samples = np.asarray(self.array[row, column, first:stop])
             self._check_index(file)
-        except MemoryError:
-            raise
+            samples = np.asarray(self.array[row, column, first:stop])
+        except MemoryError as error:
+            raise InputError(
+                f"view ({row}, {column}) of {self.path} takes {self.view_bytes / 1e9:.1f} GB of memory, more than "
+                "there is"
+            ) from error
         except Exception as error:
             raise InputError(
-                f"view ({row}, {column}) of {self.path} cannot be read: {file} is damaged or cut off ({error}). "
-                "Copy the file again; or delete it and make this view again"
-            ) from None
+                f"view ({row}, {column}) of {self.path} cannot be read: {file} is damaged or cut off "
+                f"({shown(str(error), 200)}). Copy the file again; or delete it and make this view again"
+            ) from error
         if samples.dtype.kind == "f" and not (samples.min() >= 0 and np.isfinite(samples.max())):
             raise InputError(
                 f"view ({row}, {column}) of {self.path} holds samples that are NaN, infinite or negative, which "
@@ -247,7 +265,7 @@ class StoredLightField(OnGrid):
         return samples
 
     def _check_index(self, file: Path) -> None:
-        """Refuse a file of which a chunk was never written: Zarr reads zeros there.
+        """Refuse a file of which a chunk was never written, before Zarr makes room for it and reads zeros there.
 
         Raises:
             ValueError: what is wrong.
@@ -256,6 +274,8 @@ class StoredLightField(OnGrid):
             return
         chunks = math.prod(math.ceil(s / c) for s, c in zip(self.array.shards, self.array.chunks, strict=True))
         size, index_size = file.stat().st_size, 16 * chunks + 4
+        if size < index_size:
+            raise ValueError(f"it has {size:,} bytes, and the index of its chunks alone {index_size:,}")
         at_end = _sharding(self.array).get("index_location", "end") == "end"
         with file.open("rb") as stream:
             stream.seek(size - index_size if at_end else 0)
@@ -357,12 +377,23 @@ def open_store(path: str | PathLike[str]) -> StoredLightField:
         InputError: no such folder, no Zarr v3 group, not one of a light field, a newer version, or attributes or
             an array that cannot be used (named).
     """
-    folder = Path(path).expanduser()
-    array, attributes = read_metadata(folder)
+    folder = expanded(path)
+    with reading(folder, "a light field in a store"):
+        array, attributes = read_metadata(folder)
+        _check_array(folder, array, attributes)
+        return StoredLightField(folder, attributes, array)
+
+
+def _check_array(folder: Path, array: Any, attributes: Attributes) -> None:
+    """Refuse an array that holds no light field, or none whose views are read one by one."""
     shape, kind = tuple(array.shape), np.dtype(array.dtype)
     where = folder / ARRAY
     if len(shape) not in (4, 5) or 0 in shape:
         raise InputError(f"{where}: samples have the axes (v, u, t, s[, channel]), not the shape {shape}")
+    if shape[0] * shape[1] > MOST_VIEWS:
+        raise InputError(
+            f"{where} states {shape[0]}×{shape[1]} views, a file for each: a store has at most {MOST_VIEWS:,}"
+        )
     if kind.name not in DTYPES:
         raise InputError(f"{where}: samples are {', '.join(DTYPES)}, not {kind}")
     if attributes.transfer == "srgb" and kind.kind != "u":
@@ -378,12 +409,11 @@ def open_store(path: str | PathLike[str]) -> StoredLightField:
         index = [codec.get("name") for codec in _sharding(array).get("index_codecs", [])]
         if index != ["bytes", "crc32c"]:
             raise InputError(f"{where}: index_codecs of the shards are bytes and crc32c, not {index}")
-    return StoredLightField(folder, attributes, array)
 
 
 def is_store(path: str | PathLike[str]) -> bool:
     """Whether a path is a Zarr group, of version 3 or older: what `open_store` has something to say about."""
-    folder = Path(path).expanduser()
+    folder = expanded(path)
     return any((folder / name).is_file() for name in ("zarr.json", ".zgroup", ".zarray"))
 
 
@@ -393,8 +423,7 @@ def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
     Raises:
         InputError: as `open_store`.
     """
-    if not folder.exists():
-        raise InputError(f"there is no store {folder}")
+    check_path(folder, "store")
     if not is_store(folder):
         raise InputError(
             f"{folder} is no light field in a Zarr store: {'it is a file' if folder.is_file() else 'it'} "
@@ -402,17 +431,17 @@ def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
         )
     if not (folder / "zarr.json").is_file():
         raise InputError(f"{folder} is Zarr version 2; a light field is kept in version 3. Convert it with zarr")
-    stated = _json(folder / "zarr.json")
+    stated = read_json(read_bytes(folder / "zarr.json"), f"{folder / 'zarr.json'}")
     if stated.get("zarr_format") != 3 or stated.get("node_type") != "group":
         raise InputError(
             f"{folder / 'zarr.json'}: zarr_format {stated.get('zarr_format')!r}, node_type "
             f"{stated.get('node_type')!r}; a light field is a group of version 3"
         )
-    attributes = Attributes.from_json((stated.get("attributes") or {}).get(KEY), folder)
+    attributes = Attributes.from_json(stated_at(stated, "attributes", KEY), folder)
     where = folder / ARRAY / "zarr.json"
     if not where.is_file():
         raise InputError(f'{folder} has no array "{ARRAY}": {where} is missing')
-    if attributes.lossy is not None or "vcc.picture" in where.read_text(encoding="utf-8"):
+    if attributes.lossy is not None or b"vcc.picture" in read_bytes(where):
         know_pictures()
     import zarr
 
@@ -423,18 +452,8 @@ def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
         if array.metadata.zarr_format != 3:
             raise ValueError(f"it has zarr_format {array.metadata.zarr_format}")
     except Exception as error:
-        raise InputError(f"{where} cannot be used: {error}") from None
+        raise InputError(f"{where} cannot be used: {in_words(error)}") from error
     return array, attributes
-
-
-def _json(file: Path) -> dict[str, Any]:
-    try:
-        stated = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file} cannot be read: {error}") from None
-    if not isinstance(stated, dict):
-        raise InputError(f"{file} holds no JSON object")
-    return stated
 
 
 def _sharding(array: Any) -> dict[str, Any]:

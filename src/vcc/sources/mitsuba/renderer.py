@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.reading import expanded, is_file, read_bytes, reading
 from vcc.sources.views import ViewCamera
 
 FAST, PLAIN = "llvm_ad_rgb", "scalar_rgb"
@@ -336,20 +337,32 @@ def _contents(scene: Any, parameters: dict[str, str]) -> dict[str, Any]:
             raise InputError("parameters are values for the $names of an XML file; this scene is a dict")
         text = json.dumps(scene, default=_plain, sort_keys=True)
         return {"dict_sha256": hashlib.sha256(text.encode()).hexdigest()}
-    path = Path(fspath(scene)).expanduser()
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
+    path = expanded(scene)
     files: dict[str, str] = {}
-    _collect(path, path.parent, dict(parameters), files)
+    with reading(path, "a scene of Mitsuba"):
+        _collect(path, path.parent, dict(parameters), files)
     return {"file": path.name, "files_sha256": files, "parameters": parameters}
 
 
-def _collect(path: Path, folder: Path, names: dict[str, str], files: dict[str, str]) -> None:
-    """Add the SHA-256 of a scene file and of all that it names, by their paths from its folder."""
-    data = path.read_bytes()
-    files[str(path.relative_to(folder) if path.is_relative_to(folder) else path)] = hashlib.sha256(
-        data
-    ).hexdigest()
+def _collect(
+    path: Path, folder: Path, names: dict[str, str], files: dict[str, str], including: tuple[Path, ...] = ()
+) -> None:
+    """Add the SHA-256 of a scene file and of all that it names, by their paths from its folder.
+
+    Args:
+        path: of the scene file.
+        folder: of the scene.
+        names: values of $names; those that it states are added.
+        files: to add to.
+        including: the files by which it is included.
+    """
+    if path in including:
+        raise InputError(f"{path} includes itself")
+    name = str(path.relative_to(folder) if path.is_relative_to(folder) else path)
+    if name in files:
+        return
+    data = read_bytes(path, "scene file")
+    files[name] = hashlib.sha256(data).hexdigest()
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
@@ -366,10 +379,10 @@ def _collect(path: Path, folder: Path, names: dict[str, str], files: dict[str, s
         file = folder / named
         if element.tag == "string" and element.get("name") != "filename":
             continue
-        if not file.is_file():  # Mitsuba may know of another folder, or else says that it is not there
+        if not is_file(file):  # Mitsuba may know of another folder, or else says that it is not there
             files[named] = "not found beside the scene"
         elif element.tag == "include":
-            _collect(file, folder, names, files)
+            _collect(file, folder, names, files, (*including, path))
         else:
             files[named] = hashlib.sha256(file.read_bytes()).hexdigest()
 

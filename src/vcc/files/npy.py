@@ -1,0 +1,37 @@
+"""NumPy's own files of one array, ``.npy``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+from vcc.base.reading import check_file, reading
+
+
+def read_npy(path: Path, what: str = "file") -> NDArray[Any]:
+    """The array in a ``.npy``, in memory of its own that is no larger than the file.
+
+    Args:
+        path: the file.
+        what: it is, for an error.
+
+    Raises:
+        InputError: no such file, one that is truncated or damaged, or one of Python objects, which nothing reads.
+    """
+    check_file(path, what)
+    with reading(path, "a NumPy array"):
+        # Mapped, a file that states more than it holds is refused before there is memory for what it states.
+        try:
+            mapped = np.load(path, mmap_mode="r", allow_pickle=False)
+        except ValueError as error:
+            if "pickle" not in str(error) and "Python objects" not in str(error):
+                raise
+            raise InputError(f"{path} holds no numbers of NumPy's, or objects of Python: save numbers") from error
+        if isinstance(mapped, np.ndarray):
+            return np.array(mapped)
+        mapped.close()
+    raise InputError(f"{path} is not one array of NumPy's but several, an .npz: rename it")
