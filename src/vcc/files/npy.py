@@ -30,7 +30,7 @@ def read_npy(path: Path, what: str = "file") -> NDArray[Any]:
         except ValueError as error:
             if "pickle" not in str(error) and "Python objects" not in str(error):
                 raise
-            raise InputError(f"{path} holds no numbers of NumPy's, or objects of Python: save numbers") from error
+            raise InputError(f"{path} cannot be read as a NumPy array: it is none, or of objects") from error
         if isinstance(mapped, np.ndarray):
             return np.array(mapped)
         mapped.close()
