@@ -13,7 +13,7 @@ from small_views import moving_texture, png
 
 from vcc.base.errors import InputError, ResultWarning
 from vcc.formats import open_light_field, open_sparse_views, read_geometry
-from vcc.formats.numbered import running_numbers
+from vcc.formats.orders import running_numbers
 
 Views = NDArray[np.uint8]
 GIVEN = {"spacing": 2e-3, "slope_per_pixel": 1e-3, "focus_distance": 1.0}
@@ -23,6 +23,7 @@ WALKS = {
     "column-major": [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (1, 2)],
     "serpentine": [(0, 0), (0, 1), (0, 2), (1, 2), (1, 1), (1, 0)],
     "serpentine-columns": [(0, 0), (1, 0), (1, 1), (0, 1), (0, 2), (1, 2)],
+    "chess": [(0, 0), (0, 2), (1, 1), (0, 1), (1, 0), (1, 2)],
 }
 
 
@@ -46,7 +47,7 @@ def test_the_orders(order: str) -> None:
     assert [int(numbers[place]) for place in WALKS[order]] == list(range(6))
 
 
-@pytest.mark.parametrize("order", ["row-major", "serpentine"])
+@pytest.mark.parametrize("order", ["row-major", "serpentine", "chess"])
 def test_shape_and_order_are_found(order: str, grid: Views, tmp_path: Path) -> None:
     folder = write(grid, order, tmp_path / "a")
     info = read_geometry(folder)

@@ -7,12 +7,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.reading import check_path
-from vcc.formats import cambridge, camera_names, hci, numbered, rowcol, stanford, views_csv
+from vcc.formats import cambridge, camera_names, hci, numbered, orders, rowcol, stanford, views_csv
 from vcc.formats.grid import Geometry, ViewGrid
-from vcc.formats.numbered import ORDERS, Order
+from vcc.formats.orders import Order, counted_from, running_numbers
 
 _FINDERS = (hci.find, camera_names.find, stanford.find, rowcol.find)
 """The formats in the order in which they are tried, behind a list of views."""
@@ -87,17 +86,13 @@ def _check(folder: Path, views: tuple[int, int] | None, order: Order | None, opt
         raise InputError(f"{folder} is a store, which is read in pieces: open it with vcc.store.open_store")
     for option in options:
         raise InputError(f"{option}= means nothing to a folder of views")
-    if order is not None:
-        checks.one_of("order", order, ORDERS)
-    if views is not None:
-        checks.counts("views", views, "rows", "columns")
+    orders.check(views, order)
 
 
 def _reordered(grid: ViewGrid, order: Order) -> ViewGrid:
     """The grid with its files, row by row, counted in another order."""
     flat = [file for line in grid.files for file in line]
-    shape = grid.shape[::-1] if order in ("column-major", "serpentine-columns") else grid.shape
-    numbers = numbered.running_numbers(shape, order)
+    numbers = running_numbers(counted_from(grid.shape, order), order)
     return replace(grid, files=tuple(tuple(flat[number] for number in line) for line in numbers))
 
 

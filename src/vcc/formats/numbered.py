@@ -5,27 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.words import first_few
 from vcc.files.pictures import read_picture
 from vcc.formats.grid import MOST_PLACES, ViewGrid, pictures_in
-
-Order = Literal["row-major", "column-major", "serpentine", "serpentine-columns"]
-
-ORDERS: tuple[Order, ...] = ("row-major", "column-major", "serpentine", "serpentine-columns")
+from vcc.formats.orders import Order, arrangement, running_numbers, thumbnail
 
 _NAME = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\D*)")
-_THUMBNAIL = 24  # pixels: parallax is then a small part of a feature, and differences grow with it
-_CLEARLY = 1.1  # by this factor the best arrangement must beat the next
-_LINE = 1.5  # and a single row of views the best grid
 
 
 def find(
@@ -37,8 +25,7 @@ def find(
         folder: where the pictures are; others without a number are left alone.
         views: (rows, columns). Not given, it is found from the pictures, which are read for it: in the right
             arrangement neighbours differ least.
-        order: "row-major" (rows from left to right, one below the other), "column-major", or "serpentine" and
-            "serpentine-columns", every other row or column reversed. Found likewise.
+        order: see `vcc.formats.orders`. Found likewise.
         sparse: allow numbers that are missing.
 
     Raises:
@@ -58,27 +45,11 @@ def find(
             raise InputError(
                 f'{folder} is incomplete: pass views=(rows, columns) and order="row-major" or another'
             )
-        views, order = _arrangement([file for file in line if file is not None], views, order, folder)
+        small = [thumbnail(read_picture(file)[0]) for file in line if file is not None]
+        views, order = arrangement(small, views, order, f"{folder} has {len(small)} numbered pictures")
     places = running_numbers(views, order)
     files = tuple(tuple(line[number] for number in row) for row in places)
     return ViewGrid(f"running numbers, {views[0]}×{views[1]} views, {order}", files)
-
-
-def running_numbers(views: tuple[int, int], order: Order) -> NDArray[np.intp]:
-    """The running number, from 0, of the view at each (row, column).
-
-    Args:
-        views: (rows, columns).
-        order: see `find`.
-    """
-    rows, columns = views
-    if order in ("column-major", "serpentine-columns"):
-        turned: Order = "row-major" if order == "column-major" else "serpentine"
-        return running_numbers((columns, rows), turned).T
-    numbers = np.arange(rows * columns).reshape(rows, columns)
-    if order == "serpentine":
-        numbers[1::2] = numbers[1::2, ::-1]
-    return numbers
 
 
 def _numbered(folder: Path) -> dict[int, Path]:
@@ -132,72 +103,3 @@ def _line(
             f"{first_few(named, missing)}. {way_out if not sparse else 'Is a number wrong?'}"
         )
     return [numbered.get(first + n * step) for n in range(count)]
-
-
-@dataclass(frozen=True)
-class _Candidate:
-    views: tuple[int, int]
-    order: Order
-    difference: float
-
-
-def _arrangement(
-    files: list[Path], views: tuple[int, int] | None, order: Order | None, folder: Path
-) -> tuple[tuple[int, int], Order]:
-    """The arrangement in which neighbouring views differ least."""
-    count = len(files)
-    if views is not None and 1 in views:
-        return views, order or "row-major"
-    differences = _differences(files)
-    # A square grid told as rows or as columns has the same neighbours: parallax decides later.
-    orders: tuple[Order, ...] = (order,) if order else ("row-major", "serpentine")
-    if views is None:
-        shapes = [(n, count // n) for n in range(2, count // 2 + 1) if count % n == 0]
-    else:
-        shapes = [views]
-        if order is None and views[0] != views[1]:
-            orders = ORDERS
-    found = sorted(
-        (
-            _Candidate(shape, way, float(np.mean(list(_neighbours(differences, running_numbers(shape, way))))))
-            for shape in shapes
-            for way in orders
-        ),
-        key=lambda candidate: candidate.difference,
-    )
-    if views is None:
-        line = float(np.mean(np.diagonal(differences, 1)))
-        if not found or line * _LINE < found[0].difference:
-            return (1, count), "row-major"
-    if len(found) > 1 and not found[1].difference > _CLEARLY * found[0].difference:
-        likely = " or ".join(f'views={c.views}, order="{c.order}"' for c in found[:2])
-        raise InputError(
-            f"{folder} has {count} numbered pictures, and they do not tell how they are arranged. Pass {likely}, "
-            "or whatever is right"
-        )
-    return found[0].views, found[0].order
-
-
-def _differences(files: list[Path]) -> NDArray[np.float64]:
-    """Mean absolute difference of each two pictures, made small."""
-    small = np.stack([_thumbnail(read_picture(file)[0]) for file in files]).reshape(len(files), -1)
-    differences = np.zeros((len(files), len(files)))
-    for number in range(len(files)):
-        differences[number, number + 1 :] = np.abs(small[number + 1 :] - small[number]).mean(axis=1)
-    return differences + differences.T
-
-
-def _thumbnail(picture: NDArray[Any]) -> NDArray[np.float32]:
-    """Block means of the picture's grey values."""
-    grey = picture.mean(axis=2, dtype=np.float32) if picture.ndim == 3 else picture.astype(np.float32)
-    size = max(1, min(grey.shape) // _THUMBNAIL)
-    rows, columns = (n // size for n in grey.shape)
-    blocks = grey[: rows * size, : columns * size].reshape(rows, size, columns, size)
-    small: NDArray[np.float32] = blocks.mean(axis=(1, 3))
-    return small
-
-
-def _neighbours(differences: NDArray[np.float64], places: NDArray[np.intp]) -> Iterator[float]:
-    """The differences of all views next to each other."""
-    yield from differences[places[:, :-1], places[:, 1:]].ravel()
-    yield from differences[places[:-1], places[1:]].ravel()

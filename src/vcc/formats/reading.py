@@ -25,7 +25,7 @@ from vcc.formats.cameras import Cameras
 from vcc.formats.folder_info import FolderInfo, Given, cameras_for, info_of_file, info_of_grid
 from vcc.formats.folders import find_grid, towards_positions
 from vcc.formats.grid import Decoded, Geometry, ViewGrid
-from vcc.formats.numbered import Order
+from vcc.formats.orders import Order
 from vcc.formats.orientation import OrientationChoice, look, looked_at, rearranged
 from vcc.formats.reading_views import read_views
 from vcc.formats.remarks import assumed_remark, vergence_remark

@@ -1,5 +1,5 @@
-"""Videos of a camera that moves along a line, each frame a view; and flights through a light field, as videos
-for people.
+"""Videos whose frames are views, of a camera that moves along a line or over a grid; and flights through a light
+field, as videos for people.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from vcc.files.atomic import atomic_path
 from vcc.files.pictures import Exposure
 from vcc.formats.exposing import Codes
 from vcc.formats.grid import Decoded
+from vcc.formats.orders import Order, arrangement, check, running_numbers, thumbnail
 
 ENDINGS = (".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v")
 
@@ -46,28 +47,38 @@ def read(
     first: int = 0,
     last: int | None = None,
     moves: Movement = "right",
+    views: tuple[int, int] | None = None,
+    order: Order | None = None,
     progress: Progress | None = None,
 ) -> Decoded:
-    """The frames of a video as views from places in equal steps along a line.
+    """The frames of a video as views from places in equal steps along a line, or over a grid.
 
     Args:
         path: the video.
         every: take every n-th frame.
         first: the first frame to take, counted from 0.
         last: the last that may be taken; the video's last if not given.
-        moves: where the camera goes: "right" and "left" make one row of views, "down" and "up" one column.
+        moves: where a camera on a line goes: "right" and "left" make one row of views, "down" and "up" one column.
+        views: (rows, columns) of a grid of views. Either this or the order makes a grid of the frames; the other
+            is then found from them: in the right arrangement neighbours differ least.
+        order: how the frames pass through a grid, see `vcc.formats.orders`.
         progress: called as progress(done, total) after each frame; total is 0 where the video does not state it.
 
     Returns:
-        Samples of shape (1, views, t, s, 3) or (views, 1, t, s, 3), uint8, or uint16 of videos of more than 8
-        bits, display-referred. Spacing and field of view are unknown.
+        Samples of shape (1, views, t, s, 3) or (views, 1, t, s, 3), of a grid (rows, columns, t, s, 3): uint8, or
+        uint16 of videos of more than 8 bits, display-referred. Spacing and field of view are unknown.
 
     Raises:
-        InputError: no PyAV, a damaged or truncated video, fewer than two frames to take, or one in the brightness
-            curves of high dynamic range.
+        InputError: no PyAV, a damaged or truncated video, fewer than two frames to take or not as many as the grid
+            has views, an arrangement that the frames do not tell clearly, or the brightness curves of high dynamic
+            range.
     """
     path = Path(path)
     _check_selection(every, first, last, moves)
+    check(views, order)
+    on_a_line = views is None and order is None
+    if not on_a_line and moves != "right":
+        raise InputError(f'{path}: moves="{moves}" is of a camera on a line: leave it out with views= and order=')
     av = library()
     frames: list[NDArray[Any]] = []
     remarks: list[str] = []
@@ -102,12 +113,17 @@ def read(
             f"{path} gives {len(frames)} of its {decoded} frames with every={every}, first={first}, last={last}; "
             "a light field needs two or more"
         )
-    if moves in ("left", "up"):
-        frames.reverse()
-    values = np.stack(frames)
+    kind = "video of a camera on a line"
+    if on_a_line:
+        values = _along_a_line(frames, moves)
+    else:
+        grid, order = _arranged(frames, views, order, path)
+        values = np.stack([frames[number] for number in running_numbers(grid, order).flat])
+        values = values.reshape(*grid, *values.shape[1:])
+        kind = f"video of a grid, {grid[0]}×{grid[1]} views, {order}"
     return Decoded(
-        format="video of a camera on a line",
-        values=values[None] if moves in ("left", "right") else values[:, None],
+        format=kind,
+        values=values,
         transfer="srgb",
         remarks=tuple(remarks),
         metadata={"frames": decoded, "frames_per_second": float(stream.average_rate or 0)},
@@ -191,6 +207,25 @@ def _check_selection(every: int, first: int, last: int | None, moves: str) -> No
     for name, value, least in (("every", every, 1), ("first", first, 0), ("last", last, first)):
         if value is not None:
             checks.whole_number_between(name, value, least)
+
+
+def _along_a_line(frames: list[NDArray[Any]], moves: Movement) -> NDArray[Any]:
+    values = np.stack(frames[::-1] if moves in ("left", "up") else frames)
+    return values[None] if moves in ("left", "right") else values[:, None]
+
+
+def _arranged(
+    frames: list[NDArray[Any]], views: tuple[int, int] | None, order: Order | None, path: Path
+) -> tuple[tuple[int, int], Order]:
+    """(rows, columns) and the order of frames over a grid; what is not told is found."""
+    if views is not None and views[0] * views[1] != len(frames):
+        raise InputError(
+            f"{path} gives {len(frames)} frames, and views={views} would be {views[0] * views[1]}. every=, first= "
+            "and last= choose among them"
+        )
+    if views is not None and order is not None:
+        return views, order
+    return arrangement([thumbnail(frame) for frame in frames], views, order, f"{path} gives {len(frames)} frames")
 
 
 def _picture(frame: Any, path: Path) -> NDArray[Any]:

@@ -1,0 +1,157 @@
+"""Orders in which the views of a grid are counted, and which of them pictures tell.
+
+The numbers of 3×4 views::
+
+    row-major    column-major   serpentine   serpentine-columns   chess
+    0  1  2  3   0 3 6  9       0 1  2  3    0 5 6 11             0 6  1  7
+    4  5  6  7   1 4 7 10       7 6  5  4    1 4 7 10             8 2  9  3
+    8  9 10 11   2 5 8 11       8 9 10 11    2 3 8  9             4 10 5 11
+
+Row by row and to and fro are the raster and serpentine scans by which JPEG Pleno's tools make videos of views, and
+gantries go to and fro. Chess has all fields of one colour before those of the other, as where one half of the
+views is to be had first and the rest comes after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import checks
+from vcc.base.errors import InputError
+
+Order = Literal["row-major", "column-major", "serpentine", "serpentine-columns", "chess"]
+"""How views are counted: row by row from the left; column by column from the top; every other row, or column,
+backwards; all fields of a chessboard that have the upper left one's colour, row by row, and then the others.
+"""
+ORDERS: tuple[Order, ...] = get_args(Order)
+
+_THUMBNAIL = 24  # pixels: parallax is then a small part of a feature, and differences grow with it
+_CLEARLY = 1.1  # by this factor the best arrangement must beat the next
+_LINE = 1.5  # and a single row of views the best grid
+
+
+def check(views: object, order: object) -> None:
+    """Refuse what is neither None nor (rows, columns), and neither None nor an order.
+
+    Raises:
+        InputError: that.
+    """
+    if order is not None:
+        checks.one_of("order", order, ORDERS)
+    if views is not None:
+        checks.counts("views", views, "rows", "columns")
+
+
+def running_numbers(views: tuple[int, int], order: Order) -> NDArray[np.intp]:
+    """The running number, from 0, of the view at each (row, column).
+
+    Args:
+        views: (rows, columns).
+        order: see `Order`.
+    """
+    rows, columns = views
+    if order in ("column-major", "serpentine-columns"):
+        turned: Order = "row-major" if order == "column-major" else "serpentine"
+        return running_numbers((columns, rows), turned).T
+    numbers = np.arange(rows * columns).reshape(rows, columns)
+    if order == "serpentine":
+        numbers[1::2] = numbers[1::2, ::-1]
+    if order == "chess":
+        colours = np.indices(views).sum(axis=0) % 2
+        numbers.flat[np.argsort(colours, axis=None, kind="stable")] = np.arange(rows * columns)
+    return numbers
+
+
+def counted_from(views: tuple[int, int], order: Order) -> tuple[int, int]:
+    """The (rows, columns) as which views of an order are written by someone who takes columns for rows."""
+    return views[::-1] if order in ("column-major", "serpentine-columns") else views
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    views: tuple[int, int]
+    order: Order
+    difference: float
+
+
+def arrangement(
+    thumbnails: Sequence[NDArray[np.float32]], views: tuple[int, int] | None, order: Order | None, what: str
+) -> tuple[tuple[int, int], Order]:
+    """The arrangement, of (rows, columns) and an order, in which neighbouring views differ least.
+
+    Args:
+        thumbnails: of all views, from `thumbnail`, as they are counted.
+        views: (rows, columns), if they are known.
+        order: likewise.
+        what: what has the views, for an error: "folder has 81 numbered pictures".
+
+    Raises:
+        InputError: none is clearly better than the next.
+    """
+    count = len(thumbnails)
+    if views is not None and 1 in views:
+        return views, order or "row-major"
+    if len({small.shape for small in thumbnails}) > 1:
+        raise InputError(f"{what}, and they are not all of one size. Move away what is no view")
+    differences = _differences(thumbnails)
+    # A square grid told as rows or as columns has the same neighbours: parallax decides later.
+    orders: tuple[Order, ...] = (order,) if order else ("row-major", "serpentine", "chess")
+    if views is None:
+        shapes = [(n, count // n) for n in range(2, count // 2 + 1) if count % n == 0]
+    else:
+        shapes = [views]
+        if order is None and views[0] != views[1]:
+            orders = ORDERS
+    found = sorted(
+        (
+            _Candidate(shape, way, float(np.mean(list(_neighbours(differences, running_numbers(shape, way))))))
+            for shape in shapes
+            for way in orders
+        ),
+        key=lambda candidate: candidate.difference,
+    )
+    if views is None:
+        line = float(np.mean(np.diagonal(differences, 1)))
+        if not found or line * _LINE < found[0].difference:
+            return (1, count), "row-major"
+    if len(found) > 1 and not found[1].difference > _CLEARLY * found[0].difference:
+        likely = " or ".join(f'views={c.views}, order="{c.order}"' for c in found[:2])
+        raise InputError(
+            f"{what}, and they do not tell how they are arranged. Pass {likely}, or whatever is right"
+        )
+    return found[0].views, found[0].order
+
+
+def thumbnail(picture: NDArray[Any]) -> NDArray[np.float32]:
+    """Block means of a picture's grey values.
+
+    Args:
+        picture: shape (t, s) or (t, s, channel).
+    """
+    grey = picture.mean(axis=2, dtype=np.float32) if picture.ndim == 3 else picture.astype(np.float32)
+    size = max(1, min(grey.shape) // _THUMBNAIL)
+    rows, columns = (n // size for n in grey.shape)
+    blocks = grey[: rows * size, : columns * size].reshape(rows, size, columns, size)
+    small: NDArray[np.float32] = blocks.mean(axis=(1, 3))
+    return small
+
+
+def _differences(thumbnails: Sequence[NDArray[np.float32]]) -> NDArray[np.float64]:
+    """Mean absolute difference of each two pictures."""
+    count = len(thumbnails)
+    small = np.stack(thumbnails).reshape(count, -1)
+    differences = np.zeros((count, count))
+    for number in range(count):
+        differences[number, number + 1 :] = np.abs(small[number + 1 :] - small[number]).mean(axis=1)
+    return differences + differences.T
+
+
+def _neighbours(differences: NDArray[np.float64], places: NDArray[np.intp]) -> Iterator[float]:
+    """The differences of all views next to each other."""
+    yield from differences[places[:, :-1], places[:, 1:]].ravel()
+    yield from differences[places[:-1], places[1:]].ravel()
