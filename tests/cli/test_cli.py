@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib
+import shutil
 import subprocess
 import sys
 import warnings
@@ -69,6 +70,18 @@ def test_capture_takes_all_options(folder):
     )
     assert result.exit_code == 0, result.output
     assert "exposure 2.5" in result.stdout
+
+
+def test_capture_takes_views_that_are_only_numbered(folder):
+    """In serpentine rows, the picture is that of the views with rows and columns in their names."""
+    (folder / "numbered").mkdir()
+    for number, place in enumerate(["0_0", "0_1", "0_2", "1_2", "1_1", "1_0", "2_0", "2_1", "2_2"]):
+        shutil.copy(folder / "views" / f"view_{place}.png", folder / "numbered" / f"{number}.png")
+    told = ("--views", 3, 3, "--order", "serpentine")
+    run("capture", "camera.toml", "views", "-o", "a.npy", *KNOWN)
+    result = run("capture", "camera.toml", "numbered", "-o", "b.npy", *told, *KNOWN)
+    assert result.exit_code == 0, result.output
+    assert np.array_equal(np.load("a.npy"), np.load("b.npy"))
 
 
 def test_progress_is_asked_for_where_work_is_long(folder, monkeypatch):
@@ -316,4 +329,10 @@ def test_messages_speak_of_options():
     said = 'pass spacing=…, focus_distance=… (lengths in metres) or orientation="as-is"'
     assert as_options(said) == (
         'pass --spacing …, --focus-distance … (lengths with a unit: "50 mm") or --orientation "as-is"'
+    )
+    said = (
+        'pass views=(rows, columns), e.g. views=(9, 9), and order="chess"; every= means nothing here, nor views='
+    )
+    assert as_options(said) == (
+        'pass --views rows columns, e.g. --views 9 9, and --order "chess"; --every means nothing here, nor --views'
     )

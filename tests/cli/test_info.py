@@ -7,6 +7,7 @@ from dataclasses import replace
 import imagecodecs
 import numpy as np
 import pytest
+from scipy import ndimage
 
 import vcc
 from command_line import run as run_command
@@ -69,6 +70,17 @@ def test_quick_measures_nothing(folder):
     lines = said(folder, "--quick")
     assert lines["spacing"] == "4 mm"
     assert not {"disparities", "brightness", "picture"} & set(lines)
+
+
+def test_where_views_stand_may_be_told(tmp_path, light_field):
+    smooth = ndimage.uniform_filter(light_field.values, (1, 1, 3, 3, 1))  # noise would not tell its layout
+    save_light_field(light_field.replaced(smooth), tmp_path / "all.png", kind="mosaic")
+    lines = said(tmp_path / "all.png", "--views", 3, 4)
+    assert lines["format"] == "mosaic, 3×4 views in one picture"
+    assert "pixels per view" in lines["disparities"]
+    told = said(tmp_path / "all.png", "--quick", "--views", 3, 4, "--layout", "eslf")
+    assert told["format"] == "ESLF, 3×4 views in one picture"
+    assert "pass --views rows columns" in run(tmp_path / "all.png").stderr
 
 
 def test_missing_views_are_named(folder, tmp_path):

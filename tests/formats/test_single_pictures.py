@@ -1,4 +1,4 @@
-"""ESLF, PFM and Netpbm, against files and pictures written by hand."""
+"""ESLF, mosaics, PFM and Netpbm, against files and pictures written by hand."""
 
 from __future__ import annotations
 
@@ -11,15 +11,21 @@ import imagecodecs
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from small_views import moving_texture
 
 from vcc.base.errors import InputError, ResultWarning
 from vcc.files import transfer
 from vcc.files.pfm import read_pfm
 from vcc.files.pictures import read_picture
-from vcc.formats import eslf, open_light_field, read_container, read_ground_truth
+from vcc.formats import eslf, open_light_field, read_container, read_ground_truth, save_light_field
 from vcc.light_field import LightField
 
 GIVEN = {"spacing": 1e-3, "slope_per_pixel": 1e-3, "focus_distance": 1.0}
+
+
+def side_by_side(views: NDArray[Any]) -> NDArray[Any]:
+    """The mosaic of views."""
+    return np.concatenate([np.concatenate(list(row), axis=1) for row in views], axis=0)
 
 
 def tiled(views: NDArray[Any]) -> NDArray[Any]:
@@ -43,10 +49,10 @@ def write(path: Path, picture: NDArray[Any]) -> Path:
 
 def test_eslf_is_read(samples: NDArray[np.uint8], tmp_path: Path) -> None:
     path = write(tmp_path / "one_eslf.png", tiled(samples))
-    field = open_light_field(path, views=(2, 3), transfer="linear", **GIVEN)
+    field = open_light_field(path, views=(2, 3), layout="eslf", transfer="linear", **GIVEN)
     np.testing.assert_array_equal(field.values, samples)
     np.testing.assert_array_equal(
-        open_light_field(path, views=(2, 3), **GIVEN).values, transfer.to_linear(samples / 255)
+        open_light_field(path, views=(2, 3), layout="eslf", **GIVEN).values, transfer.to_linear(samples / 255)
     )
     with pytest.raises(InputError, match=r"one picture of 12×10 pixels.*views=\(rows, columns\)"):
         open_light_field(path)
@@ -78,10 +84,66 @@ def test_eslf_written_and_read_back(channels: int | None, bits: int, tmp_path: P
     codes = np.random.default_rng(5).integers(0, 2**bits, shape, dtype=f"u{bits // 8}")
     field = LightField.from_views(transfer.decode(codes), 1e-3, 1e-3, 1.0)
     eslf.save(field, tmp_path / "a.png", bits=bits)
-    back = open_light_field(tmp_path / "a.png", views=(2, 3), **GIVEN)
+    back = open_light_field(tmp_path / "a.png", views=(2, 3), layout="eslf", **GIVEN)
     np.testing.assert_array_equal(back.values, field.values)  # each code is its own nearest
     picture, _ = read_picture(tmp_path / "a.png")
     np.testing.assert_array_equal(picture, tiled(codes))
+
+
+@pytest.mark.parametrize("kind", ["mosaic", "eslf"])
+@pytest.mark.parametrize(("rows", "columns", "disparity"), [(4, 5, 1.0), (1, 6, -0.4), (5, 1, 2.0), (3, 3, 4.0)])
+def test_the_layout_of_one_picture_is_seen(
+    kind: str, rows: int, columns: int, disparity: float, tmp_path: Path
+) -> None:
+    views = moving_texture(rows, columns, disparity)
+    path = write(tmp_path / "a.png", (side_by_side if kind == "mosaic" else tiled)(views))
+    decoded = read_container(path, views=(rows, columns))
+    np.testing.assert_array_equal(decoded.values, views)
+    assert decoded.format.lower().startswith(kind)
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_a_picture_that_does_not_tell_its_layout(flat: bool, samples: NDArray[np.uint8], tmp_path: Path) -> None:
+    """Neither one colour nor noise has seams, or anything alike."""
+    views = np.full_like(samples, 7) if flat else samples
+    path = write(tmp_path / "a.png", side_by_side(views))
+    with pytest.raises(
+        InputError, match=r'does not tell .* mosaic of 2×3 views .*layout="mosaic" or layout="eslf"'
+    ):
+        read_container(path, views=(2, 3))
+    np.testing.assert_array_equal(read_container(path, views=(2, 3), layout="mosaic").values, views)
+
+
+def test_a_mosaic_has_whole_tiles(samples: NDArray[np.uint8], tmp_path: Path) -> None:
+    path = write(tmp_path / "a.png", side_by_side(samples)[:-1])
+    with pytest.raises(InputError, match=r"9×12 pixels .*are no whole number of tiles, 2×3"):
+        read_container(path, views=(2, 3), layout="mosaic")
+    with pytest.raises(InputError, match="layout is 'eslf' or 'mosaic', not 'tiles'"):
+        read_container(path, views=(2, 3), layout="tiles")
+
+
+@pytest.mark.parametrize("kind", ["mosaic", "eslf"])
+def test_views_counted_another_way_through_a_picture(
+    kind: str, samples: NDArray[np.uint8], tmp_path: Path
+) -> None:
+    tile = side_by_side if kind == "mosaic" else tiled
+    back_and_forth = np.stack([row if n % 2 == 0 else row[::-1] for n, row in enumerate(samples)])
+    for order, written in (("serpentine", back_and_forth), ("column-major", samples.swapaxes(0, 1))):
+        path = write(tmp_path / "a.png", tile(written))
+        decoded = read_container(path, views=(2, 3), layout=kind, order=order)
+        np.testing.assert_array_equal(decoded.values, samples)
+        assert order in decoded.format
+
+
+def test_a_mosaic_written_and_read_back(tmp_path: Path) -> None:
+    codes = moving_texture(3, 4)
+    saved = save_light_field(
+        LightField.from_views(transfer.decode(codes), 1e-3, 1e-3, 1.0), tmp_path / "a.png", kind="mosaic", bits=8
+    )
+    assert (saved.kind, "side by side" in saved.description) == ("mosaic", True)
+    picture, _ = read_picture(tmp_path / "a.png")
+    np.testing.assert_array_equal(picture, side_by_side(codes))
+    np.testing.assert_array_equal(read_container(tmp_path / "a.png", views=(3, 4)).values, codes)
 
 
 @pytest.mark.parametrize(

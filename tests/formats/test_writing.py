@@ -180,7 +180,7 @@ def test_eslf(tmp_path):
     light_field = field_of()
     saved = save_light_field(light_field, tmp_path / "a.png")
     assert "holds no geometry" in saved.description
-    back = eslf.read(tmp_path / "a.png", views=(3, 4))
+    back = eslf.read(tmp_path / "a.png", views=(3, 4), layout="eslf")
     assert np.abs(transfer.decode(back.values) - light_field.values).max() < 1.8e-5  # 16 bits, as above
 
 
@@ -211,7 +211,7 @@ def test_from_a_store_as_from_memory(tmp_path, name):
     if name == "b.zarr":
         back = open_store(tmp_path / name).read()
     elif name == "b.png":
-        back = reopened(tmp_path / name, views=(3, 4), **GEOMETRY)
+        back = reopened(tmp_path / name, views=(3, 4), layout="eslf", **GEOMETRY)
     else:
         back = reopened(tmp_path / name)
     light = transfer.decode(codes.values)

@@ -123,7 +123,7 @@ def test_other_formats_are_made_from_a_store(codes):
         (["views", "b.zarr", "--quality", "50"], "--quality is for --lossy"),
         (["views", "b.zarr", "--lossy", "avif", "--level", "2"], "leave them out with --lossy"),
         (["views", "b.zarr", "--lossy", "avif", "--quality", "100"], "whole number from 1 to 99"),
-        (["views", "b.zarr", "--kind", "hci"], "--kind is for folders of views"),
+        (["views", "b.zarr", "--kind", "hci"], "--kind is for folders and pictures of views"),
         (["views", "b.npz", "--dtype", "uint8"], "--dtype is for stores"),
         (["views", "b.npz", "--dtype", "uint8", "--level", "2"], "--dtype, --level are for stores"),
         (["lost", "b.zarr"], "there is no"),
@@ -178,4 +178,4 @@ def test_the_order_of_numbered_views_can_be_told(codes, tmp_path):
     assert np.array_equal(stored_codes("told.zarr"), codes)
     assert "9 of 16 numbered views" in refused("convert", "numbered", "other.zarr", *KNOWN, "--views", "4", "4")
     assert "leave out --order" in refused("convert", "told.zarr", "again.zarr", "--order", "serpentine")
-    assert "every= means nothing to a folder" in refused("convert", "views", "v.zarr", *KNOWN, "--every", "2")
+    assert "--every means nothing to a folder" in refused("convert", "views", "v.zarr", *KNOWN, "--every", "2")

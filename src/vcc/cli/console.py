@@ -17,8 +17,10 @@ from vcc.files.atomic import atomic_path
 
 _LIBRARY_OPTION = re.compile(
     r"\b(transfer|spacing|slope_per_pixel|focus_distance|orientation|scene_distance|interpolation"
-    r"|between_views|memory_limit|engine|exposure|radiance|seed|method|samples|tolerance|refine|threads)=(?=\S)"
+    r"|between_views|memory_limit|engine|exposure|radiance|seed|method|samples|tolerance|refine|threads"
+    r"|views|order|every|layout|kind)=(?=(\S?))"
 )
+_PAIR = re.compile(r"\bviews=\((\w+), (\w+)\)")
 
 
 @contextmanager
@@ -54,7 +56,13 @@ def as_options(message: str) -> str:
     message = message.replace("(lengths in metres)", '(lengths with a unit: "50 mm")')
     message = message.replace("focus_distance=… (metres)", 'focus_distance=… (a length: "1.2 m")')
     message = message.replace("files_outside=True", "--files-outside")
-    return _LIBRARY_OPTION.sub(lambda match: f"--{match[1].replace('_', '-')} ", message)
+    message = _PAIR.sub(r"views=\1 \2", message)
+
+    def option(match: re.Match[str]) -> str:
+        has_value = match[2] not in ("", ",", ".", ":")
+        return f"--{match[1].replace('_', '-')}{' ' if has_value else ''}"
+
+    return _LIBRARY_OPTION.sub(option, message)
 
 
 def show(message: str) -> None:

@@ -11,37 +11,13 @@ from cyclopts import Group, Parameter
 from vcc import __version__
 from vcc.base.errors import InputError
 from vcc.cli.console import free_output, progress, show
-from vcc.cli.options import Counts, FolderNames, LightFieldFile, OutputFile, Overwrite, Reading, Whole, told
+from vcc.cli.options import Arrangement, FileKind, LightFieldFile, OutputFile, Overwrite, Reading, Whole, told
 from vcc.cli.store_words import written
 from vcc.formats import read_geometry
 from vcc.formats.writing import save_light_field
 from vcc.light_field import LightField
 from vcc.store import Lossless, Lossy, StoredLightField, is_store
 from vcc.store import convert as convert_to_store
-
-
-@dataclass(frozen=True, kw_only=True)
-class AnyReading(Reading):
-    """How a light field of any format is read.
-
-    Args:
-        transfer: How pixel values of the views stand for light: srgb, as pictures for people do, or linear. auto
-            takes what the format has. A store keeps it, and is read as linear light.
-        views: Of views, where file names only count on, or one picture holds all views. Default: found out.
-        order: In which names that only count on go through the views. Default: found out by parallax.
-        every: Of a video, take each so-many-th frame as a view. Default: all.
-    """
-
-    views: Counts | None = None
-    order: Literal["row-major", "column-major", "serpentine", "serpentine-columns"] | None = None
-    every: Whole | None = None
-
-    @property
-    def layout(self) -> dict[str, Any]:
-        """What of it says how a file is laid out."""
-        outside = self.files_outside or None
-        asked = {"views": self.views, "order": self.order, "every": self.every, "files_outside": outside}
-        return {name: value for name, value in asked.items() if value is not None}
 
 
 @Parameter(name="*", group=Group("Making a store", sort_key=2))
@@ -86,10 +62,10 @@ def convert(
     output: OutputFile,
     /,
     *,
-    kind: FolderNames | None = None,
+    kind: FileKind | None = None,
     overwrite: Overwrite = False,
     storing: Storing = Storing(),
-    reading: AnyReading = AnyReading(),
+    reading: Reading = Reading(),
 ) -> None:
     """Put a light field into a store (Zarr), or into files of another format.
 
@@ -98,7 +74,7 @@ def convert(
     """
     if output.suffix.lower() == ".zarr":
         if kind:
-            raise InputError("--kind is for folders of views: OUT is a store")
+            raise InputError("--kind is for folders and pictures of views: OUT is a store")
         packing = storing.packing()
         output = free_output(output, overwrite)
         show(_to_store(light_field, output, storing, packing, overwrite, reading))
@@ -114,7 +90,7 @@ def convert(
 
 
 def _to_store(
-    source: Path, output: Path, storing: Storing, packing: Lossless | Lossy, overwrite: bool, reading: AnyReading
+    source: Path, output: Path, storing: Storing, packing: Lossless | Lossy, overwrite: bool, reading: Reading
 ) -> str:
     """Convert a light field to a store; what came of it, in words."""
     field, transfer, assumed = _with_its_codes(source, reading)
@@ -134,7 +110,7 @@ def _to_store(
 
 
 def _with_its_codes(
-    source: Path, reading: AnyReading
+    source: Path, reading: Reading
 ) -> tuple[LightField | StoredLightField, Literal["srgb", "linear"], list[str] | None]:
     """A light field with its samples as the files have them, how they stand for light, and what was assumed.
 
@@ -142,7 +118,7 @@ def _with_its_codes(
     """
     if is_store(source):
         return reading.light_field(source), "linear", None
-    facts = read_geometry(source, **reading.layout)
+    facts = read_geometry(source, **reading.given(Arrangement))
     assumed = [name for name in facts.unknown if getattr(reading, name) is None]
     field = dataclasses.replace(reading, transfer="linear").in_memory(source)
     if field.values.dtype.kind != "u":

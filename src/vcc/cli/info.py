@@ -16,7 +16,7 @@ from vcc.base.reading import expanded, reading, shown
 from vcc.base.units import short
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
-from vcc.cli.options import LightFieldFile, Reading, ViewCameras, told
+from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, told
 from vcc.cli.store_words import store_facts
 from vcc.cli.view_grid import Views, draw
 from vcc.fields.grid import SAMPLES_IN_WORDS, pair
@@ -25,6 +25,8 @@ from vcc.formats.lytro_lfp import read_lytro
 from vcc.light_field import LightField
 from vcc.store import is_store, open_store
 
+LINEAR = Reading(transfer="linear")
+"""Linear keeps the type of the files: disparities do not need light, and memory is short."""
 _NAMED_AT_MOST = 12
 
 
@@ -36,6 +38,7 @@ def info(
     picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     keep: bool = False,
     cameras: ViewCameras = ViewCameras(),
+    arrangement: Arrangement = Arrangement(),
 ) -> None:
     """Say what a light field is: views, cameras, disparities, brightness, and what its files leave open.
 
@@ -47,24 +50,25 @@ def info(
     """
     if picture is not None:
         picture = check_output(picture, DRAWINGS)
-    show(describe(light_field, quick=quick, picture=picture, keep=keep, cameras=cameras))
+    how = replace(LINEAR, **cameras.given(), **arrangement.given())
+    show(describe(light_field, how, quick=quick, picture=picture, keep=keep))
 
 
 def describe(
     light_field: Path,
+    how: Reading = LINEAR,
     *,
     quick: bool = False,
     picture: Path | None = None,
     keep: bool = False,
-    cameras: ViewCameras = ViewCameras(),
 ) -> str:
-    """What ``vcc info`` says of a path; for the arguments see `info`.
+    """What ``vcc info`` says of a path, read so; for the other arguments see `info`.
 
     Raises:
         InputError: what its reader says, or an option that does not fit it.
     """
     path = expanded(light_field)
-    given = [*told(cameras), *(["--keep"] if keep else [])]
+    given = [*told(how, but=("transfer",)), *(["--keep"] if keep else [])]
     if given and (is_store(path) or lytro_lfp.recognised(path)):
         what = "a store, which states its cameras" if is_store(path) else "a raw recording: it has no views yet"
         raise InputError(f"{path} is {what}: leave out {', '.join(given)}")
@@ -76,36 +80,37 @@ def describe(
         elif is_store(path):
             lines = _of_a_store(path, quick, picture)
         else:
-            kept = {"kept": f"{keep_geometry(path, **cameras.given())}"} if keep else {}
-            lines = _of_files(path, quick, picture, ViewCameras() if keep else cameras) | kept
+            kept = {}
+            if keep:
+                kept["kept"] = f"{keep_geometry(path, **how.given(ViewCameras), **how.given(Arrangement))}"
+                how = replace(LINEAR, **how.given(Arrangement))
+            lines = _of_files(path, quick, picture, how) | kept
     width = max(map(len, lines)) + 2
     return "\n".join(f"{name:<{width}}{shown(value)}" for name, value in lines.items())
 
 
-def _of_files(path: Path, quick: bool, picture: Path | None, cameras: ViewCameras) -> dict[str, str]:
+def _of_files(path: Path, quick: bool, picture: Path | None, how: Reading) -> dict[str, str]:
     """Of a folder or a file, by names; measured, and drawn, by reading views."""
-    facts = _with(cameras, read_geometry(path, sparse=True))
+    facts = _with(how, read_geometry(path, sparse=True, **how.given(Arrangement)))
     lines = _facts(facts)
     if quick and picture is None:
         return lines
     with warnings.catch_warnings():  # of what is assumed, which the lines say
         warnings.filterwarnings("ignore", message=".* do not state ", category=ResultWarning)
-        return lines | _measured(path, facts, quick, picture, cameras)
+        return lines | _measured(path, facts, quick, picture, how)
 
 
-def _measured(
-    path: Path, facts: FolderInfo, quick: bool, picture: Path | None, cameras: ViewCameras
-) -> dict[str, str]:
+def _measured(path: Path, facts: FolderInfo, quick: bool, picture: Path | None, how: Reading) -> dict[str, str]:
     """What the views show, by names."""
     lines = {}
-    # Linear keeps the type of the files: disparities do not need light, and memory is short.
     if facts.missing:
-        sparse = open_sparse_views(path, transfer="linear", **cameras.given())
+        where = how.given(Arrangement)
+        sparse = open_sparse_views(path, transfer="linear", **how.given(ViewCameras), **where)
         held = dict(zip(sparse.places, sparse.pictures, strict=True))
         views = Views(held.get, sparse.shape, sparse.frame, facts.transfer)
         disparities = "" if quick else _sparse_disparities(sparse, facts)
     else:
-        whole = Reading(transfer="linear", **cameras.given()).in_memory(path)
+        whole = how.in_memory(path)
         values = whole.values
         views = Views(lambda place: values[place], (facts.rows, facts.columns), whole.frame, facts.transfer)
         disparities = "" if quick else _disparities(whole, facts)
@@ -116,9 +121,9 @@ def _measured(
     return lines
 
 
-def _with(cameras: ViewCameras, facts: FolderInfo) -> FolderInfo:
+def _with(how: Reading, facts: FolderInfo) -> FolderInfo:
     """Facts with what the user says of the cameras."""
-    given = cameras.given()
+    given = how.given(ViewCameras)
     unknown = tuple(name for name in facts.unknown if name not in given)
     if "spacing" in given:
         given["spacing"] = pair(given["spacing"])

@@ -18,6 +18,8 @@ from vcc.base.errors import InputError
 from vcc.base.units import parse, short
 from vcc.cli.console import as_options, progress
 from vcc.formats import open_light_field
+from vcc.formats.orders import Order
+from vcc.formats.tiles import Layout
 from vcc.light_field import LightField
 from vcc.plan.how import BetweenViews, EngineName, How, Interpolation, Method  # noqa: F401  # How's fields name them
 from vcc.store import StoredLightField, is_store, open_store
@@ -167,13 +169,21 @@ File = Annotated[Path, Parameter(metavar="FILE")]
 OutputFile = Annotated[
     Path,
     Parameter(
-        help="What to make: a store (.zarr); or .npz, .mat, .png (ESLF), .mp4 (a flight through the views), a "
-        "folder (no ending).",
+        help="What to make: a store (.zarr); or .npz, .mat, .png (all views in one), .mp4 (a flight through the "
+        "views), a folder (no ending).",
     ),
 ]
 FolderNames = Annotated[
     Literal["hci", "views"],
     Parameter(help="Names of views in a folder: as the HCI benchmark has them (the default), or row and column."),
+]
+FileKind = Annotated[
+    Literal["hci", "views", "eslf", "mosaic"],
+    Parameter(
+        help="Of a folder, the names of its views: as the HCI benchmark has them (hci, the default), or row and "
+        "column (views). Of one .png: the blocks of views of lenslets side by side (eslf, the default), or whole "
+        "views (mosaic)."
+    ),
 ]
 Overwrite = Annotated[bool, Parameter(help="Replace what has that name.")]
 
@@ -188,9 +198,20 @@ def told(record: Any, *, but: tuple[str, ...] = ()) -> list[str]:
     return [f"--{name.replace('_', '-')}" for name in changed]
 
 
+@dataclass(frozen=True)
+class Given:
+    """A record of options of which None and False stand for those that nobody gave."""
+
+    def given(self, part: type["Given"] | None = None) -> dict[str, Any]:
+        """What is given, by name; of a part, that which another record has as well."""
+        names = [field.name for field in dataclasses.fields(type(self) if part is None else part)]
+        chosen = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in chosen.items() if value is not None and value is not False}
+
+
 @Parameter(name="*", group=READING)
 @dataclass(frozen=True, kw_only=True)
-class ViewCameras:
+class ViewCameras(Given):
     """The cameras of the views, as far as the user knows better than the files.
 
     Args:
@@ -205,28 +226,45 @@ class ViewCameras:
     slope_per_pixel: float | None = None
     focus_distance: Length | None = None
 
-    def given(self) -> dict[str, Any]:
-        """What is given, by name."""
-        chosen = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return {name: value for name, value in chosen.items() if value is not None}
+
+@Parameter(name="*", group=READING)
+@dataclass(frozen=True, kw_only=True)
+class Arrangement(Given):
+    """Where views stand, in files that do not say it.
+
+    Args:
+        views: Rows and columns of views, "9 9": for names that only count on, for a video over a grid, and for one
+            picture of all views, which must be told. Default: found from names, or from the pictures.
+        order: How names that only count on, or the frames of a video, pass through the views: row by row
+            (row-major), column by column, to and fro (serpentine: every other row backwards), or the fields of one
+            colour of a chessboard before the others (chess). Default: found from the pictures.
+        every: Of a video, take each so-many-th frame as a view. Default: all.
+        layout: What one picture of all views is: a mosaic, whole views side by side, or eslf, the blocks of views
+            of lenslets side by side. Default: found from the picture.
+        files_outside: Let a views.csv name files outside of its folder. Only for lists that you trust.
+    """
+
+    views: Counts | None = None
+    order: Order | None = None
+    every: Whole | None = None
+    layout: Layout | None = None
+    files_outside: bool = False
 
 
 @Parameter(name="*", group=READING)
 @dataclass(frozen=True, kw_only=True)
-class Reading(ViewCameras):
+class Reading(Arrangement, ViewCameras):
     """How a light field is read.
 
     Args:
         transfer: How pixel values of the views stand for light: srgb, as pictures for people do, linear
-            (proportional to it), or auto: as the format says, srgb where it says nothing.
-        orientation: Order of the views. auto checks it by parallax and puts it right; as-is takes the files as
-            they are.
-        files_outside: Let a views.csv name files outside of its folder. Only for lists that you trust.
+            (proportional to it), or auto: as the format says, srgb where it says nothing. A store is linear light.
+        orientation: Which way rows and columns of views run. auto checks it by parallax and puts it right; as-is
+            takes the files as they are.
     """
 
     transfer: Literal["auto", "srgb", "linear"] = "auto"
     orientation: Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"] = "auto"
-    files_outside: bool = False
 
     def light_field(self, path: Path) -> LightField | StoredLightField:
         """The light field that is asked for, with a progress bar; a store is opened, not read.

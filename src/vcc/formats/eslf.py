@@ -1,10 +1,12 @@
-"""ESLF: one picture in which the block of views behind each lenslet is tiled over the image."""
+"""One picture of all views: ESLF, in which the block of views behind each lenslet is tiled over the image, and
+mosaics of whole views.
+"""
 
 from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +18,14 @@ from vcc.fields.samples import Samples
 from vcc.files import transfer as curves
 from vcc.files.atomic import atomic_path
 from vcc.files.pictures import read_picture
+from vcc.formats import orders
 from vcc.formats.grid import Decoded, weights_apart
+from vcc.formats.orders import Order, counted_from, running_numbers
+from vcc.formats.tiles import Layout, check, mosaic_evidence, put_together, taken_apart
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".ppm")
 
+_CLEARLY = 1.4  # real pictures of five light fields, whole and in parts, gave 1.95 and more either way
 _KNOWN = {(5264, 7574): (14, 14), (6510, 9375): (15, 15)}  # Stanford's archive, and the Light Field Toolbox
 
 
@@ -32,47 +38,69 @@ def read(
     path: Path,
     *,
     views: tuple[int, int] | None = None,
+    layout: Layout | None = None,
+    order: Order | None = None,
 ) -> Decoded:
-    """The views of a picture of lenslet blocks: pixel (l·rows + j, k·columns + i) is pixel (l, k) of view (j, i).
+    """The views of a picture that holds all of them.
+
+    In an ESLF pixel (l·rows + j, k·columns + i) is pixel (l, k) of view (j, i); in a mosaic view (j, i) is the
+    tile at row j and column i.
 
     Args:
         path: the picture. The opacity of a PNG is the weight of its samples.
-        views: (rows, columns) of views in a block. Known for the sizes of Stanford's archive (14×14, 7574×5264
-            pixels) and of the Light Field Toolbox (15×15, 9375×6510).
+        views: (rows, columns) of views. Known for the sizes of Stanford's archive (14×14, 7574×5264 pixels) and of
+            the Light Field Toolbox (15×15, 9375×6510).
+        layout: "eslf" or "mosaic"; found from the picture if not given, see `vcc.formats.tiles.mosaic_evidence`.
+        order: how the views are counted through blocks or tiles, see `vcc.formats.orders`; row by row if not
+            given.
 
     Raises:
-        InputError: a picture that cannot be read, views that are not known or impossible.
+        InputError: a picture that cannot be read, views that are not known or impossible, a picture that does not
+            tell its layout.
     """
+    orders.check(views, order)
+    check(layout)
     samples, weights = _samples(path)
     height, width = samples.shape[:2]
-    if views is None:
-        views = _KNOWN.get((height, width))
+    known = _KNOWN.get((height, width))
+    views = views or known
     if views is None:
         raise InputError(
-            f"{path} is one picture of {width}×{height} pixels. If it is an ESLF, the block of views behind each "
-            "lenslet tiled, pass views=(rows, columns) of a block, e.g. views=(14, 14); else open the folder with "
-            "one picture for each view"
+            f"{path} is one picture of {width}×{height} pixels. If it holds all views, as a mosaic of them or as "
+            "an ESLF (the block of views behind each lenslet tiled), pass views=(rows, columns), e.g. "
+            "views=(9, 9); else open the folder with one picture for each view"
         )
     rows, columns = views
-    if rows < 1 or columns < 1 or rows > height or columns > width:
-        raise InputError(f"{path}: blocks of {rows}×{columns} views do not fit into {height}×{width} pixels")
-    remarks: tuple[str, ...] = ()
-    if height % rows or width % columns:
-        remarks = (
-            f"{height}×{width} pixels (rows × columns) are no whole number of blocks of {rows}×{columns} views; "
-            f"the last {height % rows} rows and {width % columns} columns, cut off blocks, were left out",
-        )
+    if rows > height or columns > width:
+        raise InputError(f"{path}: {rows}×{columns} views do not fit into {height}×{width} pixels")
+    order = order or "row-major"
+    written = counted_from(views, order)
+    layout = layout or _layout(samples, written, known, path)
+    remarks = _cut_off(height, width, written, layout, path)
+
+    def ordered(picture: NDArray[Any]) -> NDArray[Any]:
+        whole = picture[: height - height % written[0], : width - width % written[1]]
+        return _in_order(taken_apart(whole, written, layout), views, order)
+
+    name = "ESLF" if layout == "eslf" else "mosaic"
+    counted = "" if order == "row-major" else f", {order}"
     return Decoded(
-        format=f"ESLF, {rows}×{columns} views in one picture",
-        values=_views(samples, views),
+        format=f"{name}, {rows}×{columns} views in one picture{counted}",
+        values=ordered(samples),
         transfer="srgb",
-        weights=None if weights is None else _views(weights, views),
+        weights=None if weights is None else ordered(weights),
         remarks=remarks,
     )
 
 
-def save(light_field: Samples, path: str | PathLike[str], *, bits: int = 16) -> Path:
-    """Write a light field as an ESLF, sRGB-encoded PNG.
+def save(
+    light_field: Samples,
+    path: str | PathLike[str],
+    *,
+    bits: int = 16,
+    kind: Literal["eslf", "mosaic"] = "eslf",
+) -> Path:
+    """Write a light field as one sRGB-encoded PNG.
 
     Read back, samples differ by half a code of the sRGB curve at most; they carry no geometry.
 
@@ -80,6 +108,7 @@ def save(light_field: Samples, path: str | PathLike[str], *, bits: int = 16) -> 
         light_field: what to write, grey or of 3 channels, values 0 to 1 (or unsigned integers).
         path: where to; ends in .png.
         bits: bits per sample, 8 or 16.
+        kind: "eslf", each lenslet's block of views tiled, or "mosaic", whole views side by side.
 
     Raises:
         InputError: another ending, other channels, values above 1, or a place that cannot be written to.
@@ -87,35 +116,65 @@ def save(light_field: Samples, path: str | PathLike[str], *, bits: int = 16) -> 
     import imagecodecs
 
     path = Path(path).expanduser()
-    checks.ending("an ESLF", path, ".png")
+    check(kind)
+    what = "an ESLF" if kind == "eslf" else "a mosaic of views"
+    checks.ending(what, path, ".png")
     grid = light_field.grid
     if grid.channels not in (None, 1, 3):
         raise InputError(f"a PNG has 1 or 3 channels, and this light field has {grid.channels}")
     values = all_samples(light_field).astype(np.float32) / np.float32(grid.full_scale)
     if values.max() > 1:
         raise InputError(
-            f"an ESLF holds values up to 1, and this light field reaches {values.max():g}: scale it, "
+            f"{what} holds values up to 1, and this light field reaches {values.max():g}: scale it, "
             "lf.replaced(lf.values / lf.values.max())"
         )
     codes = curves.encode(values, bits)
-    rows, columns, height, width = codes.shape[:4]
-    tiled = (
-        codes.reshape(*codes.shape[:4], -1).transpose(2, 0, 3, 1, 4).reshape(height * rows, width * columns, -1)
-    )
+    tiled = put_together(codes, kind)
     with atomic_path(path) as temporary:
         temporary.write_bytes(
-            imagecodecs.png_encode(np.ascontiguousarray(tiled if tiled.shape[2] > 1 else tiled[..., 0]))
+            imagecodecs.png_encode(np.ascontiguousarray(tiled[..., 0] if tiled.shape[2:] == (1,) else tiled))
         )
     return path
 
 
-def _views(samples: NDArray[Any], views: tuple[int, int]) -> NDArray[Any]:
-    """A tiled picture as (v, u, t, s[, channel]); blocks cut off at the right and below are left out."""
+def _layout(samples: NDArray[Any], views: tuple[int, int], known: tuple[int, int] | None, path: Path) -> Layout:
+    """The layout that a picture shows; one of a size that ESLFs are known to have need not show it clearly."""
+    if samples.shape[0] % views[0] or samples.shape[1] % views[1]:
+        return "eslf"  # whose last blocks may be cut off
+    evidence = mosaic_evidence(samples, views)
+    if max(evidence, 1 / evidence) > _CLEARLY:
+        return "mosaic" if evidence > 1 else "eslf"
+    if known == views:
+        return "eslf"
+    raise InputError(
+        f"{path} does not tell whether it is a mosaic of {views[0]}×{views[1]} views or an ESLF (the block of "
+        'views behind each lenslet tiled): pass layout="mosaic" or layout="eslf"'
+    )
+
+
+def _cut_off(height: int, width: int, views: tuple[int, int], layout: Layout, path: Path) -> tuple[str, ...]:
+    """What to say of blocks that are cut off; tiles of a mosaic may not be."""
     rows, columns = views
-    height, width = samples.shape[0] // rows, samples.shape[1] // columns
-    whole = samples[: height * rows, : width * columns]
-    blocks = whole.reshape(height, rows, width, columns, *samples.shape[2:])
-    return np.ascontiguousarray(np.moveaxis(blocks, (1, 3), (0, 1)))
+    if height % rows == width % columns == 0:
+        return ()
+    if layout == "mosaic":
+        raise InputError(
+            f"{path}: {height}×{width} pixels (rows × columns) are no whole number of tiles, {rows}×{columns} of "
+            "them. Correct views=, or crop the picture to the views"
+        )
+    return (
+        f"{height}×{width} pixels (rows × columns) are no whole number of blocks of {rows}×{columns} views; "
+        f"the last {height % rows} rows and {width % columns} columns, cut off blocks, were left out. Is it a "
+        "mosaic, or are views= others?",
+    )
+
+
+def _in_order(tiles: NDArray[Any], views: tuple[int, int], order: Order) -> NDArray[Any]:
+    """Views that stand in a picture as they are counted, each in its place."""
+    if order == "row-major":
+        return np.ascontiguousarray(tiles)
+    flat = tiles.reshape(-1, *tiles.shape[2:])
+    return flat[running_numbers(views, order)]
 
 
 def _samples(path: Path) -> tuple[NDArray[Any], NDArray[np.float32] | None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded, reading
@@ -11,7 +12,8 @@ from vcc.files.atomic import atomic_path
 from vcc.formats import containers, hci
 from vcc.formats.folder_info import Given, cameras_for, info_of_grid
 from vcc.formats.folders import find_grid
-from vcc.formats.numbered import Order
+from vcc.formats.grid import ViewGrid
+from vcc.formats.orders import Order
 
 
 def keep_geometry(
@@ -22,6 +24,8 @@ def keep_geometry(
     focus_distance: float | None = None,
     views: tuple[int, int] | None = None,
     order: Order | None = None,
+    files_outside: bool = False,
+    **options: Any,
 ) -> Path:
     """Write the cameras of a folder of views as its ``parameters.cfg``: opened again, nothing is assumed.
 
@@ -35,6 +39,8 @@ def keep_geometry(
         focus_distance: where the views converge, metres; ``math.inf`` if they are parallel.
         views: (rows, columns) of views, for running numbers.
         order: of running numbers.
+        files_outside: see `open_light_field`.
+        options: of other formats; a folder takes none.
 
     Returns:
         The file that was written.
@@ -45,21 +51,25 @@ def keep_geometry(
     """
     folder = expanded(path)
     with reading(folder, "a folder of views"):
-        text = _text(folder, Given(spacing, slope_per_pixel, focus_distance), views, order)
+        _refuse_a_file(folder)
+        grid = find_grid(folder, views, order, sparse=True, files_outside=files_outside, options=options)
+        text = _text(grid, folder, Given(spacing, slope_per_pixel, focus_distance))
     file = folder / hci.PARAMETERS
     with atomic_path(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return file
 
 
-def _text(folder: Path, given: Given, views: tuple[int, int] | None, order: Order | None) -> str:
-    """What ``parameters.cfg`` of a folder is to say."""
+def _refuse_a_file(folder: Path) -> None:
     if containers.container_of(folder) is not None:
         raise InputError(
             f"{folder} is one file, beside which no camera file is read: make a store of it, which states its "
             "cameras (vcc convert, or vcc.store.save_store)"
         )
-    grid = find_grid(folder, views, order, sparse=True)
+
+
+def _text(grid: ViewGrid, folder: Path, given: Given) -> str:
+    """What ``parameters.cfg`` of a folder is to say."""
     there = hci.parameters_file(folder)
     if there is not None:
         raise InputError(f"{there} states the cameras already: correct what it says, or move it away first")

@@ -107,9 +107,10 @@ def open_light_field(
         orientation: "auto" checks by parallax that the view axes fit the pictures and puts right
             what does not, with a warning; "as-is" takes the files as they are; "flip-rows",
             "flip-columns", "flip-both" and "transpose" rearrange the views without a check.
-        views: (rows, columns) of views, for running numbers and for single pictures of tiled views.
-        order: how views are counted: "row-major", "column-major", "serpentine" (every other row reversed) or
-            "serpentine-columns". Running numbers without it are arranged so that neighbours differ least.
+        views: (rows, columns) of views, for running numbers, one picture of all views, and videos over a grid.
+        order: how views are counted: "row-major", "column-major", "serpentine" (every other row reversed),
+            "serpentine-columns" or "chess" (all fields of one colour first), drawn in docs/files.md. Running
+            numbers without it are arranged so that neighbours differ least.
         files_outside: let a ``views.csv`` name files outside of its folder (``../a.png``, ``/data/a.png``). Only
             for lists that you trust: one that came with a folder could name any picture of yours.
         progress: called as progress(done, total) after each picture.

@@ -28,22 +28,26 @@ from vcc.formats.exposing import Codes, stored_view
 from vcc.formats.hci import PARAMETERS, parameters_text
 from vcc.store import save_store
 
-Kind = Literal["zarr", "hci", "views", "mat", "eslf", "mp4", "npz"]
+Kind = Literal["zarr", "hci", "views", "mat", "eslf", "mosaic", "mp4", "npz"]
 """What a light field may be written as; see `save_light_field`."""
-_ENDINGS: dict[str, Kind] = {
-    ".zarr": "zarr",
-    ".mat": "mat",
-    ".png": "eslf",
-    ".mp4": "mp4",
-    ".npz": "npz",
-    "": "hci",
+_ENDINGS: dict[Kind, str] = {
+    "zarr": ".zarr",
+    "mat": ".mat",
+    "eslf": ".png",
+    "mosaic": ".png",
+    "mp4": ".mp4",
+    "npz": ".npz",
+    "hci": "",
+    "views": "",
 }
+"""Of each kind; an ending alone asks for the first kind that has it."""
 _FOLDERS = ("hci", "views", "zarr")
 _HOW: dict[Kind, str] = {
     "zarr": "Zarr store",
     "npz": "NumPy arrays with the frame, lossless",
     "mat": "Light Field Toolbox .mat with its intrinsics, lossless",
-    "eslf": "one picture of tiled views (ESLF), sRGB; it holds no geometry",
+    "eslf": "one picture of tiled blocks of views (ESLF), sRGB; it holds no geometry",
+    "mosaic": "one picture of all views side by side, sRGB; it holds no geometry",
 }
 _PNG_LEVEL = 4  # a third of the usual level's time, for 5 % more bytes
 _POINTS_UNSAID = (
@@ -88,14 +92,15 @@ def save_light_field(
     | ``….mat``            | "mat"   | as the Light Field Toolbox has it, with its H; lossless                 |
     | a folder (no ending) | "hci"   | ``input_CamNNN.png`` and ``parameters.cfg``                             |
     | a folder             | "views" | ``view_RR_CC.png`` (or ``.tif``, ``.exr``), and ``parameters.cfg``      |
-    | ``….png``            | "eslf"  | one picture of tiled views; no geometry                                 |
+    | ``….png``            | "eslf"  | one picture, each lenslet's block of views tiled; no geometry           |
+    | ``….png``            | "mosaic" | one picture, the views side by side; no geometry                       |
     | ``….mp4``            | "mp4"   | a flight through the views, for people; no geometry                     |
 
     Args:
         light_field: in memory or in a store. For stores, folders and flights one view of a
             store is read at a time.
         path: where to. A folder must not exist yet, or be empty.
-        kind: see above; needed for "views".
+        kind: see above; needed for "views" and "mosaic".
         progress: called as progress(done, total) after each view of a folder.
         options: what the format takes: for "hci" and "views" see `save_folder`, for the others
             `vcc.store.save_store`, `vcc.formats.arrays.save`, `vcc.formats.lftoolbox.save`,
@@ -123,6 +128,8 @@ def save_light_field(
     if chosen in ("hci", "views"):
         saved: SavedLightField = writer(light_field, path, kind=chosen, progress=progress, **options)
         return saved
+    if chosen in ("eslf", "mosaic"):
+        options["kind"] = chosen
     if chosen == "mp4":
         count, exposure, clipped = writer(light_field, path, **options)
         _warn_of_clipping(path, clipped, options.get("exposure", 1.0))
@@ -131,7 +138,7 @@ def save_light_field(
     else:
         writer(light_field, path, **options)
         saved = SavedLightField(path, chosen, 1.0, 0.0, _words(light_field.grid, path, _HOW[chosen]))
-    if light_field.grid.sample != "mean" and chosen in ("eslf", "mp4"):
+    if light_field.grid.sample != "mean" and chosen in ("eslf", "mosaic", "mp4"):
         warnings.warn(f"{path}: {_POINTS_UNSAID}", ResultWarning, stacklevel=2)
     tell(progress, 1, 1)
     return saved
@@ -211,17 +218,17 @@ def kind_of(path: Path, kind: Kind | None) -> Kind:
     """
     ending = path.suffix.lower()
     if kind is None:
-        if ending not in _ENDINGS:
-            known = ", ".join(each for each in _ENDINGS if each)
+        chosen = next((each for each, has in _ENDINGS.items() if has == ending), None)
+        if chosen is None:
+            known = ", ".join(dict.fromkeys(each for each in _ENDINGS.values() if each))
             raise InputError(
                 f'a light field cannot be written as "{path.name}": end the name in {known}, or in nothing for a '
                 'folder (kind="hci" or "views" for a folder with a dot in its name)'
             )
-        return _ENDINGS[ending]
+        return chosen
     checks.one_of("kind", kind, get_args(Kind))
-    if kind not in _FOLDERS and _ENDINGS.get(ending) != kind:
-        wanted = next(each for each, name in _ENDINGS.items() if name == kind)
-        raise InputError(f'"{path.name}" is to be of the kind "{kind}": end its name in {wanted}')
+    if kind not in _FOLDERS and ending != _ENDINGS[kind]:
+        raise InputError(f'"{path.name}" is to be of the kind "{kind}": end its name in {_ENDINGS[kind]}')
     return kind
 
 
@@ -231,6 +238,7 @@ _WRITERS: dict[Kind, Callable[..., Any]] = {
     "views": save_folder,
     "mat": lftoolbox.save,
     "eslf": eslf.save,
+    "mosaic": eslf.save,
     "mp4": video.save,
     "npz": arrays.save,
 }
