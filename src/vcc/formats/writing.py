@@ -85,16 +85,16 @@ def save_light_field(
 ) -> SavedLightField:
     """Write a light field; the ending of the name, or ``kind``, chooses the format.
 
-    | name                 | kind    | what                                                                    |
-    |----------------------|---------|-------------------------------------------------------------------------|
-    | ``….zarr``           | "zarr"  | a store, docs/store.md; lossless unless asked otherwise                 |
-    | ``….npz``            | "npz"   | NumPy arrays: samples of any type and the frame; lossless               |
-    | ``….mat``            | "mat"   | as the Light Field Toolbox has it, with its H; lossless                 |
-    | a folder (no ending) | "hci"   | ``input_CamNNN.png`` and ``parameters.cfg``                             |
-    | a folder             | "views" | ``view_RR_CC.png`` (or ``.tif``, ``.exr``), and ``parameters.cfg``      |
-    | ``….png``            | "eslf"  | one picture, each lenslet's block of views tiled; no geometry           |
-    | ``….png``            | "mosaic" | one picture, the views side by side; no geometry                       |
-    | ``….mp4``            | "mp4"   | a flight through the views, for people; no geometry                     |
+    | name                 | kind     | what                                                               |
+    |----------------------|----------|--------------------------------------------------------------------|
+    | ``….zarr``           | "zarr"   | a store, docs/store.md; lossless unless asked otherwise            |
+    | ``….npz``            | "npz"    | NumPy arrays: samples of any type and the frame; lossless          |
+    | ``….mat``            | "mat"    | as the Light Field Toolbox has it, with its H; lossless            |
+    | a folder (no ending) | "hci"    | ``input_CamNNN.png`` and ``parameters.cfg``                        |
+    | a folder             | "views"  | ``view_RR_CC.png`` (or ``.tif``, ``.exr``), and ``parameters.cfg`` |
+    | ``….png``            | "eslf"   | one picture, each lenslet's block of views tiled; no geometry      |
+    | ``….png``            | "mosaic" | one picture, the views side by side; no geometry                   |
+    | ``….mp4``            | "mp4"    | a flight through the views, for people; no geometry                |
 
     Args:
         light_field: in memory or in a store. For stores, folders and flights one view of a
