@@ -12,7 +12,7 @@ NAMES = {
     "vcc.camera_file": "ELEMENT_KINDS KERNEL_NAMES PATTERN_NAMES SURFACE_NAMES load_camera save_camera",
     "vcc.demo": "run_demo",
     "vcc.demo.scene": "demo_scene",
-    "vcc.errors": "InputError ResultWarning",
+    "vcc.errors": "CacheWarning InputError ResultWarning",
     "vcc.formats": "lftoolbox open_light_field open_sparse_views read_ground_truth",
     "vcc.formats.pictures": "read_picture",
     "vcc.formats.writing": "save_light_field",

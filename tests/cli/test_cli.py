@@ -252,6 +252,23 @@ def test_faults_of_the_program_exit_with_1_and_a_traceback(tmp_path):
     assert "ZeroDivisionError" in result.stderr
 
 
+def test_interrupted_commands_exit_with_130_and_one_line_without_waiting_for_threads(tmp_path):
+    code = (
+        "import sys, threading, types\n"
+        "stand_in = sys.modules['vcc.demo'] = types.ModuleType('vcc.demo')\n"
+        "def at_work(*arguments):\n"
+        "    threading.Thread(target=threading.Event().wait).start()\n"
+        "    raise KeyboardInterrupt\n"
+        "stand_in.run_demo = at_work\n"
+        "sys.argv = ['vcc', 'demo', '-o', sys.argv[1]]; "
+        "from vcc.cli import main; main()"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60)  # the thread never ends
+    assert result.returncode == 130
+    assert result.stderr.strip() == "Aborted."
+
+
 def test_as_a_module():
     for module in ("vcc", "vcc.cli"):
         command = [sys.executable, "-m", module, "--version"]

@@ -9,6 +9,7 @@ import vcc
 from vcc import Affine
 from vcc.base.units import mm, um
 from vcc.engines import depth_views, engine, numba_cpu, rays_compiled, sharpening_kernels
+from vcc.engines.ray_tables import Tile
 from vcc.plan.how import How, cores
 from vcc.run.drive import drive
 
@@ -46,11 +47,11 @@ def test_any_number_of_threads_gives_the_same_bytes_and_opens_no_more(name, monk
     plan = camera.compile(lf, **options)
     for module in (numba_cpu, rays_compiled, sharpening_kernels, depth_views):
 
-        def counted(threads, module=module, pool=module.ThreadPoolExecutor):
+        def counted(threads, module=module, pool=module.Workers):
             opened.setdefault(module, set()).add(threads)
             return pool(threads)
 
-        monkeypatch.setattr(module, "ThreadPoolExecutor", counted)
+        monkeypatch.setattr(module, "Workers", counted)
     one = drive(plan, lf, How(threads=1))
     assert one.values.any()
     for threads in (2, 3, None):
@@ -66,3 +67,24 @@ def test_each_thread_takes_memory():
     core = vcc.Camera([LENS, MASK], SENSOR).compile(field()).core
     one, two, three = (engine("numba").memory(core, 3, threads) for threads in (1, 2, 3))
     assert three - two == two - one > 0
+
+
+def test_compiled_rays_end_within_a_tile_once_nobody_wants_them(monkeypatch):
+    def kernel(*given):
+        *before, ended, pictures, _ = given
+        pictures[:] = -1
+        found.append(add_tile(*before, np.ones_like(ended), pictures, tile))
+        assert (pictures == -1).all()
+        found.append(add_tile(*before, np.zeros_like(ended), pictures, tile))
+        assert (pictures[:, :3, :3] != -1).all()
+        return found[0]
+
+    tile, found, add_tile = Tile(0, 3, 0, 3), [], rays_compiled.kernels.add_tile
+    monkeypatch.setattr(rays_compiled.kernels, "add_tile", kernel)
+    lf = field()
+    plan = vcc.Camera([LENS], vcc.Sensor(z=52 * mm, shape=(4, 4), pitch=1 * mm)).compile(
+        lf, method="rays", samples=8
+    )
+    drive(plan, lf, How(threads=1))
+    assert found[0].tolist() == [0, 0, 0]
+    assert found[1][0] > 0

@@ -10,3 +10,7 @@ class InputError(ValueError):
 
 class ResultWarning(UserWarning):
     """A result was made, but part of what was asked for was not there (rays, orientation, units)."""
+
+
+class CacheWarning(UserWarning):
+    """Something could not be kept to be used again: results are the same, and take longer the next time."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import sys
+import threading
 from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError, Group, Parameter
@@ -183,13 +184,26 @@ app.register_install_completion_command(
 )
 
 
+INTERRUPTED = 130
+"""What shells expect of a program that Ctrl-C ended."""
+
+
 def main() -> None:
     """Run the command line with the arguments of this process, and end it with an exit code.
 
-    0: done. 1: a fault in the program, with a traceback, or interrupted. 2: unusable input, with a
-    message on standard error.
+    0: done. 1: a fault in the program, with a traceback. 2: unusable input, with a message on standard error.
+    130: interrupted by Ctrl-C.
     """
-    sys.exit(run(sys.argv[1:]))
+    try:
+        code = run(sys.argv[1:])
+    except KeyboardInterrupt:  # once more, while the first was being answered
+        code = INTERRUPTED
+    if code == INTERRUPTED and threading.active_count() > 1:
+        # What threads are at is no longer wanted, and Python would wait for it.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -210,7 +224,7 @@ def run(arguments: Sequence[str]) -> int:
             return _refuse(_in_words(error), _help_on(error))
         except KeyboardInterrupt:
             say("Aborted.", "bold red", "")
-            return 1
+            return INTERRUPTED
         except BrokenPipeError:  # who reads has seen enough; nothing more is to be written when Python ends
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 1

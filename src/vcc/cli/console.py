@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import CacheWarning, InputError, ResultWarning
 from vcc.base.progress import Progress
 from vcc.files.atomic import atomic_path
 
@@ -25,13 +25,15 @@ _PAIR = re.compile(r"\bviews=\((\w+), (\w+)\)")
 
 @contextmanager
 def notes() -> Iterator[None]:
-    """Warnings about results become lines on standard error while this lasts."""
+    """Warnings of ours become lines on standard error while this lasts."""
+    ours = (ResultWarning, CacheWarning)
     with warnings.catch_warnings():
-        warnings.simplefilter("always", ResultWarning)
+        for each in ours:
+            warnings.simplefilter("always", each)
         show_others = warnings.showwarning
 
         def show_note(message: Any, category: type[Warning], *rest: Any, **named: Any) -> None:
-            if issubclass(category, ResultWarning):
+            if issubclass(category, ours):
                 say("Note:", "yellow", str(message))
             else:
                 show_others(message, category, *rest, **named)

@@ -172,7 +172,7 @@ def _light_field(work: _Work, given: Path | LightField | None, small: bool) -> B
     values = bench.light_field.values
     sizes = f"{'×'.join(map(str, values.shape))}, {values.nbytes / 1e6:.0f} MB"
     work.timings.append(
-        Timing("compiling the loops", compiling, note="once on a machine: kept on disk for the next run")
+        Timing("compiling the loops", compiling, note="once on a machine where it can be kept on disk")
     )
     verb = "synthesizing" if given is None else "reading"
     work.timings.append(Timing(f"{verb} the light field", made - compiled, note=sizes))

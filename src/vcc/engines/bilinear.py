@@ -5,9 +5,9 @@ Inlined before compiling: an array that is handed on has its references counted,
 
 from __future__ import annotations
 
-from numba import njit
+from vcc.engines.compiled import compiled
 
-_inlined = njit(nogil=True, inline="always", error_model="numpy")
+_inlined = compiled(inline="always")
 
 
 @_inlined

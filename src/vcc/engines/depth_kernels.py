@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from vcc.engines.bilinear import around, bilinear
+from vcc.engines.compiled import compiled
 
-_compiled = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract", "nsz"})
+_compiled = compiled(fastmath={"contract", "nsz"})
 
 TILE = 8
 """Pixels a side of the squares whose ranges of disparities bound the marches."""

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.workers import Workers
 from vcc.engines import depth_kernels as kernels
 from vcc.engines.depth_tables import Found, March, View, Way
 from vcc.fields.grid import Block, Grid
@@ -160,7 +160,7 @@ class DenserViews:
         """
         out = np.zeros((stop - first, *view.samples.shape[1:]), dtype=np.float32)
         found = Found(first, out, *np.empty((3, *out.shape[:2]), dtype=np.float32))
-        with ThreadPoolExecutor(self._threads) as pool:
+        with Workers(self._threads) as pool:
             self._look(pool, view, away, 1.0, False, found)
             if (found.seen < 0).any():
                 for other, distance, weight in others:
@@ -169,7 +169,7 @@ class DenserViews:
 
     def _look(
         self,
-        pool: ThreadPoolExecutor,
+        pool: Workers,
         view: View,
         away: tuple[float, float],
         weight: float,

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
 from typing import Any
 
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.progress import Progress, tell
+from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import rays_compiled, sharpening_kernels
@@ -48,7 +48,7 @@ def footprints(
 ) -> Partial:
     """The raster of samples (v, u, t, s[, channels]), float32; see `vcc.plan.protocol.Runner`."""
     channels = values.shape[4] if values.ndim == 5 else 1
-    with ThreadPoolExecutor(threads) as pool:
+    with Workers(threads) as pool:
         if core.separable:
             raster = _ByColumns(core, channels, pool).raster(values, progress)
         else:
@@ -102,7 +102,7 @@ def _in_one_pass(
     if picture.size < SMALL:
         kernels.filter_rows(lines, filtering, tables.Band(0, rows), picture)
     else:
-        with ThreadPoolExecutor(threads) as pool:
+        with Workers(threads) as pool:
             list(pool.map(lambda band: kernels.filter_rows(lines, filtering, band, picture), _bands(rows)))
     return picture.reshape(rows, columns, channels)
 
@@ -200,7 +200,7 @@ def _blocks(
 class _ByColumns:
     """Tables for plans in which rows and columns part, and the loop over columns of views and bands."""
 
-    def __init__(self, core: Footprints, channels: int, pool: ThreadPoolExecutor) -> None:
+    def __init__(self, core: Footprints, channels: int, pool: Workers) -> None:
         self.core, self.channels, self.pool = core, channels, pool
         self.fine = fine = _FineGrid(core)
         rows, columns = core.raster_shape
@@ -316,7 +316,7 @@ class _ByColumns:
 
 
 def _sheared(
-    core: Footprints, values: NDArray[Any], channels: int, pool: ThreadPoolExecutor, progress: Progress | None
+    core: Footprints, values: NDArray[Any], channels: int, pool: Workers, progress: Progress | None
 ) -> NDArray[np.float32]:
     """The raster (rows, columns × channels) where rows and columns do not part."""
     raster = np.zeros((*core.raster_shape, channels), dtype=np.float32)

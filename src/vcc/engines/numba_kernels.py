@@ -1,15 +1,15 @@
 """Compiled loops of the fast engine. Each is a plain function of arrays, so that it can be read and timed alone.
 
-Compiled once for each type of samples and cached on disk. They release the interpreter's lock; the threads
-are Python's own.
+Compiled once for each type of samples and kept on disk (`vcc.engines.compiled`). They release the interpreter's
+lock; the threads are Python's own.
 """
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from vcc.engines.bilinear import dark_outside
+from vcc.engines.compiled import compiled
 from vcc.engines.footprint_tables import Entries, EntryMasks, Lines
 from vcc.engines.vector_sums import (
     EIGHT,
@@ -28,8 +28,8 @@ VIEWS = 8
 
 # Sums may be reordered so that they vectorise; NaN and infinity keep their meaning.
 _FAST = {"contract", "reassoc", "nsz"}
-_compiled = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy")
-_inlined = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy", inline="always")
+_compiled = compiled(fastmath=_FAST)
+_inlined = compiled(fastmath=_FAST, inline="always")
 
 
 @_compiled

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from vcc.engines.bilinear import around, bilinear
+from vcc.engines.compiled import compiled
 from vcc.engines.ray_tables import Drawn, Packet
 from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add_views_of_4
 from vcc.plan.rays.points import DIGITS
@@ -23,11 +23,11 @@ PACKET = 256
 DIGITS_ABOVE, DIGITS_BELOW = np.float32(2.0**DIGITS), 2.0**-DIGITS
 """What takes a point to its digits as a whole number, and back."""
 
-INLINED = {"nogil": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy", "inline": "always"}
-OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy"}
+_compiled = compiled(fastmath={"contract", "nsz"})
+_inlined = compiled(fastmath={"contract", "nsz"}, inline="always")
 
 
-@njit(**OPTIONS)
+@_compiled
 def cell_of(layout, turn, x, y):  # type: ignore[no-untyped-def]
     """(row, column, centre x, centre y) of the cell that holds a place; turn as `steps._lattice_numbers`."""
     cosine, sine, offset_x, offset_y, pitch, height = turn[0], turn[1], turn[2], turn[3], turn[4], turn[5]
@@ -57,7 +57,7 @@ def cell_of(layout, turn, x, y):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(**OPTIONS)
+@_compiled
 def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
     """(x, y) of the centre of a cell."""
     shifted = column * turn[4]
@@ -67,7 +67,7 @@ def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
     return turn[0] * shifted - turn[1] * down + turn[2], turn[1] * shifted + turn[0] * down + turn[3]
 
 
-@njit(**OPTIONS)
+@_compiled
 def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
     """(columns, row, next row, column, next column, way down, way to the right) of a place on a texture."""
     c, c1, right = around((x - real[0]) * real[2], columns)
@@ -75,7 +75,7 @@ def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
     return columns, r, r1, c, c1, down, right
 
 
-@njit(**OPTIONS)
+@_compiled
 def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
     """One of ``width`` numbers of the texture that begins at ``start``, at a place that `corner` found."""
     columns, r, r1, c, c1, down, right = at
@@ -90,7 +90,7 @@ def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(**INLINED)
+@_inlined
 def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     """Take a packet of rays through all steps.
 
@@ -213,7 +213,7 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
                 t[p] -= stretch * points[a[0] + 2 * kernel + 1, first + p]
 
 
-@njit(**OPTIONS)
+@_compiled
 def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def]
     """Add a view's value at pixel (k, l), interpolated linearly and dark outside, times a weight.
 
@@ -263,7 +263,7 @@ def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def
                     found[channel] += w * values[base + ((r + dr) * columns + c + dc) * channels + channel]
 
 
-@njit(**INLINED)
+@_inlined
 def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-def]
     """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
 
@@ -356,7 +356,7 @@ def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-de
     tally[1] += missing
 
 
-@njit(**OPTIONS)
+@_compiled
 def fold_lanes(sums, channels):  # type: ignore[no-untyped-def]
     """Add the right pixels' channels to the left ones', where vectors left them apart."""
     if channels == 1 or channels == 3 or channels == 4:
@@ -365,7 +365,7 @@ def fold_lanes(sums, channels):  # type: ignore[no-untyped-def]
                 sums[half, channel] += sums[half, channels + channel]
 
 
-@njit(**INLINED)
+@_inlined
 def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
     """Replace the places and slopes of n rays by their indices (i, j, k, l), by a 4×5 matrix."""
     x, y, s, t, _ = rays
@@ -389,7 +389,7 @@ def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
         t[p] = m[3, 0] * xp + m[3, 1] * yp + m[3, 2] * sp + m[3, 3] * tp + m[3, 4]
 
 
-@njit(**OPTIONS)
+@_compiled
 def hashed(number, seed):  # type: ignore[no-untyped-def]
     """See `vcc.plan.rays.points.hashed`."""
     h = np.uint32(number & 0xFFFFFFFF) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
@@ -398,7 +398,7 @@ def hashed(number, seed):  # type: ignore[no-untyped-def]
     return np.uint32(h ^ (h >> np.uint32(16)))
 
 
-@njit(**INLINED)
+@_inlined
 def set_image(image, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
     """Numbers by which `through_cell` finds the stop's image seen through a cell, along one axis, and the cell."""
     gain = cells.beyond[axis] + power * cells.beyond_from_slope[axis]
@@ -413,7 +413,7 @@ def set_image(image, cells, axis, centre, power, slope):  # type: ignore[no-unty
     image[4] = cells.cell_half[axis]
 
 
-@njit(**OPTIONS)
+@_compiled
 def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
     """(power, δs, δt) of a cell; divisions are spared where there is one kind, the usual case."""
     rows, columns = kinds.shape[0], kinds.shape[1]
@@ -422,7 +422,7 @@ def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
     return kinds[r, c, 0], kinds[r, c, 1], kinds[r, c, 2]
 
 
-@njit(**INLINED)
+@_inlined
 def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
     """Fill ``near`` with the (row, column) of the cells through which a pixel sees the stop; returns how many."""
     beyond, from_sensor, from_slope = cells.beyond, cells.beyond_from_sensor, cells.beyond_from_slope
@@ -451,13 +451,13 @@ def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
     return found
 
 
-@njit(**INLINED)
+@_inlined
 def unit(point, flipped):  # type: ignore[no-untyped-def]
     """A number 0 … 1 of `DIGITS` binary digits, some of them flipped; see `vcc.plan.rays.model.Rays._moved`."""
     return (np.float64(np.int32(point * DIGITS_ABOVE) ^ flipped) + 0.5) * DIGITS_BELOW
 
 
-@njit(**INLINED)
+@_inlined
 def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
     """Places of a packet's rays over the sensitive area of a pixel."""
     points, start, n, flipped = drawn
@@ -469,7 +469,7 @@ def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
         y[p] = middle_y + (unit(points[1, start + p], down) - 0.5) * high
 
 
-@njit(**INLINED)
+@_inlined
 def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays towards a window, making up for diffusers; see `vcc.plan.rays.windows.Window`."""
     points, start, n, flipped = drawn
@@ -499,7 +499,7 @@ def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
             t[p] += g0 * a + g1 * b
 
 
-@njit(**INLINED)
+@_inlined
 def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays through what of a cell the stop is seen through; see `CellWindows.aimed`.
 
@@ -544,11 +544,12 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
         share[p] = weight * wide * tall
 
 
-@njit(**OPTIONS)
-def add_tile(field, sensor, points, aim, steps, pictures, tile):  # type: ignore[no-untyped-def]
+@_compiled
+def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type: ignore[no-untyped-def]
     """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
 
-    The first picture is what all of a pixel's rays find, the second what its two halves differ by.
+    The first picture is what all of a pixel's rays find, the second what its two halves differ by. Once
+    ``ended[0]`` is true, nobody wants them, and the kernel returns.
 
     Returns:
         (3,): weights of all rays, of missing rays, how many rays.
@@ -565,6 +566,8 @@ def add_tile(field, sensor, points, aim, steps, pictures, tile):  # type: ignore
     images, flipped = np.empty((2, 5)), np.empty(4, dtype=np.int64)
     for row in range(tile.first_row, min(tile.end_row, sensor.rows)):
         for column in range(tile.first_column, min(tile.end_column, sensor.columns)):
+            if ended[0]:
+                return tally
             middle = sensor.first[0] + column * sensor.pitch[0], sensor.first[1] + row * sensor.pitch[1]
             block = (np.int64(hashed(row * sensor.columns + column, seed)) * blocks) >> 32
             first = (block ^ beside) * samples

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.progress import Progress, tell
+from vcc.base.workers import Workers
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
 from vcc.plan.protocol import Partial
@@ -42,10 +42,10 @@ def traced(
     rows, columns = core.raster_shape
     pictures = np.empty((2, rows, columns, channels), dtype=np.float32)
     given = _field(core, values, channels), _sensor(core), _points(core, beside), _aim(core.aim), _steps(core)
-    add = partial(kernels.add_tile, *given, pictures)
     tiles = [tables.Tile(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)]
     tally = np.zeros(3)
-    with ThreadPoolExecutor(threads) as pool:
+    with Workers(threads) as pool:
+        add = partial(kernels.add_tile, *given, pool.ended, pictures)
         # Tallies are summed in the order of tiles: the same sums whatever the number of threads.
         for done, part in enumerate(pool.map(add, tiles), start=1):
             tally += part

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from vcc.base.workers import Workers
+from vcc.engines.compiled import compiled
 from vcc.plan.how import cores
 from vcc.plan.operators import KEPT_DIGITS, REACH
 from vcc.plan.operators import WEIGHT_DIGITS as DIGITS
 
-OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract", "nsz"}, "error_model": "numpy"}
+_compiled = compiled(fastmath={"contract", "nsz"})
 SHIFT = 2 * DIGITS - KEPT_DIGITS
 
 
@@ -34,12 +34,12 @@ def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int |
             to = kept[row, column].reshape(rows, length)
             sharpen(view, to, channels, factors, True if small else None, lines)
 
-    with ThreadPoolExecutor(threads or cores()) as pool:
+    with Workers(threads or cores()) as pool:
         list(pool.map(sharpen_row, range(values.shape[0])))
     return kept
 
 
-@njit(**OPTIONS)
+@_compiled
 def sharpen_across(row, plain, line, channels, weights):  # type: ignore[no-untyped-def]
     """A row of pixels filtered along itself; ``plain`` is room for the row in the type of the sums."""
     length = len(row)
@@ -66,7 +66,7 @@ def sharpen_across(row, plain, line, channels, weights):  # type: ignore[no-unty
             )
 
 
-@njit(**OPTIONS)
+@_compiled
 def sharpen(view, kept, channels, weights, whole, lines):  # type: ignore[no-untyped-def]
     """A view (rows, samples in a row) filtered along both axes.
 

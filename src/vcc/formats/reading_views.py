@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Collection
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed, wait
+from concurrent.futures import Future, as_completed, wait
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
+from vcc.base.workers import Workers
 from vcc.files.pictures import read_picture, read_png_into
 from vcc.files.transfer import decode
 
@@ -83,18 +84,14 @@ def read_views(
 
     early = [number for number, place in enumerate(files) if place in first]
     late = [number for number, place in enumerate(files) if place not in first]
-    with ThreadPoolExecutor(_THREADS) as pool:
+    with Workers(_THREADS) as pool:
         tasks = [pool.submit(read, number) for number in early]
         beside = pool.submit(when_read, tasks[:])
         tasks += [pool.submit(read, number) for number in late]
-        try:
-            for done, task in enumerate(as_completed(tasks), 1):
-                task.result()
-                tell(progress, done, len(listed))
-            beside.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)  # one fault is enough
-            raise
+        for done, task in enumerate(as_completed(tasks), 1):
+            task.result()
+            tell(progress, done, len(listed))
+        beside.result()
     return values
 
 

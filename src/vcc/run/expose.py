@@ -7,7 +7,6 @@ stream of its own that follows from the seed alone: a recording is the same what
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.workers import Workers
 from vcc.optics.electronics import Electronics
 from vcc.optics.sensor import Sensor
 from vcc.plan.how import cores
@@ -273,7 +273,7 @@ def numbers_of(
         values[lines], saturated = _read_block(rate[lines], exposure, electronics, noise, pattern)
         return saturated
 
-    with ThreadPoolExecutor(threads or cores()) as pool:
+    with Workers(threads or cores()) as pool:
         saturated = sum(pool.map(read_block, range(math.ceil(rows / height))))
     return values, saturated / (rate.shape[0] * rate.shape[1])
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from vcc.engines.compiled import compiled
+
 _FAST = {"contract", "reassoc", "nsz"}
-_compiled = numba.njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy")
+_compiled = compiled(fastmath=_FAST)
 
 
 @_compiled

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from vcc.base import checks, late
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
+from vcc.base.workers import Workers
 from vcc.light_field import LightField
 from vcc.plan.how import cores
 from vcc.shapes.patterns import overlap_share
@@ -294,7 +295,7 @@ class PlanesScene:
         # As far to both sides: an array begins in a corner, and what is kept for it holds for all others.
         if kept is None or not kept[0].holds(camera.pixels, slope, margins):
             grid = _GridAround((1, 1), camera.pixels, 1.0, slope, math.inf, margins)
-            with ThreadPoolExecutor(cores()) as pool:
+            with Workers(cores()) as pool:
                 kept = self._kept = (grid, _rasters(self.planes, grid, pool))
         grid, rasters = kept
         down, across = (_starts_at(shifts[:, n : n + 1], grid.margins[n]) for n in (0, 1))
@@ -360,7 +361,7 @@ class PlanesScene:
             _fill_view_by_view(self, values, cameras, threads, progress)
             return cameras.light_field(values)
         disparities = [spacing * (1 / z - 1 / focus_distance) / slope_per_pixel for z in self.distances]
-        with ThreadPoolExecutor(threads or cores()) as pool:
+        with Workers(threads or cores()) as pool:
             grid = _Grid(views, pixels, spacing, slope_per_pixel, focus_distance)
             rasters = _rasters(self.planes, grid, pool)
             _fill(values, self.planes, grid, rasters, pool, progress)
@@ -409,7 +410,7 @@ class _GridAround(_Grid):
         return same and all(mine >= other for mine, other in zip(self.margins, margins, strict=True))
 
 
-def _rasters(planes: tuple[TexturedPlane, ...], grid: _Grid, pool: ThreadPoolExecutor) -> NDArray[np.float32]:
+def _rasters(planes: tuple[TexturedPlane, ...], grid: _Grid, pool: Workers) -> NDArray[np.float32]:
     """Each plane's texture averaged over a pixel, at 4 points a pixel: (planes, rows, 4 phases, 4, columns)."""
     fine = RASTER_PER_PIXEL
     distances = tuple(plane.distance for plane in planes)
@@ -449,7 +450,7 @@ def _fill(
     planes: tuple[TexturedPlane, ...],
     grid: _Grid,
     rasters: NDArray[np.float32],
-    pool: ThreadPoolExecutor,
+    pool: Workers,
     progress: Progress | None,
 ) -> None:
     down, across = (_starts(planes, grid, axis) for axis in (0, 1))
@@ -481,7 +482,7 @@ def _fill_view_by_view(
         values[row, column] = np.rint(np.clip(picture, 0, 1) * top) if whole else picture
 
     rows, columns = cameras.views
-    with ThreadPoolExecutor(threads or cores()) as pool:
+    with Workers(threads or cores()) as pool:
         for row in range(rows):
             for task in [pool.submit(view, row, column) for column in range(columns)]:
                 task.result()

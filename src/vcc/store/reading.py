@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import CacheWarning, InputError
 from vcc.base.progress import Progress, tell
 from vcc.base.reading import (
     check_path,
@@ -334,7 +334,7 @@ class StoredLightField(OnGrid):
             warnings.warn(
                 f"the disparities found for {self.path} could not be kept there ({error.strerror or error}): they "
                 "are found again the next time",
-                ResultWarning,
+                CacheWarning,
                 stacklevel=2,
             )
         return found

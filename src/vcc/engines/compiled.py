@@ -1,0 +1,91 @@
+"""Functions compiled by Numba. Their machine code is kept on disk; they work where it cannot be kept, too.
+
+Numba keeps code beside the source, or under the home folder, or where ``NUMBA_CACHE_DIR`` says, and fails where it
+can write to none of them, or where what it finds there is damaged. Here code is then read from the same places
+without being kept (a container's image may bring it along), and else compiled by each process.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+from numba.core.caching import FunctionCache
+from numba.core.sigutils import normalize_signature
+
+from vcc.base.errors import CacheWarning
+
+
+def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """What makes a function a compiled one, with `numba.njit`'s options; it is compiled when first called."""
+
+    def made(function: Callable[..., Any]) -> Any:
+        dispatcher = njit(nogil=True, error_model="numpy", **options)(function)
+        dispatcher._cache = _Kept(function)  # as dispatcher.enable_caching() does
+        return dispatcher
+
+    return made
+
+
+def _only_read(locator: Any) -> Any:
+    """A way of Numba's to find the folder of a function's code, for a folder that cannot be written to."""
+    return type(locator.__name__, (locator,), {"ensure_cache_path": lambda self: None})
+
+
+_Places: Any = FunctionCache._impl_class
+
+
+class _ReadableToo(_Places):  # type: ignore[misc]
+    """Where code is kept: in the first of Numba's places that can be written to, or else where it may be read."""
+
+    _locator_classes = (*_Places._locator_classes, *map(_only_read, _Places._locator_classes))
+
+
+class _Kept(FunctionCache):  # type: ignore[misc]
+    """The code of a function on disk: where it cannot be read or kept, the function works all the same."""
+
+    _impl_class = _ReadableToo
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The code for arguments of these types, or None."""
+        try:
+            found = super().load_overload(sig, target_context)
+        except Exception:  # cut off or damaged: compiled again
+            self._start_anew()
+            return None
+        # Two processes that keep code at once may give two files one name.
+        fits = found is not None and tuple(found.signature.args) == tuple(normalize_signature(sig)[0])
+        return found if fits else None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the code for arguments of these types, or say that it is not kept."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _say_once(self.cache_path, error)
+
+    def _start_anew(self) -> None:
+        try:
+            self.flush()
+        except OSError as error:
+            _say_once(self.cache_path, error)
+
+
+_said: list[str] = []
+
+
+def _say_once(folder: str, error: OSError) -> None:
+    if _said:
+        return
+    _said.append(folder)
+    setting = os.environ.get("NUMBA_CACHE_DIR")
+    warnings.warn(
+        f"compiled code cannot be kept in {setting or folder} ({error.strerror or error}): results are the same, "
+        "but each process compiles again what it needs, which takes up to half a minute. Let the environment "
+        "variable NUMBA_CACHE_DIR name a folder that can be written to",
+        CacheWarning,
+        stacklevel=2,
+    )

@@ -1,0 +1,120 @@
+"""Kernels work where their machine code cannot be kept, and where what is kept is damaged."""
+
+import importlib.util
+import tempfile
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import pytest
+
+from vcc.engines import compiled
+from vcc.errors import CacheWarning
+
+KERNEL = """
+from vcc.engines.compiled import compiled
+
+@compiled()
+def doubled(x):
+    return x + x
+"""
+
+Load = Callable[[], Any]
+
+
+@pytest.fixture
+def loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Load:
+    """Loads a kernel anew, as each process does, from a file of its own; no code is kept in a home."""
+    monkeypatch.setenv("HOME", "/dev/null")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(compiled, "_said", [])
+    file = tmp_path / "kernel.py"
+    file.write_text(KERNEL)
+
+    def load() -> Any:
+        spec = importlib.util.spec_from_file_location("kernel", file)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module.doubled
+
+    return load
+
+
+def was_read(kernel: Any) -> bool:
+    """Whether code of the kernel was read instead of compiled."""
+    return sum(kernel.stats.cache_hits.values()) > 0
+
+
+def test_code_is_kept_beside_its_source_and_read_again(loaded: Load, tmp_path: Path) -> None:
+    first, second = loaded(), loaded()
+    assert first(21) == 42
+    assert list((tmp_path / "__pycache__").glob("kernel.doubled*.nbc"))
+    assert second(21) == 42
+    assert (was_read(first), was_read(second)) == (False, True)
+
+
+def test_where_no_code_can_be_kept_it_is_compiled_and_that_is_said_once(loaded: Load, tmp_path: Path) -> None:
+    (tmp_path / "__pycache__").write_text("no folder can be made here, by root neither")
+    with pytest.warns(CacheWarning, match="compiles again.*NUMBA_CACHE_DIR") as said:
+        assert (loaded()(21), loaded()(1.5)) == (42, 3)
+    assert len(said) == 1
+
+
+def test_a_cache_that_came_along_and_cannot_be_written_to_is_read(
+    loaded: Load, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(**_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    loaded()(21)
+    monkeypatch.setattr(tempfile, "TemporaryFile", refused)  # with which Numba tries whether it may write
+    kernel = loaded()
+    assert kernel(21) == 42
+    assert was_read(kernel)
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("length", [0, 40])
+def test_damaged_code_is_compiled_again_and_kept(loaded: Load, tmp_path: Path, ending: str, length: int) -> None:
+    loaded()(21)
+    (kept,) = (tmp_path / "__pycache__").glob(f"kernel.doubled*.{ending}")
+    kept.write_bytes(kept.read_bytes()[:length])
+    second, third = loaded(), loaded()
+    assert second(21) == 42
+    assert third(21) == 42
+    assert (was_read(second), was_read(third)) == (False, True)
+
+
+def test_code_that_another_process_kept_under_the_same_name_is_not_taken(loaded: Load, tmp_path: Path) -> None:
+    of_floats = loaded()
+    of_floats(1.5)
+    (kept,) = (tmp_path / "__pycache__").glob("*.nbc")
+    other = kept.read_bytes()
+    for file in (tmp_path / "__pycache__").glob("kernel.doubled*"):
+        file.unlink()
+    loaded()(21)
+    kept.write_bytes(other)  # as where two processes keep code of a function at the same moment
+    kernel = loaded()
+    assert kernel(21) == 42
+    assert not was_read(kernel)
+
+
+def test_a_disk_that_fills_up_while_code_is_kept_is_no_failure(
+    loaded: Load, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    kernel = loaded()
+    monkeypatch.setattr(type(kernel._cache._cache_file), "_save_data", full)
+    with pytest.warns(CacheWarning, match="No space left"):
+        assert kernel(21) == 42
+    monkeypatch.undo()
+    with warnings.catch_warnings():  # what the index says is there, and is not, is compiled
+        warnings.simplefilter("error")
+        assert loaded()(21) == 42
