@@ -1,0 +1,56 @@
+"""Stores whose metadata states what is not there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from tests.fuzz import readers, seeds
+from tests.fuzz.bombs.bomb import Bomb, changed
+from tests.fuzz.seeds import Maker
+
+SAMPLES = "s.zarr/samples/zarr.json"
+
+
+def _claims(shape: list[int] | None = None, inner: list[int] | None = None, **stated: Any) -> Maker:
+    """Metadata of the array of samples changed."""
+
+    def make(folder: Path) -> None:
+        seeds.store()(folder)
+        tree = json.loads((folder / SAMPLES).read_text())
+        if shape:
+            view = [1, 1, *shape[2:]]
+            tree["shape"], tree["chunk_grid"]["configuration"]["chunk_shape"] = shape, view
+            for codec in tree["codecs"]:
+                if codec["name"] == "sharding_indexed":
+                    codec["configuration"]["chunk_shape"] = inner or view
+        (folder / SAMPLES).write_text(json.dumps(tree | stated))
+
+    return make
+
+
+def _store(make: Maker) -> Bomb:
+    return Bomb(make, "s.zarr", readers.store)
+
+
+BILLION = [10**5, 10**4, 24, 32, 3]
+UPWARDS = {"name": "default", "configuration": {"separator": "/../"}}
+LIST = b'{"zarr_format": 3, "node_type": "group", "attributes": [1]}'
+
+BOMBS = {
+    "zarr shape 1e12": _store(_claims([10**3, 10**3, 10**3, 10**3, 3])),
+    "zarr 10^9 views": _store(_claims(BILLION)),
+    "zarr 10^9 views, info": Bomb(_claims(BILLION), "s.zarr", readers.info, refused=False),
+    "zarr 250000 views": _store(_claims([500, 500, 24, 32, 3])),
+    "zarr view 10^12": _store(_claims([3, 3, 10**6, 10**6, 3])),
+    "zarr inner 1": _store(_claims([3, 3, 24000, 32000, 3], inner=[1, 1, 1, 1, 1])),
+    "zarr codec pickle": _store(_claims(codecs=[{"name": "numcodecs.pickle", "configuration": {}}])),
+    "zarr codecs []": _store(_claims(codecs=[])),
+    "zarr key ..": _store(_claims(chunk_key_encoding=UPWARDS)),
+    "zarr deep json": _store(changed(seeds.store(), "s.zarr/zarr.json", b"[" * 200000)),
+    "zarr deep samples": _store(changed(seeds.store(), SAMPLES, b'{"a":' * 200000)),
+    "zarr not utf-8": _store(changed(seeds.store(), SAMPLES, b"\xff\xfe\x00")),
+    "zarr attributes list": _store(changed(seeds.store(), "s.zarr/zarr.json", LIST)),
+    "zarr lossy not utf-8": _store(changed(seeds.store("jpegxl"), SAMPLES, b"\xff\xfe\x00")),
+}

@@ -1,0 +1,96 @@
+"""Readers: what a case opens with, and what is kept of what it reads."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import vcc
+from vcc.cli.info import describe
+from vcc.cli.lenslet_centres import _listed
+from vcc.files.pictures import read_grey
+from vcc.formats import read_ground_truth, read_lytro
+from vcc.sources.meshes import loaded
+from vcc.sources.mitsuba.renderer import _contents
+from vcc.sources.pbrt import PbrtScene
+from vcc.store import open_store
+
+Read = dict[str, Any]
+"""``digest`` of all that was read, and whether it is ``sane``: no radiance is NaN, infinite or negative."""
+
+
+def field(path: Path, **options: Any) -> Read:
+    lf = vcc.open_light_field(path, **options)
+    values = np.asarray(lf.values)
+    return _read(values, sane=_is_light(values) and bool(np.isfinite(lf.frame.matrix).all()))
+
+
+def store(path: Path) -> Read:
+    stored = open_store(path)
+    stored.check_complete()
+    values = np.asarray(stored.read().values)
+    return _read(values, sane=_is_light(values))
+
+
+def lytro(path: Path) -> Read:
+    raw = read_lytro(path)
+    return _read(raw.mosaic, sane=bool(np.isfinite(raw.linear()).all()))
+
+
+def truth(path: Path) -> Read:
+    found = read_ground_truth(path)
+    return _read(found.disparity, found.depth)
+
+
+def camera(path: Path) -> Read:
+    return _read(vcc.load_camera(path))
+
+
+def lens(path: Path) -> Read:
+    read = vcc.load_lens(path)
+    figures = [read.focal_length, read.length, *np.ravel(read.matrix)]
+    return _read(read, sane=not any(math.isnan(figure) for figure in figures))
+
+
+def mask(path: Path) -> Read:
+    values = read_grey(path)
+    return _read(values, sane=_is_light(values))
+
+
+def centres(path: Path) -> Read:
+    return _read(*_listed(path))
+
+
+def pbrt(path: Path) -> Read:
+    return _read(PbrtScene.read(path))
+
+
+def mitsuba(path: Path) -> Read:
+    return _read(_contents(path, {}))
+
+
+def mesh(path: Path) -> Read:
+    return _read(loaded(path)[0])
+
+
+def info(path: Path) -> Read:
+    """What ``vcc info`` says of a path of any kind."""
+    return _read(describe(path))
+
+
+def _read(*things: Any, sane: bool = True) -> Read:
+    state = hashlib.sha1()
+    for thing in things:
+        if isinstance(thing, np.ndarray):
+            state.update(f"{thing.shape}{thing.dtype}".encode() + np.ascontiguousarray(thing).tobytes())
+        else:
+            state.update(repr(thing).encode("utf-8", "surrogatepass"))
+    return {"digest": state.hexdigest(), "sane": sane}
+
+
+def _is_light(values: np.ndarray) -> bool:
+    return bool(values.dtype.kind not in "f" or (np.isfinite(values).all() and (values >= 0).all()))
