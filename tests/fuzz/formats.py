@@ -44,7 +44,8 @@ def _mask(name: str) -> Maker:
     return lambda folder: seeds.picture(folder / name, seeds.scene(1, 1, channels=None)[0, 0])
 
 
-TILED = {"views": (3, 3)}
+BLOCKS = {"views": (3, 3), "layout": "eslf"}
+TILES = {"views": (3, 3), "layout": "mosaic"}
 NUMBERED = {"views": (3, 3), "order": "row-major"}
 
 FORMATS = {
@@ -70,9 +71,10 @@ FORMATS = {
     "lftoolbox mat": Format(lambda f: vcc.formats.lftoolbox.save(seeds.light_field(), f / "f.mat"), "f.mat"),
     "hci 2013 h5": Format(seeds.h5, "lf.h5"),
     "vox": Format(seeds.vox, "f.vox"),
-    "eslf png": Format(seeds.eslf("a.png"), "a.png", options=TILED, checked=True),
-    "eslf tif": Format(seeds.eslf("a.tif"), "a.tif", options=TILED),
-    "eslf jpg": Format(seeds.eslf("a.jpg"), "a.jpg", options=TILED),
+    "eslf png": Format(seeds.eslf("a.png"), "a.png", options=BLOCKS, checked=True),
+    "eslf tif": Format(seeds.eslf("a.tif"), "a.tif", options=BLOCKS),
+    "eslf jpg": Format(seeds.eslf("a.jpg"), "a.jpg", options=BLOCKS),
+    "mosaic png": Format(seeds.mosaic, "a.png", options=TILES, checked=True),
     "lytro": Format(seeds.lytro, "a.lfr", readers.lytro, checked=True),
     "lytro resigned": Format(seeds.lytro, "a.lfr", readers.lytro),  # mutations.RESIGNED
     "mp4": Format(seeds.video("a.mp4"), "a.mp4"),

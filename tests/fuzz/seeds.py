@@ -222,6 +222,11 @@ def eslf(name: str) -> Maker:
     return make
 
 
+def mosaic(folder: Path) -> None:
+    tiled = scene().transpose(0, 2, 1, 3, 4).reshape(72, 96, 3)
+    picture(folder / "a.png", np.ascontiguousarray(tiled))
+
+
 def video(name: str) -> Maker:
     def make(folder: Path) -> None:
         views = scene(1, 8, 24, 32)[0]
