@@ -62,7 +62,7 @@ def draw_refocused(path: Path) -> None:
         (11, 11), (180, 250), spacing=2 * mm, slope_per_pixel=1.6e-3, focus_distance=1.3, dtype=np.float32
     )
     refocuser = Refocuser(field)
-    figure = new_figure(9, 3.4)
+    figure = new_figure(9, 3.6)
     for axes, distance in zip(figure.subplots(1, 2), (0.8, 3.0), strict=True):
         picture(axes, encode(refocuser.at(distance).values, 8), f"focused at {distance:.3g} m")
     figure.savefig(path)
@@ -70,19 +70,19 @@ def draw_refocused(path: Path) -> None:
 
 def draw_points(path: Path) -> None:
     """Points at three distances through an open lens, a code, a cubic plate and a diffuser."""
-    sensor = vcc.Sensor(z=1 / (1 / (50 * mm) - 1), shape=(61, 61), pitch=8 * um)
+    sensor = vcc.Sensor(z=1 / (1 / (50 * mm) - 1), shape=(81, 81), pitch=8 * um)
     lens = vcc.Lens(focal_length=50 * mm, diameter=10 * mm)
     cameras = {
         "open": [lens],
         "coded aperture": [vcc.Lens(focal_length=50 * mm), vcc.Mask(CODE, width=10 * mm)],
-        "cubic plate": [lens, vcc.PhasePlate(Cubic(50.0))],
+        "cubic plate": [lens, vcc.PhasePlate(Cubic(25.0))],
         "diffuser": [lens, vcc.Diffuser(kernel=TopHat(3e-3))],
     }
     figure = new_figure(8, 5.6)
     grid = figure.subplots(3, len(cameras))
     for column, (name, elements) in enumerate(cameras.items()):
         for row, distance in enumerate((0.7, 1.0, 1.8)):
-            spread = psf(vcc.Camera(elements, sensor), distance, shape=(61, 61))
+            spread = psf(vcc.Camera(elements, sensor), distance, shape=(81, 81))
             axes = grid[row, column]
             axes.imshow(np.sqrt(spread.values), cmap="gray")
             axes.set_xticks([])
@@ -90,7 +90,7 @@ def draw_points(path: Path) -> None:
             if row == 0:
                 axes.set_title(name, fontsize=11)
             if column == 0:
-                axes.set_ylabel(f"{distance:g} m", fontsize=11)
+                axes.set_ylabel(f"{distance:g} m away", fontsize=11)
     figure.savefig(path)
 
 

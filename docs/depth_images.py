@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from panels import new_figure
+from matplotlib.axes import Axes
+from panels import framed, new_figure
 
 import vcc
 from vcc.files.transfer import from_linear
+from vcc.plot import style
 from vcc.recover.defocus_depth import defocus_kernels, depth_from_defocus
 from vcc.recover.depth import depth_by_plane_sweep, depth_by_structure_tensor, disparity_error
 from vcc.recover.stereo import depth_by_biprism
@@ -19,6 +21,7 @@ from vcc.sources.textures import Picture
 from vcc.units import deg, mm, um
 
 HERE = Path(__file__).parent / "images" / "depth"
+METRES: dict[str, Any] = {"cmap": "viridis_r"}
 CODE = [
     [1, 0, 1, 1, 0, 0, 1],
     [0, 0, 1, 0, 1, 1, 0],
@@ -70,12 +73,17 @@ def from_light_field(path: Path) -> None:
     maps = [depth_by_structure_tensor(field), depth_by_plane_sweep(field)]
     for name, found in zip(("structure tensor", "plane sweep"), maps, strict=True):
         print(name, disparity_error(found.disparity, truth))
-    panels = [("middle view", from_linear(views[3, 3]), None)]
-    panels += [("true distance, m", nearest, (1, 2.6))]
-    for name, found in zip(("structure tensor", "plane sweep"), maps, strict=True):
-        panels.append((f"{name}, m", found.distance, (1, 2.6)))
-    panels += [("confidence (sweep)", maps[1].confidence, (0, 1))]
-    _draw(panels, path)
+    tensor, sweep = maps
+    figure = new_figure(10.6, 5)
+    axes = figure.subplots(2, 3)
+    framed(axes[0, 0], from_linear(views[3, 3]), "middle view", cmap="gray")
+    framed(axes[0, 1], sweep.confidence, "confidence of the sweep: white is 1", cmap="gray", vmin=0, vmax=1)
+    framed(axes[0, 2], tensor.confidence, "confidence of the tensor: white is 1", cmap="gray", vmin=0, vmax=1)
+    below = [("true", nearest), ("plane sweep", sweep.distance), ("structure tensor", tensor.distance)]
+    for place, (name, distance) in zip(axes[1], below, strict=True):
+        shown = framed(place, distance, f"distance, {name}", **METRES, vmin=1, vmax=2.6)
+    figure.colorbar(shown, ax=axes, label="distance [m]", shrink=0.46, anchor=(0, 0.02))
+    figure.savefig(path)
 
 
 def from_defocus(path: Path) -> None:
@@ -100,14 +108,53 @@ def from_defocus(path: Path) -> None:
     candidates = [1.6, 1.4, 1.25, 1.1, 1.0, 0.9]
     kernels = defocus_kernels(camera, candidates)
     found = depth_from_defocus(values, kernels, candidates, noise=0.005, step=12)
-    panels = [
-        ("recording, upright", values[::-1, ::-1] / values.max(), (0, 1)),
-        ("the kernels", np.concatenate([k / k.max() for k in kernels], axis=1), (0, 1)),
-        ("distance of blocks, m", found.distance[::-1, ::-1], (0.8, 1.7)),
-        ("confidence: 1 is white", found.confidence[::-1, ::-1], (0, 1)),
-        ("smoothed, m", found.smoothed().distance[::-1, ::-1], (0.8, 1.7)),
+    figure = new_figure(10.6, 4.6)
+    axes = figure.subplots(2, 3)
+    picture = values[::-1, ::-1] / values.max()
+    framed(axes[0, 0], picture, "recording, upright", cmap="gray", vmin=0, vmax=1)
+    _draw_kernels(axes[0, 1], kernels, candidates)
+    place = _upright_extent(found.rows, found.columns, picture.shape)
+    framed(axes[0, 2], found.confidence[::-1, ::-1], "confidence: white is 1", cmap="gray", vmax=1, extent=place)
+    truth = np.repeat([[1.4, 1.1, 0.9]], 2, axis=0)
+    below = [
+        ("true distance", truth, (0, 260, 144, 0)),
+        ("blocks by themselves", found.distance[::-1, ::-1], place),
     ]
-    _draw(panels, path)
+    below += [("smoothed", found.smoothed().distance[::-1, ::-1], place)]
+    for where, (name, distance, extent) in zip(axes[1], below, strict=True):
+        shown = framed(where, distance, name, **METRES, vmin=0.8, vmax=1.7, extent=extent)
+    for where in (axes[0, 0], axes[0, 2], *axes[1]):
+        _same_place(where, picture.shape)
+    figure.colorbar(shown, ax=axes, label="distance [m]", shrink=0.46, anchor=(0, 0.02))
+    figure.savefig(path)
+
+
+def _draw_kernels(axes: Axes, kernels: Sequence[np.ndarray], distances: Sequence[float]) -> None:
+    """What a point makes at each distance, three in a row, each as bright as it gets."""
+    side = max(kernel.shape[0] for kernel in kernels) + 4
+    sheet = np.zeros((2 * side + 12, round((2 * side + 12) * 260 / 144)))
+    for n, (kernel, distance) in enumerate(zip(kernels, distances, strict=True)):
+        top, left = n // 3 * (side + 6), round((n % 3 + 0.5) * sheet.shape[1] / 3 - side / 2)
+        size = kernel.shape[0]
+        start = (side - size) // 2
+        sheet[top + start : top + start + size, left + start : left + start + size] = kernel / kernel.max()
+        axes.text(left + side / 2, top + side + 1, f"{distance:g} m", color="white", ha="center", va="center")
+    framed(axes, sheet, "the kernels of six distances", cmap="gray")
+
+
+def _upright_extent(rows: np.ndarray, columns: np.ndarray, shape: tuple[int, ...]) -> tuple[float, ...]:
+    """Where blocks lie in the picture once it is turned upright: left, right, bottom, top, pixels."""
+    (top, bottom), (left, right) = (
+        (count - 1 - places[-1] - step / 2, count - 1 - places[0] + step / 2)
+        for places, count in ((rows, shape[0]), (columns, shape[1]))
+        for step in (places[1] - places[0],)
+    )
+    return left, right, bottom, top
+
+
+def _same_place(axes: Axes, shape: tuple[int, ...]) -> None:
+    """Show just the picture's area, so that maps stand where their blocks are; grey where there are none."""
+    axes.set(xlim=(-0.5, shape[1] - 0.5), ylim=(shape[0] - 0.5, -0.5), facecolor=style.NOTHING)
 
 
 def from_biprism(path: Path) -> None:
@@ -127,26 +174,16 @@ def from_biprism(path: Path) -> None:
     found = depth_by_biprism(image, camera, (0.5, 3), step=5)
     found_distance = np.where(found.confidence > 0.6, found.distance, np.nan)
     print("biprism", np.nanpercentile(found_distance, (5, 25, 50, 75, 95)))
-    values = image.to_numpy()[..., 0]
-    panels = [
-        ("recording, upright: two half pictures", values[::-1, ::-1] / values.max(), (0, 1)),
-        ("distance of blocks of the left one, m", found_distance[::-1, ::-1], (0.5, 1.7)),
-    ]
-    _draw(panels, path, columns=1)
-
-
-def _draw(panels: list[Any], path: Path, columns: int = 3) -> None:
-    rows = math.ceil(len(panels) / columns)
-    figure = new_figure(3.2 * columns if columns > 1 else 6.4, 2.3 * rows)
-    for n, (title, values, limits) in enumerate(panels):
-        axes = figure.add_subplot(rows, columns, n + 1)
-        low, high = limits if limits else (None, None)
-        metric = title.endswith(", m")
-        shown = axes.imshow(values, vmin=low, vmax=high, cmap="viridis_r" if metric else "gray")
-        if metric:
-            figure.colorbar(shown, ax=axes, shrink=0.8)
-        axes.set_title(title, fontsize=9)
-        axes.set(xticks=[], yticks=[])  # the frame stays: a map may be white throughout
+    picture = image.upright().to_numpy()[..., 0]
+    figure = new_figure(8.4, 4.2)
+    above, below = figure.subplots(2, 1)
+    framed(above, picture / picture.max(), "recording, upright: two half pictures of one scene", cmap="gray")
+    place = _upright_extent(found.rows, found.columns, picture.shape)
+    title = "distance of blocks of the left half picture, where they are; grey: none"
+    shown = framed(below, found_distance[::-1, ::-1], title, **METRES, vmin=0.5, vmax=1.7, extent=place)
+    for axes in (above, below):
+        _same_place(axes, picture.shape)
+    figure.colorbar(shown, ax=[above, below], label="distance [m]", shrink=0.8)
     figure.savefig(path)
 
 

@@ -24,7 +24,18 @@ MODULES = HERE.parent / "src" / "vcc" / "gallery"
 FRAME = {"entry", "listing", "page"}
 """Modules that hold no camera: a change of theirs does not change what was measured."""
 THUMBNAIL = 200
-"""Pixels that a thumbnail is high, at most."""
+"""Pixels that a thumbnail is wide and high."""
+THUMBNAILS = {
+    "heterodyne": ("views", (0, 0, 1 / 3, 1 / 3)),
+    "coded-aperture-refocusing": ("scene-coded-recorded", (0, 0, 1, 1)),
+    "coded-aperture-depth": ("kernels", (0.03, 0.055, 0.21, 0.335)),
+    "good-apertures": ("patterns", (0.604, 0.092, 0.799, 0.49)),
+    "light-field-rendering": ("from-before", (0, 0, 1, 1)),
+    "plenoptic": ("raw", (0.52, 0.05, 0.98, 0.95)),
+    "wavefront-coding": ("scene-coded", (0, 0.2, 0.5, 0.7)),
+    "diffuser-depth-of-field": ("scene-coded", (0, 0.2, 0.5, 0.7)),
+}
+"""Where the first picture has words on it: which one to take, and what part of it (left, top, right, bottom)."""
 _MARK = re.compile(r"<!-- run of ([\w-]+), source ([0-9a-f]+), claims reached (\d+) of (\d+) -->")
 _TABLE = re.compile(r"(<!-- table of the cameras -->\n).*?(<!-- end of the table -->)", re.S)
 
@@ -71,19 +82,22 @@ def write_page(made: Entry, result: Result) -> None:
     folder = PICTURES / made.name
     shutil.rmtree(folder, ignore_errors=True)
     write_entry_markdown(made, result, PAGES, pictures=folder, note=note)
-    _write_thumbnail(folder / f"{result.pictures[0][0].name}", folder / "thumbnail.jpg")
+    write_thumbnail(made.name, result.pictures[0][0].name)
 
 
-def _write_thumbnail(picture: Path, path: Path) -> None:
+def write_thumbnail(name: str, first: str) -> None:
+    """Write a camera's small square picture: its first one, or the part of another that `THUMBNAILS` names."""
     from PIL import Image, ImageOps
 
-    (found,) = picture.parent.glob(f"{picture.name}.*")
-    with Image.open(found) as image:
-        side = min(image.size)  # the middle of what is much wider than high, or higher than wide
-        size = (min(image.width, 3 * side // 2), min(image.height, 3 * side // 2))
-        small = ImageOps.fit(image.convert("RGB"), size)
-    small.thumbnail((2 * THUMBNAIL, THUMBNAIL), Image.Resampling.LANCZOS)
-    small.save(path, quality=88)
+    picture, (left, top, right, bottom) = THUMBNAILS.get(name, (first, (0, 0, 1, 1)))
+    (found,) = (PICTURES / name).glob(f"{picture}.*")
+    with Image.open(found) as whole:
+        width, height = whole.size
+        part = whole.convert("RGB").crop(
+            (round(left * width), round(top * height), round(right * width), round(bottom * height))
+        )
+    small = ImageOps.fit(part, (THUMBNAIL, THUMBNAIL), Image.Resampling.LANCZOS)
+    small.save(PICTURES / name / "thumbnail.jpg", quality=88)
 
 
 def write_table() -> None:

@@ -29,10 +29,11 @@ PICTURES = [
     ("light-field-middle-view", "one of 20×20 views"),
     ("example-1-focused-near", "lens, focused near"),
     ("example-1-focused-far", "lens, focused far"),
-    ("example-2-cosine", "cosine mask before the sensor"),
-    ("example-2-coded", "coded mask half-way"),
-    ("check-sharp", "pinhole at the lens"),
+    ("example-2-cosine", "cosine mask near the sensor, exposure × 2"),
+    ("example-2-coded", "coded mask half-way, exposure × 2"),
+    ("check-sharp", "pinhole at the lens, exposure for it"),
 ]
+"""Of the demo; exposures as its page says."""
 
 
 def main() -> None:
@@ -41,14 +42,19 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         demo = Path(folder)
         run_demo(demo)
-        figure = new_figure(10.8, 7.5)
-        for axes, (name, title) in zip(figure.subplots(2, 3).flat, PICTURES, strict=True):
-            picture(axes, matplotlib.image.imread(demo / f"{name}.png"), title)
-        figure.savefig(HERE / "demo.png")
+        draw_demo(demo, HERE / "demo.png")
         for name in ("example-1-phase-space-points", "example-2-coded-camera", "check-close-ups"):
             shutil.copyfile(demo / f"{name}.png", HERE / f"{name}.png")
     draw_sensor(HERE / "sensor.png")
     element_images.main(HERE / "elements")
+
+
+def draw_demo(demo: Path, path: Path) -> None:
+    """README's first picture, of those in the demo's folder."""
+    figure = new_figure(10.8, 7.5)
+    for axes, (name, title) in zip(figure.subplots(2, 3).flat, PICTURES, strict=True):
+        picture(axes, matplotlib.image.imread(demo / f"{name}.png"), title)
+    figure.savefig(path)
 
 
 def draw_sensor(path: Path) -> None:

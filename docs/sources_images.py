@@ -22,8 +22,8 @@ def main(folder: Path = HERE) -> None:
     """Draw all of them into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     cameras = CameraArray.over_aperture(60 * mm, 40 * deg, views=(5, 5), pixels=PIXELS, focus_distance=1.3)
-    draw_views(planes(), cameras, folder / "planes.png")
-    draw_views(meshes(), cameras, folder / "opengl.png")
+    draw_views(planes(), cameras, 140, (128, 225), folder / "planes.png")
+    draw_views(meshes(), cameras, 165, (94, 203), folder / "opengl.png")
     draw_depth(folder / "depth-map.png", cameras)
 
 
@@ -87,14 +87,14 @@ def meshes() -> OpenGLRenderer:
     )
 
 
-def draw_views(renderer: Any, cameras: CameraArray, path: Path) -> None:
-    """Three views of a row, and how one pixel row looks in all views: lines whose slope is the distance."""
-    last = cameras.views[1] - 1
-    row = cameras.views[0] // 2
-    pictures = [renderer.render(cameras.camera(row, column)) for column in (0, last // 2, last)]
-    figure = panels.new_figure(10.8, 3.0)
-    for axes, picture, words in zip(figure.subplots(1, 3), pictures, ("left", "middle", "right"), strict=True):
-        panels.picture(axes, encode(picture, 8), f"the {words} view")
+def draw_views(renderer: Any, cameras: CameraArray, line: int, guides: tuple[float, ...], path: Path) -> None:
+    """The outer views of a row, and how one line of pixels looks in all of them: slopes are distances."""
+    rows, columns = cameras.views
+    views = [encode(renderer.render(cameras.camera(rows // 2, column)), 8) for column in range(columns)]
+    figure = panels.new_figure(10.8, 5.2)
+    grid = figure.add_gridspec(2, 2, height_ratios=(3.6, 1))
+    places = [figure.add_subplot(place) for place in (grid[0, 0], grid[0, 1], grid[1, :])]
+    panels.parallax(places, np.stack(views), line, guides)
     figure.savefig(path)
 
 

@@ -10,9 +10,12 @@ from typing import Any
 
 import numpy as np
 import panels
+from matplotlib.patches import Circle
 
+import vcc
 from vcc.files.pictures import read_picture
 from vcc.plot import style
+from vcc.units import mm
 
 PAGE = Path(__file__).parent / "tutorial.md"
 HERE = Path(__file__).parent / "images" / "tutorial"
@@ -42,16 +45,7 @@ def draw(folder: Path, names: dict[str, Any]) -> None:
     focused = [(f"focused on the {name}", shown(f"focused-{name}")) for name in ("leaves", "chart", "town")]
     row(folder / "focus.png", focused)
     (folder / "camera.png").write_bytes(Path("camera.png").read_bytes())
-    lamps = (slice(20, 110), slice(0, 130))
-    cells = np.kron(names["mask"].faces().pattern.values, np.ones((18, 18)))
-    row(
-        folder / "mask.png",
-        [
-            ("open lens, part of the picture", shown("focused-leaves")[lamps]),
-            ("with the mask", shown("coded")[lamps]),
-            ("the mask", cells),
-        ],
-    )
+    lamps_and_mask(folder / "mask.png", names["mask"], names["lens"])
     raw = shown("raw")
     row(
         folder / "plenoptic.png",
@@ -77,7 +71,24 @@ def row(path: Path, pictures: list[tuple[str, np.ndarray]]) -> None:
     figure = panels.new_figure(height * sum(widths), height + 0.3)
     places = figure.subplots(1, len(pictures), width_ratios=widths, squeeze=False)[0]
     for axes, (title, picture) in zip(places, pictures, strict=True):
-        panels.picture(axes, picture, title, style.TITLE, style.INK, cmap="gray", interpolation="nearest")
+        panels.picture(axes, picture, title, style.TITLE, style.INK, cmap="gray")
+    figure.savefig(path)
+
+
+def lamps_and_mask(path: Path, mask: vcc.Mask, lens: vcc.Lens) -> None:
+    """The same lamps out of focus without and with the mask, and the mask within the lens's rim."""
+    lamps = np.s_[24:72, 0:66]
+    figure = panels.new_figure(11, 3.6)
+    without, behind, cells = figure.subplots(1, 3, width_ratios=(66 / 48, 66 / 48, 1))
+    panels.framed(without, shown("focused-leaves")[lamps], "lamps behind the focus, open lens")
+    panels.framed(behind, shown("coded")[lamps], "with the mask")
+    half = mask.width / 2 / mm
+    cells.imshow(mask.faces().pattern.values, cmap="gray", vmin=0, vmax=1, extent=(-half, half, half, -half))
+    cells.add_patch(Circle((0, 0), lens.diameter / 2 / mm, fill=False, ec=style.ORANGE, lw=1.5))
+    rim = lens.diameter / 2 / mm * 1.05
+    cells.set(xlim=(-rim, rim), ylim=(rim, -rim), facecolor=style.NOTHING)
+    cells.set_title("the mask; orange: the lens's rim", fontsize=style.SMALL, color=style.INK)
+    style.tidy(cells, "x [mm]", "y [mm]")
     figure.savefig(path)
 
 

@@ -17,6 +17,7 @@ from vcc.showcase.truth import psnr, true_picture
 from vcc.showcase.words import away, duration, filled, length
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
+from vcc.store import save_store
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +123,26 @@ def test_someones_own_light_field_is_scaled_to_a_lens(convergence):
     # is an rms error of ½/√2·(2π/51)·√(2/12) = 0.018, 35 dB. Four edges of two planes, half of the picture wide,
     # cost a strip of half a pixel of 64 where radiances differ by ½ at most: 4·½/64·¼ = 0.008, 21 dB.
     assert found["nearest"] > 20.8
+
+
+@pytest.mark.parametrize("brightness", [0.002, 30.0])
+def test_radiance_that_nobody_exposed_is_brought_to_white(brightness):
+    own = someones_own(20.0)
+    as_it_is = from_someone(own, small=False)
+    assert "multiplied" not in as_it_is.assumed
+    lit = from_someone(own.replaced(own.values * np.float32(brightness)), small=False)
+    assert "multiplied" in lit.assumed
+    # "auto" of Image.save: the 99.5th percentile of what a person sees is white.
+    assert np.percentile(lit.light_field.view(2, 2).to_numpy(), 99.5) == pytest.approx(1, rel=1e-5)
+    gain = lit.light_field.values.max() / as_it_is.light_field.values.max()
+    np.testing.assert_allclose(lit.light_field.values, as_it_is.light_field.values * gain, rtol=1e-5, atol=1e-7)
+
+
+def test_a_store_can_be_put_on_the_bench(tmp_path):
+    own = someones_own(20.0)
+    save_store(own, tmp_path / "own.zarr")
+    bench = from_someone(tmp_path / "own.zarr", small=True)
+    np.testing.assert_array_equal(bench.light_field.values, from_someone(own, small=True).light_field.values)
 
 
 def test_what_no_bench_can_use_is_refused(tmp_path: Path):

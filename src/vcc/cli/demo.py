@@ -12,14 +12,14 @@ from vcc.demo import run_demo
 def demo(
     *,
     output: Annotated[Path, Parameter(alias="-o", metavar="FOLDER")] = Path("vcc-demo"),
-    light_field: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
+    light_field: Annotated[Path | None, Parameter(metavar="LIGHT_FIELD")] = None,
     small: bool = False,
 ) -> None:
     """Run the paper's examples and its own check, and explain them on a page of pictures.
 
     Args:
         output: Where the pictures go.
-        light_field: A light field of your own: a folder with a picture for each view. Default: a scene that the
+        light_field: A light field of your own: a folder of views, a file or a store. Default: a scene that the
             demo makes.
         small: Fewer views and pixels: a look in seconds.
     """

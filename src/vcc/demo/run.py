@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 INTERPOLATIONS: tuple[Interpolation, ...] = ("nearest", "linear", "cubic", "sharp")
 PAPER_SHAPE = (20, 20, 500, 500)
+BEHIND_MASKS = 2.0
+"""Exposure behind either mask over that without: one is half open, and the crests of the other do not clip."""
 OTHER_PLACES = "sharp when focused near", "sharp at middle distance", "sharp when focused far"
 """What close-ups of someone's own light field show."""
 
@@ -50,8 +52,8 @@ def run_demo(
 
     Args:
         output: the folder for pictures, ``index.html`` and ``contact-sheet.png``; made if missing.
-        light_field: a light field, or a folder that `vcc.open_light_field` reads, instead of the built-in
-            scene.
+        light_field: a light field, a store of one, or what `vcc.open_light_field` reads, instead of the
+            built-in scene.
         small: a smaller light field (8×8 views of 160×160 pixels; of someone's own, every second view and
             pixel), for a quick look.
         console: where to print progress and results; None prints to the standard output.
@@ -233,9 +235,8 @@ def _example_one(work: _Work, bench: Bench) -> dict[str, _Taken]:
 def _draw_example_one(work: _Work, bench: Bench, taken: dict[str, _Taken]) -> None:
     far = bench.conventional(bench.far)
     work.draw("example-1-camera.png", far.plot(light_field=bench.light_field))
-    points = figures.points_field(bench.focal_length, bench.diameter)
-    focused_far_away = bench.conventional(math.inf)
-    work.draw("example-1-phase-space-points.png", plot_phase_space_stages(focused_far_away, points))
+    points = figures.points_figure(bench.conventional(math.inf), bench.diameter)
+    work.draw("example-1-phase-space-points.png", points)
     row = round(0.46 * bench.light_field.shape[2])
     stages = plot_phase_space_stages(far, bench.light_field, pixel_row=row)
     work.draw("example-1-phase-space-scene.png", stages)
@@ -259,12 +260,11 @@ def _example_two(work: _Work, bench: Bench, conventional: dict[str, _Taken]) -> 
     full = bench.light_field.shape[:4] == PAPER_SHAPE
     note = "one mask in mid-path" + (", three channels for the paper’s one" if full else "")
     columns = [("no mask", unmasked.shown)]
-    for name, open_share in (("cosine", 0.25), ("coded", 0.5)):
-        exposure = bench.exposure(bench.conventional(bench.middle), bench.diameter, open_share)
-        taken = work.take(bench, cameras[name], f"example-2-{name}", exposure)
+    for name, camera in cameras.items():
+        taken = work.take(bench, camera, f"example-2-{name}", BEHIND_MASKS * unmasked.exposure)
         work.timings.append(Timing(f"Example 2: {MASK_TITLES[name]}", *taken.seconds, note, full))
         columns.append((MASK_TITLES[name], taken.shown))
-        work.draw(f"example-2-{name}-camera.png", cameras[name].plot(light_field=bench.light_field))
+        work.draw(f"example-2-{name}-camera.png", camera.plot(light_field=bench.light_field))
     masks = [(MASK_TITLES[name], camera.elements[-1]) for name, camera in cameras.items()]
     width = max(cameras["cosine"].sensor.size) * 0.9
     work.draw("example-2-masks.png", figures.mask_figure(masks, width))

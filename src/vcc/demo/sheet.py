@@ -52,7 +52,8 @@ def drawn_sheet(folder: Path, bench: Bench, psnr: dict[str, float], timings: Seq
         ),
         (
             f"Example 2: a mask between lens and sensor{_compared(timings)}",
-            "Cosine: the picture carries directions as a modulation. Coded: what is out of focus shows the mask.",
+            "Cosine: the picture carries directions as a modulation. Coded: what is out of focus shows the mask. "
+            "Exposed twice as long as Example 1.",
             {f"example-2-{name}": title for name, title in MASK_TITLES.items()}
             | {"example-2-close-ups": "close-ups"},
         ),

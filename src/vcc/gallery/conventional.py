@@ -36,9 +36,7 @@ def run(bench: Bench, progress: Progress) -> Result:
         caption = f"Sensor at {length(bench.image_distance(distance))}, focused {away(distance)}."
         pictures.append(Picture(f"focused-{name}", f"Focused {name}", caption, taken[name]))
     progress(3, 4)
-    points = plot_phase_space_stages(
-        bench.conventional(math.inf), figures.points_field(bench.focal_length, bench.diameter)
-    )
+    points = figures.points_figure(bench.conventional(math.inf), bench.diameter)
     row = round(0.46 * bench.light_field.shape[2])
     scene = plot_phase_space_stages(bench.conventional(bench.far), bench.light_field, pixel_row=row)
     stages = (

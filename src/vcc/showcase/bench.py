@@ -14,6 +14,7 @@ from vcc.base.progress import Progress
 from vcc.base.units import mm, um
 from vcc.camera import Camera
 from vcc.fields.grid import skew
+from vcc.files.pictures import auto_exposure
 from vcc.formats import open_light_field
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
@@ -21,12 +22,15 @@ from vcc.optics.sensor import Sensor
 from vcc.shapes import patterns
 from vcc.showcase.scene import FAR, MIDDLE, NEAR, demo_scene
 from vcc.sources import PlanesScene
+from vcc.store import is_store, open_store
 
 APERTURE = 20 * mm
 """How wide the grid of views is; light fields of other widths are scaled to it."""
 RIM = 0.9
 """The lens's diameter as a share of that: a round rim inside a square grid of views."""
 FOCAL_LENGTH = 50 * mm
+DIMMEST_WHITE = 0.4
+"""Radiance of the brightest things above which a light field is taken to be exposed for people."""
 INSIDE = 0.15
 """How far inside a light field's range of disparities near and far lie, as a share of the range."""
 
@@ -128,15 +132,14 @@ class Bench:
         hole = Mask(patterns.Circle(self.pinhole_diameter), decentre=self.pinhole_place, name="pinhole")
         return Camera([self.lens, hole], self.sensor(self.near))
 
-    def exposure(self, camera: Camera, diameter: float, transmitted: float = 1.0) -> float:
-        """The factor that shows radiance 1 through a round aperture as white: 1 / (π/4·D²/d² · T).
+    def exposure(self, camera: Camera, diameter: float) -> float:
+        """The factor that shows radiance 1 through a round aperture as white: 1 / (π/4·D²/d²).
 
         Args:
             camera: whose sensor's distance d counts.
             diameter: D of the aperture, metres.
-            transmitted: T, mean transmission of a mask on the way.
         """
-        return camera.sensor.z**2 / (math.pi / 4 * diameter**2 * transmitted)
+        return camera.sensor.z**2 / (math.pi / 4 * diameter**2)
 
 
 def built_in(small: bool, progress: Progress | None = None) -> Bench:
@@ -170,11 +173,12 @@ def from_someone(given: Path | LightField, small: bool, progress: Progress | Non
     Its world is scaled so that the grid of views is 20 mm wide, a lens's width. The lens has f = 50 mm, or less
     where the scaled scene is nearer than four times that. The distances to focus on come from the range of
     disparities; where these lie beyond infinity, the views are taken to converge such that the farthest thing
-    is 3 m away. The sensor's pixels are the views' at the middle distance, and a little smaller where the sensor
-    would otherwise look past the views.
+    is 3 m away. Radiance far from 1, as renderers give it, is multiplied so that the brightest 0.5 % of the middle
+    view are white. The sensor's pixels are the views' at the middle distance, and a little smaller where the
+    sensor would otherwise look past the views.
 
     Args:
-        given: a light field, or a folder that `vcc.open_light_field` reads.
+        given: a light field, a store of one, or what `vcc.open_light_field` reads.
         small: keep every second view and pixel only, for a quick look.
         progress: called with (done, total) in pictures read.
 
@@ -182,7 +186,7 @@ def from_someone(given: Path | LightField, small: bool, progress: Progress | Non
         InputError: what the reader refuses, views that are not on an upright grid or in a single row, or views
             without parallax.
     """
-    light_field = given if isinstance(given, LightField) else open_light_field(given, progress=progress)
+    light_field = given if isinstance(given, LightField) else _opened(given, progress)
     if small:
         light_field = light_field[::2, ::2, ::2, ::2]
     if min(light_field.shape[:2]) < 2:
@@ -196,8 +200,27 @@ def from_someone(given: Path | LightField, small: bool, progress: Progress | Non
         )
     _check_upright(light_field)
     scale = APERTURE / _aperture(light_field)
-    scaled, assumed = _before_the_lens(light_field.scaled(scale))
-    return _fitted(scaled, scale, assumed)
+    lit, exposed = _lit(light_field)
+    scaled, moved = _before_the_lens(lit.scaled(scale))
+    return _fitted(scaled, scale, ". ".join(words for words in (moved, exposed) if words))
+
+
+def _opened(path: Path, progress: Progress | None) -> LightField:
+    if is_store(path):
+        light_field: LightField = open_store(path).read(progress=progress)
+        return light_field
+    return open_light_field(path, progress=progress)
+
+
+def _lit(light_field: LightField) -> tuple[LightField, str]:
+    """The light field with its white near 1, and what was done for that."""
+    rows, columns = light_field.shape[:2]
+    view = light_field.view(rows // 2, columns // 2).to_numpy()
+    gain = auto_exposure(view[..., 0] if view.shape[2:] == (1,) else view)
+    if light_field.full_scale != 1 or DIMMEST_WHITE <= 1 / gain <= 1:
+        return light_field, ""  # stored numbers that are shares of a full scale stay as they are
+    words = f"Its radiance was multiplied by {gain:.3g}, so that the brightest 0.5 % of its middle view are white"
+    return light_field.replaced(light_field.values * gain), words
 
 
 def _check_upright(light_field: LightField) -> None:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.units import mm
+from vcc.camera import Camera
 from vcc.fields.sampled import to_numpy
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
@@ -17,6 +19,7 @@ from vcc.files.pictures import read_picture
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics.sensor import Sensor
+from vcc.plot import plot_phase_space_stages
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -213,6 +216,28 @@ def views_figure(light_field: LightField) -> Figure:
     return figure
 
 
+PARALLEL, NEAR_POINT = (0.1, 0.5, 1.0), (1.0, 0.4, 0.05)
+"""Colours of light from two points, linear: blue and orange."""
+
+
+def points_figure(camera: Camera, width: float) -> Figure:
+    """Two points of light in phase space on their way through a camera, with a key.
+
+    Args:
+        camera: one lens, focused on what is infinitely far away.
+        width: of the lens, metres.
+    """
+    focal_length = camera.sensor.z
+    figure = plot_phase_space_stages(camera, points_field(focal_length, width))
+    words = ("parallel light", f"a point {4 * focal_length / mm:g} mm away")
+    lines = [
+        figure.axes[0].plot([], [], color=tuple(transfer.from_linear(np.array(colour))), lw=2, label=word)[0]
+        for word, colour in zip(words, (PARALLEL, NEAR_POINT), strict=True)
+    ]
+    figure.legend(handles=lines, loc="outside lower center", ncols=2, frameon=False)
+    return figure
+
+
 def points_field(focal_length: float, width: float) -> LightField:
     """Two points of light as 41 views in a row see them: one infinitely far and off the axis, one near on it.
 
@@ -228,7 +253,7 @@ def points_field(focal_length: float, width: float) -> LightField:
     parallel = np.broadcast_to(k + round(0.36 * pixels), (views, pixels))
     near = k + width / views * i[:, None] / distance / slope
     values = np.zeros((1, views, 1, pixels, 3), dtype=np.float32)
-    for offset, colour in ((parallel, (0.1, 0.5, 1.0)), (near, (1.0, 0.4, 0.05))):
+    for offset, colour in ((parallel, PARALLEL), (near, NEAR_POINT)):
         values[0, :, 0][np.abs(offset) <= 4] = colour
     return LightField.from_views(values, width / views, slope, disparity_range=(0.0, 0.0))
 
