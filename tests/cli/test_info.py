@@ -15,6 +15,7 @@ from vcc.cli.brightness import brightness, histogram
 from vcc.cli.view_grid import grid_figure
 from vcc.files import transfer
 from vcc.formats.writing import save_light_field
+from vcc.store import save_store
 
 
 def run(*arguments):
@@ -81,6 +82,21 @@ def test_where_views_stand_may_be_told(tmp_path, light_field):
     told = said(tmp_path / "all.png", "--quick", "--views", 3, 4, "--layout", "eslf")
     assert told["format"] == "ESLF, 3×4 views in one picture"
     assert "pass --views rows columns" in run(tmp_path / "all.png").stderr
+
+
+def test_dark_views_are_counted_and_named(tmp_path, light_field):
+    """Once: as a line, of codes that stand for light by the sRGB curve, and not as a note besides."""
+    values = light_field.values.copy()
+    values[0, 0] *= 0.01
+    values[2, 3] *= 0.04
+    save_light_field(light_field.replaced(values), tmp_path / "views")
+    result = run(tmp_path / "views")
+    assert re.search(
+        r"(?m)^dark views +1 of the 12 views are black .*, by \(row, column\): \(0, 0\)$", result.stdout
+    )
+    assert "black or nearly so" not in result.stderr
+    save_store(light_field.replaced(values), tmp_path / "a.zarr")
+    assert said(tmp_path / "a.zarr")["dark views"].endswith(": (0, 0)")
 
 
 def test_missing_views_are_named(folder, tmp_path):

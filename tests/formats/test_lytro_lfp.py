@@ -150,6 +150,47 @@ def test_sizes_of_the_cameras_need_not_be_stated(tmp_path):
     assert raw.color_filter == "BGGR"
 
 
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("refocusStack", "a refocus stack"),
+        ("depthMap", "a depth map"),
+        ("perImage", "com.lytro.acceleration.perImage"),
+    ],
+)
+def test_what_was_made_of_a_recording_is_none(tmp_path, kind, words):
+    """As Lytro Desktop writes …-stk.lfp and …-dm.lfp: the frame is that of the camera's file, and not in here."""
+    picture = b"JPEG"
+    elsewhere = {
+        key: f"sha1-{n}" + 39 * "0" for n, key in enumerate(("imageRef", "metadataRef", "privateMetadataRef"))
+    }
+    made = {
+        "type": f"com.lytro.acceleration.{kind}",
+        "vendorContent": {"imageArray": [{"imageRef": name_of(picture)}]},
+    }
+    contents = {"picture": {"frameArray": [{"frame": elsewhere}], "accelerationArray": [made]}}
+    path = tmp_path / "IMG_0001-stk.lfp"
+    path.write_bytes(FILE + section(CONTENTS, json.dumps(contents).encode()) + section(BLOB, picture))
+    for read in (read_lytro, lytro_lfp.read):
+        with pytest.raises(
+            InputError, match=rf"no raw recording, only what was made of one \({words}\).*own file"
+        ):
+            read(path)
+
+
+def test_a_recording_with_what_was_made_of_it_is_one(tmp_path, illum):
+    """The camera's own files may hold a preview besides."""
+    pixels, metadata, _ = illum
+    blobs = [json.dumps(metadata).encode(), pack_little(pixels)]
+    frame = {"metadataRef": name_of(blobs[0]), "imageRef": name_of(blobs[1])}
+    contents = {"frames": [{"frame": frame}], "accelerations": [{"type": "com.lytro.acceleration.perImage"}]}
+    path = tmp_path / "a.lfr"
+    path.write_bytes(
+        FILE + section(CONTENTS, json.dumps(contents).encode()) + b"".join(section(BLOB, blob) for blob in blobs)
+    )
+    assert np.array_equal(read_lytro(path).mosaic, pixels)
+
+
 def test_a_recording_is_no_light_field_yet(tmp_path, illum):
     path = tmp_path / "a.lfr"
     path.write_bytes(illum[2])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError, ResultWarning
 from vcc.files import transfer
-from vcc.formats import open_light_field, read_geometry
+from vcc.formats import open_light_field, open_sparse_views, read_geometry
 from vcc.light_field import LightField
 
 Views = NDArray[np.uint8]
@@ -83,6 +83,32 @@ def test_names_with_row_and_column(name: Callable, views: Views, folder_of: Writ
     field = open_light_field(folder, transfer="linear", **GIVEN)
     assert field.values.dtype == np.uint8
     np.testing.assert_array_equal(field.values, views)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        lambda j, i: f"IMG_0001_{16 + 4 * j + i:03d}_{j + 1:02d}_{i + 3:02d}.png",
+        lambda j, i: f"{99 - 4 * j - i}-view {j}x{i}.png",  # counted backwards, and in front
+        lambda j, i: f"v{j}_{i}_{j + 3 * i:04d}.png",  # behind, down the columns
+    ],
+)
+def test_names_that_count_on_beside_row_and_column(name: Callable, views: Views, folder_of: Write) -> None:
+    folder = folder_of(views, name)
+    (folder / "depth_0_1.png").write_bytes(png(views[0, 0]))
+    assert read_geometry(folder).format == "names with row, column and a running number"
+    np.testing.assert_array_equal(open_light_field(folder, transfer="linear", **GIVEN).values, views)
+    (folder / name(1, 2)).unlink()
+    with pytest.raises(InputError, match=r"11 of the 12 views .*\((1, 2|2, 5)\)"):
+        open_light_field(folder)
+
+
+def test_three_numbers_that_do_not_count_on(views: Views, folder_of: Write) -> None:
+    """Two moments of a film of a light field: no number is another in each name."""
+    for moment in range(2):
+        folder_of(views, lambda j, i, moment=moment: f"t{moment}_{j}_{i}.png")
+    with pytest.raises(InputError, match=r"2 sets of pictures with a row and a column"):
+        open_light_field(folder_of(views[:0], generic))
 
 
 def test_folders_of_any_name(views: Views, folder_of: Write) -> None:
@@ -339,6 +365,30 @@ def test_negative_disparities_of_parallel_views_are_said(views: Views, folder_of
     with pytest.warns(ResultWarning, match="all negative.*flip-both"):
         open_light_field(folder, transfer="linear", **GIVEN)
     open_light_field(folder, transfer="linear", **(GIVEN | {"focus_distance": 1.0}))
+
+
+# Views without light
+
+
+def test_views_that_are_dark_are_counted_and_named(views: Views, folder_of: Write) -> None:
+    """The corners of a grid as a plenoptic camera decodes it: one black, others with 1 % and 4 % of the light."""
+    light = transfer.to_linear(views / 255)
+    for place, share in {(0, 0): 0, (0, 3): 0.01, (2, 0): 0.04}.items():
+        light[place] *= share
+    folder = folder_of(transfer.encode(light, 8), generic)
+    given = GIVEN | {"orientation": "as-is"}
+    with pytest.warns(
+        ResultWarning, match=r"2 of the 12 views are black or nearly so .*: \(0, 0\), \(0, 3\)\. "
+    ) as said:
+        open_light_field(folder, **given)
+    assert len(said) == 1
+    (folder / "view_01_01.png").unlink()
+    with pytest.warns(ResultWarning, match=r"2 of the 11 views are black or nearly so"):
+        open_sparse_views(folder, **GIVEN)
+
+
+def test_darkness_everywhere_is_no_view_without_light(folder_of: Write) -> None:
+    open_light_field(folder_of(np.zeros((2, 2, 8, 8), np.uint8), generic), **GIVEN)
 
 
 # What it takes

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,6 +21,7 @@ from vcc.cli.store_words import store_facts
 from vcc.cli.view_grid import Views, draw
 from vcc.fields.grid import SAMPLES_IN_WORDS, pair
 from vcc.formats import FolderInfo, keep_geometry, lytro_lfp, open_sparse_views, read_geometry
+from vcc.formats.dark_views import dark_words, mean_light
 from vcc.formats.lytro_lfp import read_lytro
 from vcc.light_field import LightField
 from vcc.store import is_store, open_store
@@ -95,8 +96,9 @@ def _of_files(path: Path, quick: bool, picture: Path | None, how: Reading) -> di
     lines = _facts(facts)
     if quick and picture is None:
         return lines
-    with warnings.catch_warnings():  # of what is assumed, which the lines say
-        warnings.filterwarnings("ignore", message=".* do not state ", category=ResultWarning)
+    with warnings.catch_warnings():  # of what is assumed and what is dark, which the lines say
+        for said in (".* do not state ", ".* black or nearly so"):
+            warnings.filterwarnings("ignore", message=said, category=ResultWarning)
         return lines | _measured(path, facts, quick, picture, how)
 
 
@@ -115,7 +117,7 @@ def _measured(path: Path, facts: FolderInfo, quick: bool, picture: Path | None, 
         views = Views(lambda place: values[place], (facts.rows, facts.columns), whole.frame, facts.transfer)
         disparities = "" if quick else _disparities(whole, facts)
     if not quick:
-        lines = {"disparities": disparities, "brightness": brightness(views.all(), facts.transfer)}
+        lines = {"disparities": disparities, **_light(views)}
     if picture is not None:
         lines["picture"] = draw(views, path.resolve().name, picture, assumed="spacing" in facts.unknown)
     return lines
@@ -148,7 +150,7 @@ def _of_a_store(path: Path, quick: bool, picture: Path | None) -> dict[str, str]
     if missing:
         lines["missing"] = _missing(sorted(missing), there[0] * there[1])
     if not quick and len(missing) < there[0] * there[1]:
-        lines["brightness"] = brightness(views.all(), "linear")
+        lines |= _light(views)
     if picture is not None:
         lines["picture"] = draw(views, path.resolve().name, picture, assumed=False)
     return lines
@@ -201,6 +203,21 @@ def _missing(places: Iterable[tuple[int, int]], total: int) -> str:
     named = ", ".join(f"({row}, {column})" for row, column in missing[:_NAMED_AT_MOST])
     more = ", …" if len(missing) > _NAMED_AT_MOST else ""
     return f"{len(missing)} of the {total} views, by (row, column): {named}{more}"
+
+
+def _light(views: Views) -> dict[str, str]:
+    """How bright the views are, and which are dark, by names; each view is read once."""
+    light: dict[tuple[int, int], float] = {}
+
+    def passing() -> Iterator[NDArray[Any]]:
+        for place, view in views.all():
+            light[place] = mean_light(view, views.transfer)
+            yield view
+
+    lines = {"brightness": brightness(passing(), views.transfer)}
+    if dark := dark_words(light):
+        lines["dark views"] = dark
+    return lines
 
 
 def _disparities(field: LightField, facts: FolderInfo) -> str:

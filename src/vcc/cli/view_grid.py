@@ -42,12 +42,12 @@ class Views:
     frame: Affine
     transfer: str
 
-    def all(self) -> Iterable[NDArray[Any]]:
-        """Those there are, row by row."""
-        for place in np.ndindex(*self.shape):
-            view = self.at((place[0], place[1]))
+    def all(self) -> Iterable[tuple[tuple[int, int], NDArray[Any]]]:
+        """Those there are, with their (row, column), row by row."""
+        for place in _places(self.shape):
+            view = self.at(place)
             if view is not None:
-                yield view
+                yield place, view
 
 
 def draw(views: Views, title: str, path: Path, assumed: bool) -> str:

@@ -25,6 +25,12 @@ from vcc.formats.lytro_container import Container, begins_as_container
 
 ENDINGS = (".lfp", ".lfr", ".lfx")
 
+_MADE = {
+    "refocusStack": "a refocus stack",
+    "depthMap": "a depth map",
+    "edofParallax": "pictures from several sides",
+}
+"""What Lytro's programs make of a recording, by the end of its type's name, com.lytro.acceleration.…"""
 _CORNERS = {"r": "RGGB", "gr": "GRBG", "gb": "GBRG", "b": "BGGR"}
 """What colour the upper left pixel has, and the tile that this makes."""
 _PLACES = {"RGGB": ("r", "gr", "gb", "b"), "GRBG": ("gr", "r", "b", "gb")}
@@ -361,18 +367,39 @@ class _Recording:
 
 
 def _frame(container: Container) -> dict[str, Any]:
-    """The names of a container's picture and metadata."""
+    """The names of a container's picture and metadata.
+
+    What Lytro's programs make of a recording (a refocus stack, …-stk.lfp; a depth map, …-dm.lfp; an Illum's
+    picture for the web) lists it as its frame, and does not hold it.
+    """
     contents = container.contents()
     for keys in (("frames",), ("picture", "frameArray")):
         frames = stated_at(contents, *keys)
         if isinstance(frames, list) and frames and isinstance(frames[0], dict):
             frame = frames[0].get("frame")
-            if isinstance(frame, dict):
+            if isinstance(frame, dict) and _is_there(container, frame, _made_of_it(contents)):
                 return frame
+    made = _made_of_it(contents) or ["pictures"]
     raise container.fault(
-        "it holds no raw recording. Files for the web (…-stk.lfp) hold only pictures made of one; "
-        "take the camera's own file"
+        f"it holds no raw recording, only what was made of one ({', '.join(made)}), as files for the web "
+        "(…-stk.lfp) and depth maps (…-dm.lfp) do; take the camera's own file"
     )
+
+
+def _made_of_it(contents: dict[str, Any]) -> list[str]:
+    """What a container says that it holds besides, or instead of, a recording."""
+    found = [stated_at(contents, *keys) for keys in (("accelerations",), ("picture", "accelerationArray"))]
+    kinds = [
+        each.get("type") for some in found if isinstance(some, list) for each in some if isinstance(each, dict)
+    ]
+    return [_MADE.get(kind.rpartition(".")[2], kind) for kind in kinds if isinstance(kind, str)]
+
+
+def _is_there(container: Container, frame: dict[str, Any], made: list[str]) -> bool:
+    """Whether a frame is in the file, or missing from one that nothing was made of: then that one is damaged."""
+    names = [frame.get(key) for key in ("imageRef", "metadataRef")]
+    missing = [isinstance(name, str) and container.length_of(name) is None for name in names]
+    return not (all(missing) or (missing[0] and made))
 
 
 def _reference(container: Container, frame: dict[str, Any], key: str) -> str:

@@ -22,6 +22,7 @@ from vcc.fields.samples import check_samples
 from vcc.files.transfer import decode
 from vcc.formats import containers
 from vcc.formats.cameras import Cameras
+from vcc.formats.dark_views import dark_remark
 from vcc.formats.folder_info import FolderInfo, Given, cameras_for, info_of_file, info_of_grid
 from vcc.formats.folders import find_grid, towards_positions
 from vcc.formats.grid import Decoded, Geometry, ViewGrid
@@ -121,8 +122,8 @@ def open_light_field(
 
     Warns:
         ResultWarning: a quantity that nobody stated had to be assumed (see `read_geometry` for the
-            defaults), the views were rearranged, parallel views show negative disparities, or the format's reader
-            has something to say.
+            defaults), the views were rearranged, parallel views show negative disparities, some views are black or
+            nearly so (less than 2 % of the light of the brightest), or the format's reader has something to say.
 
     Raises:
         InputError: no such folder or file, nothing in it that looks like a light field, missing views or
@@ -163,7 +164,7 @@ def open_sparse_views(
     The views are taken in the order that the files state: parallax is not looked at.
 
     Warns:
-        ResultWarning: a quantity that nobody stated had to be assumed.
+        ResultWarning: a quantity that nobody stated had to be assumed, or some views are black or nearly so.
 
     Raises:
         InputError: what `open_light_field` says, but for missing views; or a path that is a file.
@@ -180,7 +181,8 @@ def open_sparse_views(
             grid.present, info.picture_shape, _STORED[info.bits], linear=transfer == "linear", progress=progress
         )
     assumed = [name for name in info.unknown if name not in given.names]
-    if remark := assumed_remark(info, path, grid.geometry, assumed):
+    dark = dark_remark(dict(zip(grid.present, pictures, strict=True)))
+    for remark in filter(None, (assumed_remark(info, path, grid.geometry, assumed), dark)):
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
     frame = cameras.frame((*grid.shape, *info.picture_shape))
     return SparseViews(pictures, tuple(grid.present), grid.shape, frame, info.disparity_range, info.sample)
@@ -319,7 +321,8 @@ def _put_in_order(
     assert frame is not None  # stated where there are no cameras
     grid = Grid(values.shape, frame, values.dtype, info.sample, disparity_range, shown)
     light_field = LightField.of(values, grid)
-    remarks = (*info.remarks, opened.remark, moved.remark)
+    views = {(row, column): values[row, column] for row, column in np.ndindex(values.shape[:2])}
+    remarks = (*info.remarks, opened.remark, moved.remark, dark_remark(views))
     if cameras is None:
         return light_field, remarks
     assumed = [name for name in info.unknown if name not in given.names]

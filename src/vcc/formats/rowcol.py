@@ -1,44 +1,73 @@
 """Views whose names end in a row and a column: ``lf_1_1.png``, ``2067_01_09.png``,
-``view_r00_c02.jpg``.
+``view_r00_c02.jpg``; and those that count on besides, ``IMG_0001_017_02_04.png``.
 """
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.formats.grid import Place, ViewGrid, arrange, pictures_in
 
 _NAME = re.compile(r"(?P<before>.*?)(?P<row>\d+)(?P<between>[^\d.]{1,8})(?P<column>\d+)")
+_NUMBER = re.compile(r"\d+")
 
 
 def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
     """The grid of the pictures whose names end in two numbers, row then column; None if there are
     none.
 
-    Counted from any number and in any even step. Pictures of other names are left alone.
+    Counted from any number and in any even step. Pictures of other names are left alone. A third number that is
+    another one in each name, wherever it stands, counts the views and says nothing of their places.
 
     Raises:
         InputError: several such sets in the folder, or a grid that `vcc.formats.grid.arrange`
             refuses.
     """
+    pictures = pictures_in(folder)
     sets: dict[str, list[Place]] = defaultdict(list)
-    for file in pictures_in(folder):
+    for file in pictures:
         match = _NAME.fullmatch(file.stem)
         if match:
             place = Place(int(match["row"]), int(match["column"]), file)
             sets[match["before"] + "…" + match["between"] + "…"].append(place)
     several = {name: places for name, places in sets.items() if len(places) > 1}
+    if len(several) == 1:
+        files = arrange(next(iter(several.values())), folder, sparse=sparse)
+        return ViewGrid("names with row and column", files)
+    counted = _beside_a_count(pictures)
+    if counted:
+        return ViewGrid("names with row, column and a running number", arrange(counted, folder, sparse=sparse))
     if not several:
         return None
-    if len(several) > 1:
-        named = ", ".join(f'"{name}" ({len(places)} files)' for name, places in several.items())
-        raise InputError(
-            f"{folder} holds {len(several)} sets of pictures with a row and a column in their "
-            f"names: {named}. "
-            "Leave one of them in the folder, or list the views in a views.csv"
-        )
-    files = arrange(next(iter(several.values())), folder, sparse=sparse)
-    return ViewGrid("names with row and column", files)
+    named = ", ".join(f'"{name}" ({len(places)} files)' for name, places in several.items())
+    raise InputError(
+        f"{folder} holds {len(several)} sets of pictures with a row and a column in their "
+        f"names: {named}. "
+        "Leave one of them in the folder, or list the views in a views.csv"
+    )
+
+
+def _beside_a_count(pictures: Sequence[Path]) -> list[Place]:
+    """The places of pictures whose names differ in three numbers, of which one is another in each; none if there
+    are none, or several sets of such names.
+    """
+    sets: dict[str, list[Path]] = defaultdict(list)
+    for file in pictures:
+        if "." not in file.stem:  # decimals are positions
+            sets[_NUMBER.sub("#", file.stem)].append(file)
+    found = [places for files in sets.values() if (places := _without_their_count(files))]
+    return found[0] if len(found) == 1 else []
+
+
+def _without_their_count(files: Sequence[Path]) -> list[Place]:
+    """Rows and columns in names of one form; none if these are not three numbers of which one only counts on."""
+    numbers = [[int(digits) for digits in _NUMBER.findall(file.stem)] for file in files]
+    varying = [column for column in zip(*numbers, strict=True) if len(set(column)) > 1]
+    places = [column for column in varying if len(set(column)) < len(files)]
+    if len(varying) != 3 or len(places) != 2:
+        return []
+    return [Place(row, column, file) for row, column, file in zip(*places, files, strict=True)]
