@@ -12,6 +12,7 @@ from vcc.base.errors import InputError, ResultWarning
 from vcc.base.reading import check_file, expanded, read_text, reading
 from vcc.cli.raw_recordings import RawRecording
 from vcc.files.npy import read_npy
+from vcc.formats.matlab_v5 import read_matlab
 from vcc.recover import LensletGrid
 
 _ORDERS = {"x y": "x-y", "row column": "row-column", "row col": "row-column"}
@@ -77,14 +78,12 @@ def _listed(path: Path) -> tuple[NDArray[np.float64], str | None]:
         if path.suffix.lower() == ".npy":
             found = read_npy(path, "list of centres")
         elif path.suffix.lower() == ".mat":
-            from scipy.io import loadmat
-
-            arrays = {name: each for name, each in loadmat(path).items() if not name.startswith("__")}
+            arrays = read_matlab(path)
             lists = {n: a for n, a in arrays.items() if np.ndim(a) >= 2 and a.shape[-1] == 2 and a.size >= 32}
             if len(lists) != 1:
                 raise InputError(
                     f"{path} must hold one array of centres, of shape (…, 2); its arrays: "
-                    + ", ".join(f"{name} {np.shape(each)}" for name, each in arrays.items())
+                    + ", ".join(f"{name} {np.shape(each)}" for name, each in list(arrays.items())[:8])
                 )
             found = next(iter(lists.values()))
         elif path.suffix.lower() in (".csv", ".txt"):

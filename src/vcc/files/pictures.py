@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -17,8 +16,7 @@ from vcc.base.errors import InputError
 from vcc.base.reading import check_file
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
-from vcc.files.netpbm import read_netpbm
-from vcc.files.npy import read_npy
+from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_png
 
 READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
 """The endings that `read_picture` knows."""
@@ -32,10 +30,6 @@ Exposure = float | Literal["auto"]
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)  # IEC 61966-2-1
 _BRIGHT_PERCENTILE = 99.5
-
-
-class _Unsuitable(Exception):
-    """A file that its library reads, and this package does not want."""
 
 
 def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
@@ -56,25 +50,38 @@ def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
             picture that is not of one of these types, or one that is not opaque.
     """
     path = Path(path)
+    return _checked(read_stored(path), path)
+
+
+def read_stored(path: str | PathLike[str]) -> NDArray[Any]:
+    """The samples of a picture as its library gives them: a PNG may have opacity as its last channel.
+
+    Returns:
+        Of any type and shape.
+
+    Raises:
+        InputError: no such file, an ending that is not known, a truncated or damaged file, or one that claims more
+            than it can hold.
+    """
+    path = Path(path)
     ending = path.suffix.lower()
-    if ending not in _READERS:
+    if ending not in DECODERS:
         raise InputError(
             f'{path} has the ending "{ending}", which is not a picture that can be read: '
             f"{', '.join(READ_ENDINGS)} can"
         )
     check_file(path, "picture file")
     try:
-        samples = _READERS[ending](path)
-    except _Unsuitable as error:
+        return DECODERS[ending](path)
+    except Unsuitable as error:
         raise InputError(f"{path}: {error}") from None
     except InputError as error:
         raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
     except Exception as error:  # each library has its own types for a damaged file
         raise InputError(
             f"{path} cannot be read as a picture: it is truncated, damaged or not a "
-            f"{ending[1:].upper()} file ({error}). Copy it again from where it came from"
+            f"{ending[1:].upper()} file ({str(error)[:200]}). Copy it again from where it came from"
         ) from error
-    return _checked(samples, path)
 
 
 def read_png_into(path: Path, out: NDArray[Any]) -> bool:
@@ -89,10 +96,8 @@ def read_png_into(path: Path, out: NDArray[Any]) -> bool:
     """
     if path.suffix.lower() != ".png" or out.dtype not in (np.uint8, np.uint16) or not path.is_file():
         return False
-    import imagecodecs
-
     try:
-        imagecodecs.png_decode(path.read_bytes(), out=out)
+        decode_png(path.read_bytes(), out)
     except Exception:  # each library has its own types for a damaged file
         return False
     return True
@@ -333,110 +338,6 @@ def _write_exr(values: NDArray[np.float32], path: Path) -> None:
         file.write(str(path))
 
 
-def _read_png(path: Path) -> NDArray[Any]:
-    import imagecodecs
-
-    samples: NDArray[Any] = imagecodecs.png_decode(path.read_bytes())
-    return samples
-
-
-def _read_jpeg(path: Path) -> NDArray[Any]:
-    import imagecodecs
-
-    data = path.read_bytes()
-    samples: NDArray[Any] = imagecodecs.jpeg8_decode(data)
-    if not _jpeg_is_complete(data):  # the library paints what is missing grey, and says nothing
-        raise ValueError("the end of the picture is missing")
-    if samples.ndim == 3 and samples.shape[2] == 4:
-        raise _Unsuitable("this JPEG has four inks (CMYK); convert it to RGB")
-    return samples
-
-
-def _jpeg_is_complete(data: bytes) -> bool:
-    """Whether the end marker follows the first scan (an embedded thumbnail has one of its own)."""
-    place = 2
-    while place + 4 <= len(data) and data[place] == 0xFF:
-        marker = data[place + 1]
-        if marker == 0xFF:  # fill byte
-            place += 1
-            continue
-        if marker == 0xDA:
-            return data.rfind(b"\xff\xd9", place) >= 0
-        place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
-    return False
-
-
-def _read_tiff(path: Path) -> NDArray[Any]:
-    import tifffile
-
-    with tifffile.TiffFile(path) as file:
-        if len(file.pages) != 1 and len(file.series) != 1:
-            raise _Unsuitable(f"this TIFF holds {len(file.pages)} pictures; one is wanted")
-        page = file.pages.first
-        samples: NDArray[Any] = page.asarray()
-        if page.photometric == tifffile.PHOTOMETRIC.MINISWHITE:
-            if samples.dtype.kind != "u":
-                raise _Unsuitable("this TIFF stores white as 0 in floating point; invert it")
-            samples = np.iinfo(samples.dtype).max - samples
-        elif page.photometric == tifffile.PHOTOMETRIC.PALETTE:
-            samples = np.moveaxis(np.asarray(page.colormap)[:, samples], 0, -1)
-        if samples.ndim == 3 and page.planarconfig == tifffile.PLANARCONFIG.SEPARATE:
-            samples = np.moveaxis(samples, 0, -1)
-    return samples
-
-
-def _read_bmp(path: Path) -> NDArray[Any]:
-    import imagecodecs
-
-    samples: NDArray[Any] = imagecodecs.bmp_decode(path.read_bytes())
-    return samples
-
-
-def _read_exr(path: Path) -> NDArray[Any]:
-    import OpenEXR
-
-    with OpenEXR.File(str(path), separate_channels=True) as file:
-        channels = {name: channel.pixels for name, channel in file.channels().items()}
-        if {"R", "G", "B"} <= channels.keys():
-            picked = [channels[name] for name in "RGB"]
-        elif len(channels) == 1:
-            picked = list(channels.values())
-        elif "Y" in channels and channels.keys() <= {"Y", "A"}:
-            picked = [channels["Y"]]
-        else:
-            raise _Unsuitable(
-                f"this OpenEXR file has the channels {', '.join(sorted(channels))}; "
-                "R, G, B or a single one is wanted"
-            )
-        alpha = channels.get("A")
-        if alpha is not None and not (alpha >= 1).all():
-            raise _Unsuitable(_NOT_OPAQUE)
-        samples = np.stack(picked, axis=-1) if len(picked) > 1 else np.array(picked[0])
-    return samples.astype(np.float32, copy=False)
-
-
-def _read_npy(path: Path) -> NDArray[Any]:
-    return read_npy(path)
-
-
-_NOT_OPAQUE = (
-    "this picture is not opaque everywhere, and what lies behind it is not known: "
-    "flatten it (remove its alpha channel)"
-)
-_READERS: dict[str, Callable[[Path], NDArray[Any]]] = {
-    ".png": _read_png,
-    ".jpg": _read_jpeg,
-    ".jpeg": _read_jpeg,
-    ".tif": _read_tiff,
-    ".tiff": _read_tiff,
-    ".bmp": _read_bmp,
-    ".exr": _read_exr,
-    ".npy": _read_npy,
-    ".ppm": read_netpbm,
-    ".pgm": read_netpbm,
-}
-
-
 def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
     """Samples of a type and shape that everything behind can rely on, and their bits."""
     if samples.dtype == np.bool_:
@@ -455,6 +356,6 @@ def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
     if path.suffix.lower() != ".npy" and samples.ndim == 3 and samples.shape[2] in (2, 4):
         opaque = 1 if samples.dtype.kind == "f" else np.iinfo(samples.dtype).max
         if not (samples[..., -1] >= opaque).all():
-            raise InputError(f"{path}: {_NOT_OPAQUE}")
+            raise InputError(f"{path}: {NOT_OPAQUE}")
         samples = samples[..., :-1]
     return _grey_if_one(samples), samples.dtype.itemsize * 8

@@ -24,6 +24,8 @@ from vcc.fields.arrays import all_samples
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
+from vcc.files.claims import LIGHT_FIELD, check_claim
+from vcc.files.npy import read_npy
 from vcc.formats.grid import Decoded, Geometry
 
 ENDINGS = (".npy", ".npz")
@@ -114,13 +116,16 @@ def save(light_field: Samples, path: str | PathLike[str]) -> Path:
 def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
     """The arrays that matter, the samples under the name of "values"."""
     try:
+        if path.suffix.lower() == ".npy":
+            if key is not None:
+                raise InputError(f"{path} holds one array without a name, so key={key!r} means nothing")
+            return {"values": read_npy(path)}
         with path.open("rb") as file:
-            loaded = np.load(file, allow_pickle=False)
+            loaded = np.load(file, allow_pickle=False, mmap_mode="r")
             if not isinstance(loaded, np.lib.npyio.NpzFile):
-                if key is not None:
-                    raise InputError(f"{path} holds one array without a name, so key={key!r} means nothing")
-                return {"values": loaded}
+                raise InputError(f"{path} holds one array without a name: end its own name in .npy")
             names = loaded.files
+            _check_unpacked(loaded, path)
             if key is not None:
                 if key not in names:
                     raise InputError(f'{path} holds no array "{key}", but {_listed(names)}')
@@ -132,7 +137,7 @@ def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
     except InputError:
         raise
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, KeyError, zipfile.error, MemoryError) as error:
-        objects = "Object arrays" in str(error) or "pickle" in str(error)
+        objects = any(word in str(error) for word in ("Object arrays", "Python objects", "pickle"))
         way_out = "Save numbers only" if objects else "Copy it again from where it came from"
         raise InputError(
             f"{path} cannot be read as arrays: it is truncated, damaged, of Python objects or too large "
@@ -140,6 +145,12 @@ def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
         ) from error
     held = f"the arrays {_listed(names)}" if names else "no array"
     raise InputError(f"{path} holds {held}: say which one is the light field, key=…")
+
+
+def _check_unpacked(loaded: np.lib.npyio.NpzFile, path: Path) -> None:
+    """Refuse arrays that unpack to more than so few bytes may hold."""
+    members = [] if loaded.zip is None else loaded.zip.infolist()
+    check_claim(sum(member.file_size for member in members) // 2, 2, path.stat().st_size, str(path), LIGHT_FIELD)
 
 
 def _listed(names: list[str]) -> str:

@@ -17,7 +17,7 @@ from vcc.fields.arrays import all_samples
 from vcc.fields.samples import Samples
 from vcc.files import transfer as curves
 from vcc.files.atomic import atomic_path
-from vcc.files.pictures import read_picture
+from vcc.files.pictures import read_picture, read_stored
 from vcc.formats import orders
 from vcc.formats.grid import Decoded, weights_apart
 from vcc.formats.orders import Order, counted_from, running_numbers
@@ -181,15 +181,7 @@ def _samples(path: Path) -> tuple[NDArray[Any], NDArray[np.float32] | None]:
     """The picture, and its opacity as weights if it is not opaque."""
     if path.suffix.lower() != ".png":
         return read_picture(path)[0], None
-    import imagecodecs
-
-    try:
-        samples = imagecodecs.png_decode(path.read_bytes())
-    except Exception as error:
-        raise InputError(
-            f"{path} cannot be read as a picture: it is truncated, damaged or not a PNG file ({error}). "
-            "Copy it again from where it came from"
-        ) from error
+    samples = read_stored(path)
     if samples.ndim == 3 and samples.shape[2] in (2, 4):
         samples, weights = weights_apart(samples)
         return samples if samples.shape[2] == 3 else samples[..., 0], weights

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vcc.base.errors import InputError
-from vcc.formats import hdf5
+from vcc.formats import hdf5, hdf5_reading
 from vcc.formats.grid import Decoded, Geometry
 
 
@@ -24,17 +24,20 @@ def read(path: Path) -> Decoded:
     Blender's, the metre, is taken. Whether h runs to the right is not stated either, and left to parallax.
 
     Raises:
-        InputError: no h5py, a file that is not HDF5 or is damaged, or one without /LF or its attributes.
+        InputError: no h5py, a file that is not HDF5, is damaged or lacks samples, or one without /LF or its
+            attributes.
     """
     with hdf5.opened(path) as file:
-        if "LF" not in file:
+        samples = hdf5_reading.dataset(file, "LF", path)
+        if samples is None:
             raise InputError(
                 f"{path} has no data set LF, which HCI's light fields of 2013 have; "
                 f"it holds {', '.join(map(str, file)) or 'nothing'}"
             )
-        values = file["LF"][...]
-        attributes = dict(file.attrs)
-        depth = file["GT_DEPTH"][...] if "GT_DEPTH" in file else None
+        values = hdf5_reading.numbers(samples, path)
+        attributes = hdf5_reading.attributes(file, path)
+        true = hdf5_reading.dataset(file, "GT_DEPTH", path)
+        depth = None if true is None else hdf5_reading.numbers(true, path)
     if values.ndim not in (4, 5):
         raise InputError(f"{path}: LF has the shape {values.shape}; it has the axes (v, h, y, x, channel)")
     if depth is not None and depth.shape != values.shape[:4]:
@@ -66,5 +69,5 @@ def read(path: Path) -> Decoded:
 def _plain(value: Any) -> Any:
     found = np.asarray(value)
     if found.dtype.kind in "SO":
-        return str(value.decode() if isinstance(value, bytes) else value)
+        return hdf5_reading.text(value)
     return found.item() if found.size == 1 else found.tolist()

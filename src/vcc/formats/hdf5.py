@@ -14,12 +14,15 @@ from vcc.base.errors import InputError
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 
+BEGINNINGS = (0, 512)
+"""Where the signature may stand: MATLAB's files begin with a block of their own."""
+
 
 def is_hdf5(path: Path) -> bool:
     """Whether a file begins as HDF5 files do, at the start or, as MATLAB's, after a block of 512 bytes."""
     with path.open("rb") as file:
         start = file.read(520)
-    return start.startswith(MAGIC) or start[512:520] == MAGIC
+    return any(start[place : place + len(MAGIC)] == MAGIC for place in BEGINNINGS)
 
 
 def library() -> Any:
@@ -56,13 +59,13 @@ def opened(path: Path) -> Iterator[Any]:
             yield file
     except InputError:
         raise
-    except (OSError, RuntimeError, KeyError) as error:
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:  # what h5py says of damaged files
         raise InputError(
             f"{path} cannot be read: it is truncated or damaged ({error}). Copy it again from where it came from"
         ) from error
 
 
-def number(found: Any, name: str, path: Path) -> float:
+def number(found: dict[str, Any], name: str, path: Path) -> float:
     """An attribute that is one number, alone or in an array of one.
 
     Raises:
@@ -76,5 +79,5 @@ def number(found: Any, name: str, path: Path) -> float:
     except (ValueError, TypeError, IndexError):
         only = float("nan")
     if not np.isfinite(only) or np.asarray(value).size != 1:
-        raise InputError(f"{path}: the attribute {name} is {value!r}, not a finite number")
+        raise InputError(f"{path}: the attribute {name} is {str(value)[:100]!r}, not a finite number")
     return only

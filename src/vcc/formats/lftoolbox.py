@@ -8,6 +8,7 @@ towards the scene with slope u comes from it with ours of −u.
 
 from __future__ import annotations
 
+import math
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -22,7 +23,7 @@ from vcc.fields.arrays import all_samples
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
-from vcc.formats import hdf5
+from vcc.formats import hdf5, hdf5_reading
 from vcc.formats.grid import Decoded, Geometry, weights_apart
 
 _TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
@@ -48,30 +49,29 @@ def read(path: Path) -> Decoded:
             are no 5×5 matrix.
     """
     with hdf5.opened(path) as file:
-        if "LF" not in file:
+        samples = hdf5_reading.dataset(file, "LF", path)
+        if samples is None:
             raise InputError(
                 f"{path} has no variable LF, which light fields of the Light Field Toolbox have; it holds "
                 f"{', '.join(name for name in file if not name.startswith('#')) or 'nothing'}"
             )
-        stored = file["LF"][...]
-        if stored.ndim not in (4, 5):
-            raise InputError(f"{path}: LF has {stored.ndim} axes; it has [j, i, l, k, channel]")
-        intrinsics = (
-            file["RectOptions/RectCamIntrinsicsH"][...].T if "RectOptions/RectCamIntrinsicsH" in file else None
-        )
-        corrected = "ColourCorrect" in _text(file, "DecodeOptions/OptionalTasks")
-        ours = _text(file, f"{_OURS}/Transfer")
-        sample: Sample = "point" if _text(file, f"{_OURS}/Sample") == "point" else "mean"
-        has_weight = file[f"{_OURS}/HasWeight"][0, 0] != 0 if _OURS in file else None
-        disparities = file[f"{_OURS}/DisparityRange"][...].ravel() if f"{_OURS}/DisparityRange" in file else None
-        metadata: dict[str, Any] = {}
-        if "LFMetadata" in file:
-            metadata["LFMetadata"] = sorted(file["LFMetadata"])
+        if samples.ndim not in (4, 5):
+            raise InputError(f"{path}: LF has {samples.ndim} axes; it has [j, i, l, k, channel]")
+        stored = hdf5_reading.numbers(samples, path)
+        intrinsics = _numbers(file, "RectOptions/RectCamIntrinsicsH", path)
+        corrected = "ColourCorrect" in _text(file, "DecodeOptions/OptionalTasks", path)
+        ours = _text(file, f"{_OURS}/Transfer", path)
+        sample: Sample = "point" if _text(file, f"{_OURS}/Sample", path) == "point" else "mean"
+        weighted = _numbers(file, f"{_OURS}/HasWeight", path)
+        disparities = _disparities(_numbers(file, f"{_OURS}/DisparityRange", path), path)
+        about = hdf5_reading.found(file, "LFMetadata", path)
+        metadata = {"LFMetadata": sorted(about)} if isinstance(about, hdf5.library().Group) else {}
     values = np.ascontiguousarray(stored.T)
     if values.dtype == np.float64:
         values = values.astype(np.float32)
-    if has_weight is None:
-        has_weight = values.ndim == 5 and values.shape[4] in (2, 4)
+    if weighted is not None and weighted.shape != (1, 1):
+        raise InputError(f"{path}: {_OURS}.HasWeight has the shape {weighted.shape}; it is one number, 1×1")
+    has_weight = values.ndim == 5 and values.shape[4] in (2, 4) if weighted is None else weighted.item() != 0
     weights = None
     if has_weight:
         values, weights = weights_apart(values)
@@ -87,10 +87,10 @@ def read(path: Path) -> Decoded:
         values=values,
         transfer=transfer,
         geometry=Geometry(
-            disparity_range=None if disparities is None else (float(disparities[0]), float(disparities[1])),
+            disparity_range=disparities,
             sample=sample,
         ),
-        frame=None if intrinsics is None else frame_of(intrinsics, path),
+        frame=None if intrinsics is None else frame_of(intrinsics.T, path),
         weights=weights,
         remarks=tuple(remarks),
         metadata=metadata,
@@ -186,13 +186,34 @@ def _variable(group: Any, name: str, values: NDArray[Any], kind: str | None = No
         made.attrs["MATLAB_int_decode"] = np.int32(2)
 
 
-def _text(file: Any, name: str) -> str:
+def _numbers(file: Any, name: str, path: Path) -> NDArray[Any] | None:
+    """The numbers of a variable; None if there is none."""
+    data = hdf5_reading.dataset(file, name, path)
+    return None if data is None else hdf5_reading.numbers(data, path)
+
+
+def _disparities(stated: NDArray[Any] | None, path: Path) -> tuple[float, float] | None:
+    """The lowest and the highest disparity of a variable; None if there is none."""
+    if stated is None:
+        return None
+    given = [float(value) for value in stated.ravel()[:3]]
+    if len(given) != 2 or not -math.inf < given[0] <= given[1] < math.inf:
+        raise InputError(f"{path}: {_OURS}.DisparityRange is {given}, not two numbers, lowest first")
+    return given[0], given[1]
+
+
+def _text(file: Any, name: str, path: Path) -> str:
     """The text, or texts in a cell array, of a variable; empty if there is none."""
-    if name not in file:
+    data = hdf5_reading.dataset(file, name, path)
+    if data is None:
         return ""
-    found = file[name][...]
-    if found.dtype.kind == "u":
-        return "".join(map(chr, found.ravel()))
-    if found.dtype == object:
-        return " ".join("".join(map(chr, file[reference][...].ravel())) for reference in found.ravel())
-    return ""
+    parts = [data] if data.dtype.kind == "u" else hdf5_reading.references(data, path)
+    return " ".join(_characters(part, path) for part in parts)
+
+
+def _characters(data: Any, path: Path) -> str:
+    """MATLAB's text: a number of 8 or 16 bits for a character."""
+    codes = hdf5_reading.numbers(data, path)
+    if codes.dtype not in (np.uint8, np.uint16):
+        raise InputError(f"{path}: {data.name} should be text, and holds numbers of type {codes.dtype}")
+    return "".join(map(chr, codes.ravel()))

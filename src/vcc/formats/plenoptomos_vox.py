@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import mm, um
-from vcc.formats import hdf5
+from vcc.formats import hdf5, hdf5_reading
 from vcc.formats.grid import Decoded, Geometry
+from vcc.formats.hdf5_reading import text
 
 ENDINGS = (".vox",)
 
-_CAMERA = "/instrument/camera"
+_CAMERA = "instrument/camera"
 _UNITS = {"m": 1.0, "mm": mm, "um": um, "µm": um}
 _DEFAULT_UNIT = "mm"
 _ORDER = "vutsc"
@@ -55,20 +56,22 @@ def read(path: Path) -> Decoded:
     """
     path = Path(path)
     with hdf5.opened(path) as file:
-        kind = _text(file.attrs.get("description"))
+        kind = text(hdf5_reading.attribute(file, "description", path))
         if kind != "VoxelDataFormat":
             stated = f'its description is "{kind}"' if kind else "it has no description"
             raise InputError(f'{path} is HDF5 and no .vox file: {stated}, not "VoxelDataFormat"')
-        if "/data/image" not in file:
+        image = hdf5_reading.dataset(file, "data/image", path)
+        if image is None:
             raise InputError(f"{path} has no /data/image. Copy it again from where it came from")
-        values = _samples(file["/data/image"], path)
+        values = _samples(image, path)
         camera = _Camera(file, path)
         frame, remarks = camera.frame(values.shape)
         geometry = Geometry(spacing=None if frame else camera.lengths("main_lens/pixel_size", "v:u"))
-        kept = [name for name in ("white", "dark") if f"/data/{name}" in file]
+        kept = [name for name in ("white", "dark") if hdf5_reading.found(file, f"data/{name}", path) is not None]
         if kept:
             remarks.append(f"it holds {' and '.join(kept)} pictures too, which are not applied")
-        model = _text(file[_CAMERA].attrs.get("model")) if _CAMERA in file else ""
+        about = hdf5_reading.found(file, _CAMERA, path)
+        model = "" if about is None else text(hdf5_reading.attribute(about, "model", path))
     return Decoded(
         format="plenoptomos .vox",
         values=values,
@@ -80,16 +83,9 @@ def read(path: Path) -> Decoded:
     )
 
 
-def _text(value: Any) -> str:
-    """An attribute as text, however it was written."""
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    return "" if value is None else str(value)
-
-
 def _samples(image: Any, path: Path) -> NDArray[Any]:
     """The samples with axes (v, u, t, s[, channel])."""
-    mode, axes = _text(image.attrs.get("mode")), _text(image.attrs.get("axes"))
+    mode, axes = (text(hdf5_reading.attribute(image, name, path)) for name in ("mode", "axes"))
     names = axes.split(":")
     if mode == "raw" or {"tau", "sigma"} & set(names):
         raise InputError(
@@ -101,15 +97,14 @@ def _samples(image: Any, path: Path) -> NDArray[Any]:
             f'{path}: the axes of /data/image are "{axes}", and it has {image.ndim}; "v:u:t:s" in any order, and '
             "perhaps c, is known"
         )
-    values: NDArray[Any] = np.transpose(image[()], [names.index(name) for name in _ORDER if name in names])
-    if values.dtype.kind not in "iuf":
-        raise InputError(f"{path} holds samples of type {values.dtype}, not numbers")
-    if 0 not in values.shape and values.min() < 0:
+    values: NDArray[Any] = np.transpose(
+        hdf5_reading.numbers(image, path), [names.index(name) for name in _ORDER if name in names]
+    )
+    if values.min() < 0:
         raise InputError(f"{path} holds negative samples, down to {values.min()}: light is not negative")
     if values.dtype in (np.uint8, np.uint16) or values.dtype.kind == "f":
         return values
-    exact = 0 in values.shape or values.max() <= _EXACT_IN_FLOAT32
-    return values.astype(np.float32 if exact else np.float64)
+    return values.astype(np.float32 if values.max() <= _EXACT_IN_FLOAT32 else np.float64)
 
 
 class _Camera:
@@ -165,16 +160,16 @@ class _Camera:
     def _stated(self, name: str, axes: str) -> tuple[float, ...] | None:
         """Lengths in metres in the order of these axes, "" for a single one."""
         where = f"{_CAMERA}/{name}"
-        if where not in self._file:
+        data = hdf5_reading.dataset(self._file, where, self._path)
+        if data is None:
             return None
-        data = self._file[where]
-        unit = _text(data.attrs.get("units")) or _DEFAULT_UNIT
+        unit = text(hdf5_reading.attribute(data, "units", self._path)) or _DEFAULT_UNIT
         if unit not in _UNITS:
             raise InputError(f'{self._path}: {where} is in "{unit}"; {", ".join(_UNITS)} are known')
         wanted = axes.split(":") if axes else [""]
-        given = (_text(data.attrs.get("axes")) or axes).split(":") if axes else [""]
-        numbers = np.ravel(data[()])
-        if sorted(given) != sorted(wanted) or numbers.size != len(wanted) or numbers.dtype.kind not in "iuf":
+        given = (text(hdf5_reading.attribute(data, "axes", self._path)) or axes).split(":") if axes else [""]
+        numbers = hdf5_reading.numbers(data, self._path).ravel()
+        if sorted(given) != sorted(wanted) or numbers.size != len(wanted):
             raise InputError(
                 f'{self._path}: {where} holds {numbers.size} numbers along "{":".join(given)}", not along "{axes}"'
             )

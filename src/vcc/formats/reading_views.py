@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
+from vcc.files.claims import LIGHT_FIELD, check_claim
 from vcc.files.pictures import read_picture, read_png_into
 from vcc.files.transfer import decode
 
@@ -44,10 +45,14 @@ def read_views(
             some time and needs only them. Not called if one of them cannot be read.
 
     Raises:
-        InputError: pictures that differ in size or type, a damaged picture, or more memory needed than there is.
+        InputError: pictures that differ in size or type, a damaged picture, more samples than so few bytes may
+            hold, or more memory needed than there is.
     """
     kind = stored if linear else np.float32
     shape = (len(files), *picture)
+    stored_bytes = sum(file.stat().st_size for file in set(files.values()) if file.is_file())
+    folder = next(iter(files.values())).parent
+    check_claim(math.prod(shape), np.dtype(stored).itemsize, stored_bytes, str(folder), LIGHT_FIELD)
     try:
         values: NDArray[Any] = np.empty(shape, kind)
     except MemoryError:

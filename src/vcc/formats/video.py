@@ -18,6 +18,7 @@ from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
+from vcc.files.claims import LIGHT_FIELD, check_claim
 from vcc.files.pictures import Exposure
 from vcc.formats.exposing import Codes
 from vcc.formats.grid import Decoded
@@ -32,6 +33,10 @@ Flight = Literal["serpentine", "circle", "row"]
 
 _BT709, _UNSPECIFIED, _SRGB_CURVE = 1, 2, 13  # ITU-T H.273
 _HIGH_DYNAMIC_RANGE = {16: "PQ", 18: "HLG"}
+_THIS_FILE_ALONE = {
+    "protocol_whitelist": "file",
+    "format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi",  # playlists would open other files
+}
 _HD = 720  # rows from which players take BT.709 where nothing is stated
 
 
@@ -83,16 +88,18 @@ def read(
     frames: list[NDArray[Any]] = []
     remarks: list[str] = []
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(path), options=_THIS_FILE_ALONE, metadata_errors="replace") as container:
             if not container.streams.video:
                 raise InputError(f"{path} holds no video")
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
+            stream.codec_context.options = {"max_pixels": str(LIGHT_FIELD // 6)}  # two frames of three channels
             decoded, end = 0, 0.0
             for frame in container.decode(stream):
                 if last is not None and decoded > last:
                     break
                 if decoded >= first and (decoded - first) % every == 0:
+                    _check_claim(frame, len(frames) + 1, path)
                     frames.append(_picture(frame, path))
                     if frames[-1].shape != frames[0].shape:
                         raise InputError(f"{path}: the size of the picture changes at frame {decoded}")
@@ -226,6 +233,14 @@ def _arranged(
     if views is not None and order is not None:
         return views, order
     return arrangement([thumbnail(frame) for frame in frames], views, order, f"{path} gives {len(frames)} frames")
+
+
+def _check_claim(frame: Any, count: int, path: Path) -> None:
+    """Refuse so many frames of this size, if the file is too small for them: frames that repeat need no bytes."""
+    try:
+        check_claim(3 * frame.height * frame.width * count, 2, path.stat().st_size, str(path), LIGHT_FIELD)
+    except InputError as error:
+        raise InputError(f"{error}, or take fewer frames with every=, first= and last=") from None
 
 
 def _picture(frame: Any, path: Path) -> NDArray[Any]:

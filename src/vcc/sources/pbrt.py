@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded, is_file, read_bytes, reading, unpacked_gzip
+from vcc.files.picture_decoders import read_exr_channels
 from vcc.sources.views import ViewCamera
 
 Matrix = NDArray[Any]
@@ -308,13 +309,10 @@ def _read_exr(path: Path) -> NDArray[np.float32]:
     Raises:
         InputError: it has none.
     """
-    import OpenEXR
-
-    with OpenEXR.File(str(path), separate_channels=True) as file:
-        channels = file.channels()
-        if not {"R", "G", "B"} <= set(channels):
-            raise InputError(f"pbrt wrote the channels {', '.join(channels)}: take a film that writes R, G and B")
-        return np.stack([np.asarray(channels[name].pixels, np.float32) for name in "RGB"], axis=-1)
+    channels = read_exr_channels(path)
+    if not {"R", "G", "B"} <= set(channels):
+        raise InputError(f"pbrt wrote the channels {', '.join(channels)}: take a film that writes R, G and B")
+    return np.stack([np.asarray(channels[name], np.float32) for name in "RGB"], axis=-1)
 
 
 def _text(path: Path) -> str:

@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
-from vcc.files.pictures import read_picture
+from vcc.files.picture_decoders import read_exr_channels
+from vcc.files.pictures import read_picture, read_stored
 from vcc.files.transfer import decode
 
 Array = NDArray[Any]
@@ -272,24 +273,16 @@ def _averaged(values: Array, axis: int, count: int) -> Array:
 
 def _read_with_opacity(path: Path) -> tuple[Array, Array | None]:
     """Samples as stored, (rows, columns[, 3]), and opacity, 0 to 1, if there is any that is not 1."""
-    if path.suffix.lower() == ".png" and path.is_file():
-        import imagecodecs
-
-        try:
-            samples = np.asarray(imagecodecs.png_decode(path.read_bytes()))
-        except Exception:  # what is wrong is said below
-            samples = np.empty((0, 0))
+    if path.suffix.lower() == ".png":
+        samples = read_stored(path)
         if samples.ndim == 3 and samples.shape[2] in (2, 4):
             opacity = samples[..., -1] / np.iinfo(samples.dtype).max
             colour = samples[..., :-1]
             return (colour[..., 0] if colour.shape[2] == 1 else colour), opacity
     if path.suffix.lower() == ".exr" and path.is_file():
-        import OpenEXR
-
         try:
-            with OpenEXR.File(str(path), separate_channels=True) as file:
-                channels = {name: np.asarray(file.channels()[name].pixels) for name in file.channels()}
-        except Exception:  # likewise
+            channels = read_exr_channels(path)
+        except Exception:  # what is wrong is said below
             channels = {}
         if set(channels) == set("RGBA"):
             return np.stack([channels[name] for name in "RGB"], axis=-1), channels["A"].astype(np.float64)

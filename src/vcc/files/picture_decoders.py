@@ -1,0 +1,223 @@
+"""Bytes of pictures to samples, by libraries that are told first what they may believe.
+
+A header may claim more than its file holds: libraries then take the memory that it asks for, read beyond their
+input, or fill up with black. So sizes are held against the file before a library unpacks it.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.files import jpeg_headers
+from vcc.files.claims import check_claim
+from vcc.files.netpbm import read_netpbm
+from vcc.files.npy import read_npy
+
+NOT_OPAQUE = (
+    "this picture is not opaque everywhere, and what lies behind it is not known: "
+    "flatten it (remove its alpha channel)"
+)
+
+_PNG = b"\x89PNG\r\n\x1a\n"
+_PNG_CHANNELS = {0: 1, 2: 3, 3: 4, 4: 2, 6: 4}  # by the type of colour; a palette may have opacity
+_TIFF_JPEG = 7
+_PALETTE_NOT_GREY = ("P", "1")
+_PLAIN_BMP = (0, 3)  # as it is, with bit fields
+
+
+class Unsuitable(Exception):
+    """A file that its library reads, and this package does not want."""
+
+
+def read_png(path: Path) -> NDArray[Any]:
+    """The samples of a PNG with all of its channels, opacity among them."""
+    return decode_png(path.read_bytes())
+
+
+def decode_png(data: bytes, out: NDArray[Any] | None = None) -> NDArray[Any]:
+    """The samples of a PNG with all of its channels, into memory that is there already, if any is given.
+
+    Raises:
+        Exception: of any type; what is wrong.
+    """
+    import imagecodecs
+
+    _check_png(data)
+    samples: NDArray[Any] = imagecodecs.png_decode(data, out=out)
+    return samples
+
+
+def read_exr_channels(path: Path) -> dict[str, NDArray[Any]]:
+    """All channels of an OpenEXR file by their names, of its first part if it has several.
+
+    Raises:
+        Exception: of any type; what is wrong.
+    """
+    import OpenEXR
+
+    with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
+        for part in file.parts:
+            header = part.header
+            if header.get("type") not in (None, OpenEXR.scanlineimage, OpenEXR.tiledimage):
+                raise Unsuitable("this OpenEXR file has several samples for a pixel (deep); flatten it")
+            first, last = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
+            width, height = (max(0, int(n)) for n in last - first + 1)
+            check_claim(width * height * len(header["channels"]), 4, path.stat().st_size, "it")
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        return {name: np.asarray(channel.pixels) for name, channel in file.channels().items()}
+
+
+def _check_png(data: bytes) -> None:
+    """Refuse a PNG that claims too much or does not reach its end."""
+    place = len(_PNG)
+    while data.startswith(_PNG):
+        length = int.from_bytes(data[place : place + 4], "big")
+        name = data[place + 4 : place + 8]
+        if place + 12 + length > len(data):
+            break
+        if place == len(_PNG):
+            if name != b"IHDR" or length < 13:
+                break
+            width, height = (int.from_bytes(data[n : n + 4], "big") for n in (place + 8, place + 12))
+            bits, colour = data[place + 16], data[place + 17]
+            claimed = width * height * _PNG_CHANNELS.get(colour, 4)
+            check_claim(claimed, 2 if bits > 8 else 1, len(data), "it")
+        if name == b"IEND":
+            return
+        place += 12 + length
+    raise ValueError("it is no PNG, or its end is missing")
+
+
+def _read_jpeg(path: Path) -> NDArray[Any]:
+    samples = _decode_jpeg(path.read_bytes())
+    if samples.ndim == 3 and samples.shape[2] == 4:
+        raise Unsuitable("this JPEG has four inks (CMYK); convert it to RGB")
+    return samples
+
+
+def _decode_jpeg(data: bytes, tables: bytes | None = None) -> NDArray[Any]:
+    """The samples of a JPEG, whose tables may be elsewhere."""
+    import imagecodecs
+
+    jpeg = jpeg_headers.parsed(data)
+    check_claim(jpeg.height * jpeg.width * len(jpeg.sampling), 1 if jpeg.bits == 8 else 2, len(data), "it")
+    if jpeg_headers.least_bytes(jpeg) > len(data):
+        raise ValueError(f"{jpeg.width}×{jpeg.height} pixels take more than its {len(data):,} bytes")
+    samples: NDArray[Any] = imagecodecs.jpeg8_decode(data, tables=tables)
+    if jpeg.coding == "lossless" or (samples[-1, -1] == 1 << (jpeg.bits - 1)).all():
+        # It ends in the grey that the library paints where data are missing. Data that come later are not looked
+        # at if they are complete, and are taken for the missing ones if not.
+        filled = imagecodecs.jpeg8_decode(jpeg_headers.longer(jpeg, data, _FILLING), tables=tables)
+        if not np.array_equal(samples, filled):
+            raise ValueError("the end of the picture is missing")
+    return samples
+
+
+_FILLING = bytes(
+    np.random.default_rng(8).integers(0, 255, 256, dtype=np.uint8)
+)  # has no 255, which begins markers
+
+
+def _read_tiff(path: Path) -> NDArray[Any]:
+    import tifffile
+
+    with tifffile.TiffFile(path) as file:
+        if len(file.pages) != 1:
+            raise Unsuitable(f"this TIFF holds {len(file.pages)} pictures; one is wanted")
+        page = file.pages.first
+        _check_tiff(page, path)
+        samples: NDArray[Any] = page.asarray()
+        if page.photometric == tifffile.PHOTOMETRIC.MINISWHITE:
+            if samples.dtype.kind != "u":
+                raise Unsuitable("this TIFF stores white as 0 in floating point; invert it")
+            samples = np.iinfo(samples.dtype).max - samples
+        elif page.photometric == tifffile.PHOTOMETRIC.PALETTE:
+            samples = np.moveaxis(np.asarray(page.colormap)[:, samples], 0, -1)
+        if samples.ndim == 3 and page.planarconfig == tifffile.PLANARCONFIG.SEPARATE:
+            samples = np.moveaxis(samples, 0, -1)
+    return samples
+
+
+def _check_tiff(page: Any, path: Path) -> None:
+    """Refuse a TIFF that claims too much, or some of whose strips or tiles are not in the file.
+
+    The library leaves those black.
+    """
+    size, width = path.stat().st_size, page.dtype.itemsize
+    palette = 3 if page.colormap is not None else 1
+    check_claim(math.prod(page.shaped) * palette, width, size, "it")
+    if page.is_tiled:
+        check_claim(math.prod(page.chunked) * math.prod(page.chunks), width, size, "its tiles")
+    places = list(zip(page.dataoffsets, page.databytecounts, strict=False))
+    wanted = math.prod(page.chunked)
+    there = [place for place in places[:wanted] if place[0] > 0 < place[1] and sum(place) <= size]
+    if len(there) < wanted:
+        raise ValueError(f"{wanted - len(there):,} of its {wanted:,} strips or tiles are missing")
+    if page.compression == 1 and isinstance(page.bitspersample, int):
+        *rows, across, channels = page.shaped
+        needed = math.prod(rows) * -(-across * channels * page.bitspersample // 8)
+        if sum(count for _, count in there) < needed:
+            raise ValueError(f"its strips or tiles have less than the {needed:,} bytes of its pixels")
+    if page.compression == _TIFF_JPEG:
+        with path.open("rb") as file:
+            for start, count in there:
+                file.seek(start)
+                _decode_jpeg(file.read(count), page.jpegtables)
+
+
+def _read_bmp(path: Path) -> NDArray[Any]:
+    from PIL import Image
+
+    data = path.read_bytes()
+    with Image.open(io.BytesIO(data), formats=("BMP",)) as picture:
+        check_claim(3 * picture.width * picture.height, 1, len(data), "it")
+        if picture.info["compression"] not in _PLAIN_BMP:
+            raise Unsuitable("this BMP is packed, which few programs do; save it as PNG")
+        if picture.mode == "P":
+            palette: Any = picture.palette  # its colours as the file has them
+            colours = len(palette.palette) // len(palette.rawmode)
+            if np.asarray(picture).max() >= colours:
+                raise ValueError(f"it has colours beyond the {colours} of its palette")
+        return np.asarray(picture.convert("RGB") if picture.mode in _PALETTE_NOT_GREY else picture)
+
+
+def _read_exr(path: Path) -> NDArray[Any]:
+    channels = read_exr_channels(path)
+    if {"R", "G", "B"} <= channels.keys():
+        picked = [channels[name] for name in "RGB"]
+    elif len(channels) == 1:
+        picked = list(channels.values())
+    elif "Y" in channels and channels.keys() <= {"Y", "A"}:
+        picked = [channels["Y"]]
+    else:
+        raise Unsuitable(
+            f"this OpenEXR file has the channels {', '.join(sorted(channels))[:200]}; "
+            "R, G, B or a single one is wanted"
+        )
+    alpha = channels.get("A")
+    if alpha is not None and not (alpha >= 1).all():
+        raise Unsuitable(NOT_OPAQUE)
+    samples = np.stack(picked, axis=-1) if len(picked) > 1 else np.array(picked[0])
+    return samples.astype(np.float32, copy=False)
+
+
+DECODERS: dict[str, Callable[[Path], NDArray[Any]]] = {
+    ".png": read_png,
+    ".jpg": _read_jpeg,
+    ".jpeg": _read_jpeg,
+    ".tif": _read_tiff,
+    ".tiff": _read_tiff,
+    ".bmp": _read_bmp,
+    ".exr": _read_exr,
+    ".npy": read_npy,
+    ".ppm": read_netpbm,
+    ".pgm": read_netpbm,
+}
+"""What reads a file, by its ending; any exception says what is wrong."""
