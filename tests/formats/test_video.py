@@ -226,3 +226,20 @@ def test_flights_that_cannot_be(tmp_path, light_field, name, options, message):
 def test_channels_that_a_video_does_not_have_are_refused(tmp_path, light_field):
     with pytest.raises(InputError, match="has 2"):
         video.save(light_field[..., :2], tmp_path / "a.mp4")
+
+
+def test_frames_that_need_no_bytes_have_an_end(tmp_path, monkeypatch):
+    """A frame that repeats the last one takes a few bytes: so many may unpack to any size."""
+    path = written(tmp_path / "a.mp4", np.zeros((6, 48, 64, 3), np.uint8))
+    monkeypatch.setattr(video, "LIGHT_FIELD", 5 * 48 * 64 * 3)
+    with pytest.raises(InputError, match=r"a\.mp4 claims 55,296 samples in .*take fewer frames with every="):
+        video.read(path)
+    assert video.read(path, every=2).values.shape == (1, 3, 48, 64, 3)
+
+
+def test_a_playlist_opens_no_other_file(tmp_path):
+    written(tmp_path / "real.mp4", np.zeros((3, 48, 64, 3), np.uint8))
+    path = tmp_path / "a.mp4"
+    path.write_text("ffconcat version 1.0\nfile real.mp4\n")
+    with pytest.raises(InputError, match=r"a\.mp4 cannot be read as a video"):
+        video.read(path)

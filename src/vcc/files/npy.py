@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.reading import check_file, reading
 
+_ZIP = b"PK\x03\x04"
+
 
 def read_npy(path: Path, what: str = "file") -> NDArray[Any]:
     """The array in a ``.npy``, in memory of its own that is no larger than the file.
@@ -24,14 +26,16 @@ def read_npy(path: Path, what: str = "file") -> NDArray[Any]:
     """
     check_file(path, what)
     with reading(path, "a NumPy array"):
+        with path.open("rb") as file:
+            several = file.read(len(_ZIP)) == _ZIP
+        if several:
+            raise InputError(f"{path} is not one array of NumPy's but several, an .npz: rename it")
         # Mapped, a file that states more than it holds is refused before there is memory for what it states.
         try:
-            mapped = np.load(path, mmap_mode="r", allow_pickle=False)
+            return np.array(np.lib.format.open_memmap(path, mode="r"))
         except ValueError as error:
             if "pickle" not in str(error) and "Python objects" not in str(error):
                 raise
-            raise InputError(f"{path} cannot be read as a NumPy array: it is none, or of objects") from error
-        if isinstance(mapped, np.ndarray):
-            return np.array(mapped)
-        mapped.close()
-    raise InputError(f"{path} is not one array of NumPy's but several, an .npz: rename it")
+            raise InputError(
+                f"{path} cannot be read as a NumPy array: it is none, or of objects. Save numbers only"
+            ) from error

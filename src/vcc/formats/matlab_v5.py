@@ -43,7 +43,7 @@ def _unpacked(data: bytes) -> bytes:
         body = data[place + 8 : place + 8 + length]
         if kind == _PACKED:
             stream = zlib.decompressobj()
-            body = stream.decompress(body, left)
+            body = stream.decompress(body, max(1, left))
             if not stream.eof:
                 raise ValueError(f"a variable of it is truncated, or unpacks to more than {left:,} bytes")
             parts.append(body)
