@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vcc.camera_file import load_camera as load_camera
     from vcc.formats import open_light_field as open_light_field
     from vcc.image import Image as Image
+    from vcc.image import load_image as load_image
     from vcc.light_field import LightField as LightField
     from vcc.optics import Biprism as Biprism
     from vcc.optics import CodedDiffuser as CodedDiffuser
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from vcc.prescriptions import load_lens as load_lens
     from vcc.recording import Recording as Recording
     from vcc.recording import expose_image as expose_image
+    from vcc.recording import load_recording as load_recording
     from vcc.run.photon_transfer import photon_transfer as photon_transfer
 
 __version__ = VERSION
@@ -68,7 +70,9 @@ _HOMES = {
     "Sensor": "vcc.optics.sensor",
     "expose_image": "vcc.recording",
     "load_camera": "vcc.camera_file",
+    "load_image": "vcc.image",
     "load_lens": "vcc.prescriptions",
+    "load_recording": "vcc.recording",
     "open_light_field": "vcc.formats",
     "photon_transfer": "vcc.run.photon_transfer",
 }

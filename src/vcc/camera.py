@@ -48,6 +48,7 @@ class Camera(Train):
     Args:
         elements: in any order; kept sorted by z. Elements at the same z commute.
         sensor: where the picture is recorded.
+        name: what pictures say made them, that of the camera's file where there is one; not compared.
 
     Raises:
         InputError: an element before the entrance plane or behind the sensor, two elements of one name.
@@ -134,12 +135,13 @@ class Camera(Train):
             self.sensor.frame,
             missing_rays=found.missing_rays,
             sampling_error=found.sampling_error,
+            camera=self,
         )
 
     def expose(
         self,
         light_field: Samples,
-        exposure: float | Literal["auto"],
+        exposure: float | Literal["auto"] = "auto",
         *,
         seed: int = 0,
         radiance: float = 1.0,

@@ -57,7 +57,7 @@ def load_camera(path: str | PathLike[str]) -> Camera:
             element (counted from 1) and the field.
     """
     train = read_train(path)
-    return Camera(train.elements, train.sensor)
+    return Camera(train.elements, train.sensor, name=train.name)
 
 
 def save_camera(camera: Camera, path: str | PathLike[str]) -> None:

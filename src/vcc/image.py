@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
@@ -11,10 +12,13 @@ from array_api_compat import array_namespace
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import short
 from vcc.fields.sampled import IMAGE_AXES, Index, indices, taken, to_numpy
 from vcc.files.pictures import Exposure, SavedPicture, save_picture
+from vcc.files.stated import clipping, light_of, read_stated, unknown
+from vcc.files.statement import CameraMark, Quantity, Statement
+from vcc.optics.train import Train
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,6 +35,7 @@ class Image:
         sampling_error: for a picture made by rays, its estimated error from sampling, root mean square over the
             pixels, in units of the values; 0 where nothing is sampled.
         inverted: whether this is a real, upside-down image (what a camera records), which `upright` turns.
+        camera: what made it, or what a file says of that; None where not known. Files that are written name it.
     """
 
     values: Any
@@ -38,6 +43,7 @@ class Image:
     missing_rays: float = 0.0
     sampling_error: float = 0.0
     inverted: bool = True
+    camera: Train | CameraMark | None = None
 
     def __post_init__(self) -> None:
         if len(self.values.shape) not in (2, 3):
@@ -94,6 +100,8 @@ class Image:
         - ``.exr``: linear float32, values untouched; channels R, G, B or Y
         - ``.npy``: linear float32, values untouched
 
+        Each file says what its numbers are (`vcc.files.statement`), and `load_image` gives the picture back.
+
         Args:
             path: where to.
             exposure: the factor that brings the values to the range 0…1 of an sRGB file. "auto" takes 1 over the
@@ -112,9 +120,52 @@ class Image:
                 values that are not finite, or a number of channels that the format cannot show.
         """
         shown = self.upright() if upright else self
-        return save_picture(shown.to_numpy(), path, exposure=exposure, bits=bits)
+        values = shown.to_numpy()
+        return save_picture(values, path, statement=shown._statement(), exposure=exposure, bits=bits)
+
+    def _statement(self) -> Statement:
+        """What the values are, for a file."""
+        mark = CameraMark.of(self.camera) if isinstance(self.camera, Train) else self.camera
+        quantity: Quantity = "light" if mark is None else "irradiance"
+        return Statement(quantity, upright=not self.inverted, frame=self.frame, camera=mark)
 
     def __repr__(self) -> str:
         pitch = short(self.pixel_area**0.5)
         missing = f", {self.missing_rays:.1%} of the rays missing" if self.missing_rays > 0 else ""
         return f"Image({'×'.join(map(str, self.shape))}, pixel {pitch}{missing})"
+
+
+def load_image(path: str | PathLike[str]) -> Image:
+    """The picture in a file that `Image.save` or `vcc.Recording.save` wrote, by what the file says of itself.
+
+    The sRGB curve and the exposure are undone, raw numbers become the irradiance that they tell of, as
+    `vcc.Recording.image` has it, and the picture lies as it was stored: ``inverted`` says how.
+
+    Args:
+        path: a PNG, TIFF, OpenEXR or .npy file.
+
+    Returns:
+        float32; of sRGB files within half a code of the file, divided by the exposure.
+
+    Raises:
+        InputError: a file that cannot be read, does not say what its numbers are or how large its pixels, or whose
+            numbers have been changed since it was written.
+
+    Warns:
+        ResultWarning: pixels were too bright when the file was written: they are lower bounds.
+    """
+    stated = read_stated(path)
+    said = stated.statement
+    if said is None:
+        raise InputError(
+            f"{unknown(stated)}: vcc.formats.pictures.read_picture gives its numbers as they are, for an "
+            "Image(values, frame) of your own"
+        )
+    if said.frame is None:
+        raise InputError(
+            f"{stated.path} does not say how large its pixels are, as a view of a folder does not: open the "
+            "folder with vcc.open_light_field"
+        )
+    if said.clipped and said.recording is None:
+        warnings.warn(clipping(stated), ResultWarning, stacklevel=2)
+    return Image(light_of(stated), said.frame, inverted=not said.upright, camera=said.camera)

@@ -12,8 +12,11 @@ import numpy as np
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import short
 from vcc.files.pictures import SavedPicture, save_numbers
+from vcc.files.stated import read_stated, unknown
+from vcc.files.statement import CameraMark, RawNumbers, Statement
 from vcc.image import Image
 from vcc.optics.sensor import Sensor
+from vcc.optics.train import Train
 from vcc.run.demosaic import Demosaicing, demosaic
 from vcc.run.expose import Exposure, RawPicture, below_zero
 from vcc.run.photon_transfer import PhotonTransfer as PhotonTransfer
@@ -24,7 +27,8 @@ from vcc.run.photon_transfer import photon_transfer as photon_transfer
 class Recording(RawPicture):
     """The digital numbers that a sensor gave, as they are read out, and what is needed to understand them.
 
-    Made by `vcc.Camera.expose` and `expose_image`; or of numbers kept in a file, with the camera's sensor.
+    Made by `vcc.Camera.expose` and `expose_image`; or of numbers kept in a file, with the camera's sensor
+    (`load_recording`).
 
     Args:
         values: digital numbers, uint8 (up to 8 bits) or uint16. (rows, columns) behind a colour filter or of grey
@@ -37,10 +41,13 @@ class Recording(RawPicture):
         saturated: the share of the pixels, 0 to 1, that were at full well or at the largest number (in any
             channel).
         missing_rays: the share of the rays that the camera asked for and the light field did not hold, 0 to 1.
+        camera: what made it, or what a file says of that; None where not known. Files that are written name it.
 
     Raises:
         InputError: a sensor without electronics, or values of another shape or type.
     """
+
+    camera: Train | CameraMark | None = None
 
     def image(self) -> Image:
         """The irradiance that the numbers tell of: what `vcc.Camera.capture` gives, and noise.
@@ -51,7 +58,7 @@ class Recording(RawPicture):
         Returns:
             float32 irradiance, shape of the values (behind a colour filter: each pixel in its own channel).
         """
-        return Image(self.irradiance(), self.frame, missing_rays=self.missing_rays)
+        return Image(self.irradiance(), self.frame, missing_rays=self.missing_rays, camera=self.camera)
 
     def demosaiced(self, method: Demosaicing | None = None) -> Image:
         """The picture in all channels, of a recording through a colour filter, in the unit of `image`.
@@ -77,29 +84,47 @@ class Recording(RawPicture):
                 "there is no colour filter to demosaic: every pixel recorded all that there is. Use image()"
             )
         values = demosaic(self.irradiance(), electronics, method)
-        return Image(values, self.frame, missing_rays=self.missing_rays)
+        return Image(values, self.frame, missing_rays=self.missing_rays, camera=self.camera)
 
     def save(self, path: str | PathLike[str]) -> SavedPicture:
         """Write the numbers untouched to a .tif, .png or .npy: linear, not scaled, upside down as recorded.
 
-        A TIFF also says, as JSON in its description, what the numbers mean (exposure, gain, black level, filter).
+        The file also says, as JSON, what the numbers mean (exposure, gain, black level, filter, …; see
+        `vcc.files.statement`), and `load_recording` gives the recording back.
 
         Raises:
             InputError: another ending, channels that the format cannot hold, or a place that cannot be written.
         """
+        words = f"{self.electronics.bit_depth}-bit raw, {self.electronics.filter_in_words}, {self._in_words()}"
+        return save_numbers(self.values, path, self._statement(), words)
+
+    def _statement(self) -> Statement:
+        """What the numbers are, for a file."""
+        return Statement(
+            "digital numbers",
+            upright=False,
+            clipped=self.saturated,
+            full_scale=float(self.electronics.largest_number),
+            frame=self.frame,
+            camera=CameraMark.of(self.camera) if isinstance(self.camera, Train) else self.camera,
+            recording=self._raw_numbers(),
+        )
+
+    def _raw_numbers(self) -> RawNumbers:
+        """What the numbers stand for."""
         electronics = self.electronics
-        meaning = {
-            "exposure_seconds": self.exposure,
-            "gain_dn_per_electron": electronics.gain,
-            "black_level_dn": electronics.black_level,
-            "bit_depth": electronics.bit_depth,
-            "full_well_electrons": electronics.full_well,
-            "color_filter": electronics.color_filter,
-            "radiance_of_1_in_w_per_m2_sr": self.radiance,
-            "seed": self.seed,
-        }
-        words = f"{electronics.bit_depth}-bit raw, {electronics.filter_in_words}, {self._in_words()}"
-        return save_numbers(self.values, path, meaning, words, self.saturated)
+        return RawNumbers(
+            exposure_seconds=self.exposure,
+            gain_dn_per_electron=electronics.gain,
+            black_level_dn=electronics.black_level,
+            dark_level_dn=electronics.black_level + electronics.gain * electronics.dark_current * self.exposure,
+            dn_per_irradiance=tuple(electronics.gain * freed for freed in self._electrons_per_light()),
+            bit_depth=electronics.bit_depth,
+            full_well_electrons=electronics.full_well,
+            color_filter=electronics.color_filter,
+            radiance_of_1_in_w_per_m2_sr=self.radiance,
+            seed=self.seed,
+        )
 
     def _in_words(self) -> str:
         return f"exposed {short(self.exposure, 'time', 4)}, {self.saturated:.2%} of the pixels saturated"
@@ -124,7 +149,7 @@ class Recording(RawPicture):
 def expose_image(
     image: Image,
     sensor: Sensor,
-    exposure: float | Literal["auto"],
+    exposure: float | Literal["auto"] = "auto",
     *,
     seed: int = 0,
     radiance: float = 1.0,
@@ -168,4 +193,43 @@ def recorded(image: Image, exposure: Exposure) -> Recording:
     caution = below_zero(light)
     if caution is not None:
         warnings.warn(caution, ResultWarning, stacklevel=3)
-    return Recording(**{each.name: getattr(raw, each.name) for each in fields(raw)})
+    return Recording(**{each.name: getattr(raw, each.name) for each in fields(raw)}, camera=image.camera)
+
+
+def load_recording(path: str | PathLike[str], sensor: Sensor) -> Recording:
+    """The recording in a file that `Recording.save` wrote.
+
+    Args:
+        path: a TIFF, PNG or .npy file.
+        sensor: what recorded it, with electronics; a file tells only what its numbers stand for.
+
+    Raises:
+        InputError: a file that cannot be read, that does not say that it is such a recording, or whose numbers
+            have been changed since it was written; a sensor that the file contradicts.
+    """
+    stated = read_stated(path)
+    said = stated.statement
+    if said is None or said.recording is None:
+        is_none = unknown(stated) if said is None else f"{path} says that its numbers are {said.in_words}"
+        raise InputError(
+            f"{is_none}, not those of a recording: vcc.load_image reads pictures, and vcc.Recording takes "
+            "numbers, a sensor and an exposure time"
+        )
+    numbers = said.recording
+    found = Recording(
+        stated.samples,
+        sensor,
+        numbers.exposure_seconds,
+        numbers.radiance_of_1_in_w_per_m2_sr,
+        numbers.seed,
+        said.clipped or 0.0,
+        camera=said.camera,
+    )
+    own = found._raw_numbers()
+    wrong = numbers.unlike(own)
+    if wrong is not None:
+        raise InputError(
+            f"{path} says that {wrong} is {getattr(numbers, wrong)}, and with this sensor it is "
+            f"{getattr(own, wrong)}: give the one that recorded it"
+        )
+    return found

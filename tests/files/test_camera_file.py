@@ -37,6 +37,7 @@ from vcc.base.units import deg, mm, nm, um
 from vcc.camera_file import ELEMENT_KINDS, KERNEL_NAMES, PATTERN_NAMES, SURFACE_NAMES, save_camera
 from vcc.files.camera_reading import read_train
 from vcc.files.camera_writing import write_train
+from vcc.files.statement import CameraMark
 from vcc.optics.train import Train
 from vcc.shapes import kernels, patterns, surfaces
 from vcc.shapes.lattice import CellApertures, CellBlock, Lattice
@@ -212,7 +213,10 @@ EVERYTHING = Camera(
 
 def test_round_trip_is_exact(tmp_path):
     EVERYTHING.save(tmp_path / "everything.toml")
-    assert load_camera(tmp_path / "everything.toml") == EVERYTHING
+    back = load_camera(tmp_path / "everything.toml")
+    assert back == EVERYTHING
+    assert (back.name, EVERYTHING.name) == ("everything", "")
+    assert CameraMark.of(back).hash == CameraMark.of(EVERYTHING).hash is not None
     assert {file.name for file in tmp_path.iterdir()} == {
         "everything.toml",
         "everything_coded_1.npy",

@@ -472,7 +472,7 @@ def test_a_truncated_picture_is_named(views: Views, folder_of: Write) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"transfer": "gamma"}, "transfer is 'auto', 'srgb' or 'linear', not 'gamma'"),
+        ({"transfer": "gamma"}, "transfer is one of 'auto', 'srgb', 'linear' or 'as-is', not 'gamma'"),
         ({"orientation": "up"}, "'flip-both'.*not 'up'"),
         ({"spacing": 0}, "spacing must be greater than 0"),
         ({"slope_per_pixel": -1}, "slope_per_pixel must be greater than 0"),

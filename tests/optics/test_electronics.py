@@ -550,12 +550,15 @@ def test_raw_files_hold_the_numbers(tmp_path, ending, bits):
     assert "upside down" in saved.description
 
 
-def test_raw_tiffs_say_what_the_numbers_mean(tmp_path):
+def test_raw_files_say_what_the_numbers_mean(tmp_path):
     on = sensor(Electronics(color_filter=XTRANS))
     got = vcc.expose_image(picture((1.0, 0.5, 0.2), on), on, 1e-2, seed=4)
     got.save(tmp_path / "raw.tif")
     with tifffile.TiffFile(tmp_path / "raw.tif") as file:
-        meaning = json.loads(file.pages.first.description)
+        said = json.loads(file.pages.first.description)
+    assert (said["quantity"], said["transfer"]) == ("digital numbers", "linear")
+    assert said["orientation"] == "as recorded"
+    meaning = said["recording"]
     assert meaning["black_level_dn"] == 64
     assert meaning["exposure_seconds"] == 1e-2
     assert meaning["color_filter"] == list(XTRANS)

@@ -11,7 +11,17 @@ from cyclopts import Group, Parameter
 from vcc import __version__
 from vcc.base.errors import InputError
 from vcc.cli.console import free_output, progress, show
-from vcc.cli.options import Arrangement, FileKind, LightFieldFile, OutputFile, Overwrite, Reading, Whole, told
+from vcc.cli.options import (
+    Arrangement,
+    FileKind,
+    LightFieldFile,
+    OutputFile,
+    Overwrite,
+    Reading,
+    ViewExposure,
+    Whole,
+    told,
+)
 from vcc.cli.store_words import written
 from vcc.formats import read_geometry
 from vcc.formats.writing import save_light_field
@@ -63,6 +73,7 @@ def convert(
     /,
     *,
     kind: FileKind | None = None,
+    exposure: ViewExposure = 1.0,
     overwrite: Overwrite = False,
     storing: Storing = Storing(),
     reading: Reading = Reading(),
@@ -73,8 +84,9 @@ def convert(
         InputError: an output that is there, or what reading and writing refuse.
     """
     if output.suffix.lower() == ".zarr":
-        if kind:
-            raise InputError("--kind is for folders and pictures of views: OUT is a store")
+        if kind or exposure != 1:
+            option = "--kind" if kind else "--exposure"
+            raise InputError(f"{option} is for folders and pictures of views: OUT is a store")
         packing = storing.packing()
         output = free_output(output, overwrite)
         show(_to_store(light_field, output, storing, packing, overwrite, reading))
@@ -86,7 +98,8 @@ def convert(
         output = free_output(output, overwrite)
         field = reading.light_field(light_field)
         with progress("Writing views") as advance:
-            show(save_light_field(field, output, kind=kind, progress=advance).description)
+            exposed = {} if exposure == 1 else {"exposure": exposure}
+            show(save_light_field(field, output, kind=kind, progress=advance, **exposed).description)
 
 
 def _to_store(
@@ -120,10 +133,12 @@ def _with_its_codes(
         return reading.light_field(source), "linear", None
     facts = read_geometry(source, **reading.given(Arrangement))
     assumed = [name for name in facts.unknown if getattr(reading, name) is None]
-    field = dataclasses.replace(reading, transfer="linear").in_memory(source)
-    if field.values.dtype.kind != "u":
+    facts.stated.check(reading.transfer)
+    as_stored, transfer = facts.codes
+    field = dataclasses.replace(reading, transfer=as_stored).in_memory(source)
+    if field.values.dtype.kind != "u" or reading.transfer == "as-is":
         return field, "linear", assumed
-    return field, facts.transfer if reading.transfer == "auto" else reading.transfer, assumed
+    return field, transfer if reading.transfer == "auto" else reading.transfer, assumed
 
 
 def _provenance(source: Path, assumed: list[str]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from vcc.camera_file import load_camera
 from vcc.cli.console import free_output, progress, show
 from vcc.cli.decode_cosines import Cosines, through_a_mask
 from vcc.cli.decode_lenslets import Lenslets, through_lenslets
-from vcc.cli.options import Factor, FolderNames, OutputFile, Overwrite, told
+from vcc.cli.options import FolderNames, OutputFile, Overwrite, ViewExposure, told
 from vcc.cli.raw_recordings import Recorded
 from vcc.formats.writing import kind_of, save_light_field
 from vcc.light_field import LightField
@@ -27,15 +27,10 @@ from vcc.shapes.patterns import CosineSum
 @Parameter(name="*", group=Group("The light field", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class Written:
-    """How the light field is written.
-
-    Args:
-        exposure: Factor to the brightness of a folder's or film's views. auto shows the brightest parts white.
-            Other formats keep the numbers.
-    """
+    """How the light field is written."""
 
     kind: FolderNames | None = None
-    exposure: Factor = "auto"
+    exposure: ViewExposure = 1.0
     overwrite: Overwrite = False
 
 
@@ -43,8 +38,8 @@ def decode(
     raw: Annotated[
         Path,
         Parameter(
-            help="The recording: a picture whose numbers are proportional to light, as vcc expose or a real "
-            "camera writes it, or a Lytro file, .lfp or .lfr."
+            help="The recording: a picture that says what its numbers are, as vcc expose and vcc capture write "
+            "it; a real camera's, with --transfer and --upside-down or --upright; or a Lytro file, .lfp or .lfr."
         ),
     ],
     /,
@@ -104,12 +99,10 @@ def write(field: LightField, output: Path, written: Written, source: Path) -> No
         InputError: what `vcc.formats.writing.save_light_field` refuses.
     """
     ending = output.suffix.lower()
-    options: dict[str, Any] = {}
+    options: dict[str, Any] = {} if written.exposure == 1 else {"exposure": written.exposure}
     if ending == ".zarr":
         made = {"decoded_from": source.name, "decoded_by": f"vcc {__version__}, vcc decode"}
-        options = {"provenance": made, "overwrite": written.overwrite}
-    elif ending in ("", ".mp4") or written.kind is not None:
-        options = {"exposure": written.exposure}
+        options |= {"provenance": made, "overwrite": written.overwrite}
     with progress("Writing views") as advance:
         show(save_light_field(field, output, kind=written.kind, progress=advance, **options).description)
 

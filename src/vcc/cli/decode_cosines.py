@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vcc.camera import Camera
 from vcc.cli.console import progress
 from vcc.cli.options import File
-from vcc.cli.raw_recordings import Recorded, read_raw
+from vcc.cli.raw_recordings import Recorded, check_camera, read_raw
 from vcc.light_field import LightField
 from vcc.optics.electronics import Electronics
 from vcc.recover import decode_heterodyne
@@ -45,17 +45,16 @@ def through_a_mask(path: Path, camera: Camera, recorded: Recorded, given: Cosine
     Raises:
         InputError: what `vcc.recover.decode_heterodyne` refuses.
     """
-    raw = read_raw(path, camera, None, recorded.black)
-    shadow = (
-        None if given.calibration is None else read_raw(given.calibration, camera, None, recorded.black).light()
-    )
+    raw = read_raw(path, camera, None, recorded)
+    check_camera(raw, camera, recorded.camera)
+    # Of the same camera and a pinhole: another hash, and that is no contradiction.
+    shadow = None if given.calibration is None else read_raw(given.calibration, camera, None, recorded).light()
     light: NDArray[Any] = raw.light()
     with progress("Decoding"):
         if raw.color_filter is not None:
             light = demosaic(light.astype(np.float32), Electronics(color_filter=raw.color_filter), "bilinear")
-        if recorded.upright:
-            light, shadow = light[::-1, ::-1], None if shadow is None else shadow[::-1, ::-1]
         field = decode_heterodyne(
             light, camera, calibration=shadow, border=given.border, memory_limit=recorded.memory_limit
         )
-    return field, f"spectral tiles rearranged, calibration {'simulated' if shadow is None else 'given'}"
+    words = f"spectral tiles rearranged, calibration {'simulated' if shadow is None else 'given'}"
+    return field, "; ".join(filter(None, (words, raw.in_words)))

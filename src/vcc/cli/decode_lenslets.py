@@ -13,7 +13,7 @@ from vcc.camera import Camera
 from vcc.cli.console import progress
 from vcc.cli.lenslet_centres import grid_of
 from vcc.cli.options import File, Whole
-from vcc.cli.raw_recordings import RawRecording, Recorded, read_raw
+from vcc.cli.raw_recordings import RawRecording, Recorded, check_alike, check_camera, read_raw
 from vcc.light_field import LightField
 from vcc.recover import LensletGrid, decode_plenoptic, find_lenslets
 
@@ -61,9 +61,16 @@ def through_lenslets(
     """
     if given.dark is not None and recorded.black is not None:
         raise InputError("--black is said pixel by pixel by --dark: leave it out")
-    raw = read_raw(path, camera, given.color_filter, recorded.black)
-    white = None if given.white is None else read_raw(given.white, camera, given.color_filter, recorded.black)
-    dark = raw.black if given.dark is None else read_raw(given.dark, camera, given.color_filter, None).numbers
+    raw = read_raw(path, camera, given.color_filter, recorded)
+    others = [
+        None if each is None else read_raw(each, camera, given.color_filter, recorded)
+        for each in (given.white, given.dark)
+    ]
+    for each in filter(None, (raw, *others)):
+        check_alike(raw, each)
+        check_camera(each, camera, recorded.camera)
+    white, darkness = others
+    dark = raw.black if darkness is None else darkness.numbers
     listed = None
     if given.centres is not None:
         bright = raw if white is None else white
@@ -80,7 +87,6 @@ def through_lenslets(
             color_filter=tile,
             views=given.views,
             view_step=given.view_step,
-            inverted=not recorded.upright,
             memory_limit=recorded.memory_limit,
         )
     if white is None and raw.scale != 1:
@@ -90,7 +96,8 @@ def through_lenslets(
         f"micro-images {source}, a {grid.layout} lattice of {grid.pitch:.3f} pixels turned by "
         f"{np.degrees(grid.rotation):.2f}°{off}"
     )
-    return field, words if white is None else f"{words}; divided by {white.path.name}"
+    divided = "" if white is None else f"divided by {white.path.name}"
+    return field, "; ".join(filter(None, (words, divided, raw.in_words)))
 
 
 def _lattice(

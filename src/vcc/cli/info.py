@@ -26,8 +26,7 @@ from vcc.formats.lytro_lfp import read_lytro
 from vcc.light_field import LightField
 from vcc.store import is_store, open_store
 
-LINEAR = Reading(transfer="linear")
-"""Linear keeps the type of the files: disparities do not need light, and memory is short."""
+AS_STORED = Reading(transfer="as-is")
 _NAMED_AT_MOST = 12
 
 
@@ -51,13 +50,13 @@ def info(
     """
     if picture is not None:
         picture = check_output(picture, DRAWINGS)
-    how = replace(LINEAR, **cameras.given(), **arrangement.given())
+    how = replace(AS_STORED, **cameras.given(), **arrangement.given())
     show(describe(light_field, how, quick=quick, picture=picture, keep=keep))
 
 
 def describe(
     light_field: Path,
-    how: Reading = LINEAR,
+    how: Reading = AS_STORED,
     *,
     quick: bool = False,
     picture: Path | None = None,
@@ -84,7 +83,7 @@ def describe(
             kept = {}
             if keep:
                 kept["kept"] = f"{keep_geometry(path, **how.given(ViewCameras), **how.given(Arrangement))}"
-                how = replace(LINEAR, **how.given(Arrangement))
+                how = replace(AS_STORED, **how.given(Arrangement))
             lines = _of_files(path, quick, picture, how) | kept
     width = max(map(len, lines)) + 2
     return "\n".join(f"{name:<{width}}{shown(value)}" for name, value in lines.items())
@@ -105,16 +104,18 @@ def _of_files(path: Path, quick: bool, picture: Path | None, how: Reading) -> di
 def _measured(path: Path, facts: FolderInfo, quick: bool, picture: Path | None, how: Reading) -> dict[str, str]:
     """What the views show, by names."""
     lines = {}
+    # Numbers as they are stored, where they can be had: disparities do not need light, and memory is short.
+    as_stored, transfer = facts.codes
     if facts.missing:
         where = how.given(Arrangement)
-        sparse = open_sparse_views(path, transfer="linear", **how.given(ViewCameras), **where)
+        sparse = open_sparse_views(path, transfer=as_stored, **how.given(ViewCameras), **where)
         held = dict(zip(sparse.places, sparse.pictures, strict=True))
-        views = Views(held.get, sparse.shape, sparse.frame, facts.transfer)
+        views = Views(held.get, sparse.shape, sparse.frame, transfer)
         disparities = "" if quick else _sparse_disparities(sparse, facts)
     else:
-        whole = how.in_memory(path)
+        whole = replace(how, transfer=as_stored).in_memory(path)
         values = whole.values
-        views = Views(lambda place: values[place], (facts.rows, facts.columns), whole.frame, facts.transfer)
+        views = Views(lambda place: values[place], (facts.rows, facts.columns), whole.frame, transfer)
         disparities = "" if quick else _disparities(whole, facts)
     if not quick:
         lines = {"disparities": disparities, **_light(views)}

@@ -41,6 +41,8 @@ def grid_of(path: Path, order: str | None, first: int, bright: RawRecording) -> 
     if (order or said or "x-y") == "row-column":
         places = places[:, ::-1]
     rows, columns = bright.numbers.shape[:2]
+    if bright.turned:  # the list counts the file's pixels
+        places = (columns - 1, rows - 1) - places
     outside = float(np.mean((places < -0.5).any(axis=1) | (places > (columns - 0.5, rows - 0.5)).any(axis=1)))
     if outside > 0.5:
         raise InputError(

@@ -185,6 +185,14 @@ FileKind = Annotated[
         "views (mosaic)."
     ),
 ]
+ViewExposure = Annotated[
+    float | Literal["auto"],
+    quantity("auto|NUMBER", auto_or(above_zero), written=lambda factor: f"{factor:g}"),
+    Parameter(
+        help="Factor to the brightness of a folder's or film's views; auto shows the brightest parts white. Other "
+        "formats keep the numbers, and take none."
+    ),
+]
 Overwrite = Annotated[bool, Parameter(help="Replace what has that name.")]
 
 
@@ -258,12 +266,13 @@ class Reading(Arrangement, ViewCameras):
 
     Args:
         transfer: How pixel values of the views stand for light: srgb, as pictures for people do, linear
-            (proportional to it), or auto: as the format says, srgb where it says nothing. A store is linear light.
+            (proportional to it), or auto: as the files say, srgb where they say nothing. as-is takes the stored
+            numbers as linear, whatever they say. A store is linear light.
         orientation: Which way rows and columns of views run. auto checks it by parallax and puts it right; as-is
             takes the files as they are.
     """
 
-    transfer: Literal["auto", "srgb", "linear"] = "auto"
+    transfer: Literal["auto", "srgb", "linear", "as-is"] = "auto"
     orientation: Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"] = "auto"
 
     def light_field(self, path: Path) -> LightField | StoredLightField:

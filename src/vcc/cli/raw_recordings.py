@@ -1,21 +1,28 @@
 """Raw recordings read from files: their numbers, and what those stand for."""
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from cyclopts import Parameter
 from numpy.typing import NDArray
 
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, ResultWarning
 from vcc.base.reading import expanded
 from vcc.cli.options import Size
-from vcc.files.pictures import READ_ENDINGS, read_picture
+from vcc.files import transfer
+from vcc.files.pictures import READ_ENDINGS
+from vcc.files.stated import StatedPicture, check_told, clipping, light_of, read_stated, unknown
+from vcc.files.statement import CameraMark, Statement
 from vcc.formats.lytro_lfp import read_lytro
+from vcc.optics.electronics import Electronics
 from vcc.optics.train import Train
 
 _LYTRO = (".lfp", ".lfr")
+
+Tile = str | tuple[str, ...]
 
 
 @Parameter(name="*")
@@ -26,36 +33,42 @@ class Recorded:
     Args:
         camera: What recorded it: lenses and, last, an array of lenslets; or lenses and a mask of cosines. With it
             distances are right; without it only disparities are.
+        transfer: How the numbers of files that do not say it stand for light: linear (proportional to it), as raw
+            numbers do, or srgb, as pictures for people do.
+        upright: How files that do not say it lie: upright as people see it, or upside down as on a sensor.
         black: The number in RAW that stands for no light. Default: what --dark, the camera's electronics or the
             Lytro file say, or 0.
-        upright: The recording has been turned upright (vcc capture does that, vcc expose does not). Default: it is
-            upside down, as it lies on a sensor.
         memory_limit: What the light field may take, "1.5 GB".
     """
 
     camera: Annotated[Path | None, Parameter(metavar="CAMERA.toml")] = None
+    transfer: Literal["linear", "srgb"] | None = None
+    upright: Annotated[bool | None, Parameter(negative="--upside-down")] = None
     black: float | None = None
-    upright: bool = False
     memory_limit: Size | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class RawRecording:
-    """A recording read: its numbers as they are, and what they stand for.
+    """A recording read: its numbers as they lie on a sensor, upside down, and what they stand for.
 
     Args:
         path: the file.
-        numbers: (rows, columns[, channels]).
+        numbers: (rows, columns[, channels]); irradiance where the file says what its own numbers are.
         black: what stands for no light, (rows, columns), or None for 0.
-        largest: what stands for the most light; 1 where nothing is known.
+        largest: what stands for the most light; 1 where nothing is known, and of irradiance.
         color_filter: of a mosaic.
+        turned: whether the file has it upright.
+        statement: what the file says of its numbers; None where they are as told, or of a Lytro camera.
     """
 
     path: Path
     numbers: NDArray[Any]
     black: NDArray[np.float32] | None
     largest: float
-    color_filter: str | tuple[str, ...] | None
+    color_filter: Tile | None
+    turned: bool = False
+    statement: Statement | None = None
 
     def light(self) -> NDArray[np.float64]:
         """0 for none, 1 for the most."""
@@ -69,46 +82,167 @@ class RawRecording:
         """From no light to the most, in numbers."""
         return self.largest - (0.0 if self.black is None else float(self.black.mean()))
 
+    @property
+    def in_words(self) -> str:
+        """What the file says, for people; empty where it says nothing."""
+        return "" if self.statement is None else f"{self.path.name} says: {self.statement.in_words}"
 
-def read_raw(path: Path, camera: Train | None, color_filter: str | None, black: float | None) -> RawRecording:
-    """A picture or a Lytro file; black level and colour filter as told, or as the camera or the file say.
+
+def read_raw(path: Path, camera: Train | None, color_filter: str | None, recorded: Recorded) -> RawRecording:
+    """A picture or a Lytro file; what its numbers are is as the file says, or else as told.
 
     Args:
         path: the file.
-        camera: whose electronics tell, if it has any.
-        color_filter: of a mosaic.
-        black: the number that stands for no light.
+        camera: whose electronics tell of numbers that do not say what they are, if it has any.
+        color_filter: of a mosaic, as the file has it.
+        recorded: what was told.
 
     Raises:
-        InputError: a file that cannot be read, or a colour filter other than the camera's or the file's.
+        InputError: a file that cannot be read, that neither says nor is told what its numbers are, or that says
+            otherwise than told.
+
+    Warns:
+        ResultWarning: something was lost when it was written: pixels too bright, or all but 8 bits.
     """
     path = expanded(path)
     if path.suffix.lower() in _LYTRO:
-        lytro = read_lytro(path)
-        if color_filter not in (None, lytro.color_filter):
-            raise InputError(f"{path} says that its mosaic is {lytro.color_filter}: leave out --color-filter")
-        levels = lytro.black or (0.0,) * 4 if black is None else (black,) * 4
-        dark = np.empty(lytro.mosaic.shape, np.float32)
-        for place, number in enumerate(levels):
-            dark[place // 2 :: 2, place % 2 :: 2] = number
-        most = 2.0**lytro.bits - 1 if lytro.white is None else float(np.mean(lytro.white))
-        return RawRecording(path, lytro.mosaic, dark, most, lytro.color_filter)
+        return _read_lytro(path, color_filter, recorded)
     if path.suffix.lower() not in READ_ENDINGS:
         known = ", ".join((*READ_ENDINGS, *_LYTRO))
         raise InputError(f"{path} is no recording that can be read: its name must end in {known}")
-    numbers, _ = read_picture(path)
-    if numbers.ndim == 3 and numbers.shape[2] == 1:
-        numbers = numbers[..., 0]
+    picture = read_stated(path)
+    if picture.statement is not None:
+        return _stated(picture, picture.statement, color_filter, recorded)
+    return _told(picture, camera, color_filter, recorded)
+
+
+def check_alike(raw: RawRecording, other: RawRecording | None) -> None:
+    """Refuse another recording whose numbers are of another kind.
+
+    Raises:
+        InputError: one file says what its numbers are, and the other does not.
+    """
+    if other is not None and (raw.statement is None) != (other.statement is None):
+        says, silent = (raw, other) if other.statement is None else (other, raw)
+        raise InputError(
+            f"{says.in_words}, and {silent.path} does not say what its numbers are: they are not of one kind. "
+            "Give recordings that were written alike"
+        )
+
+
+def check_camera(raw: RawRecording, camera: Train | None, told: Path | None) -> None:
+    """Say so where another camera than that of the camera file made a recording.
+
+    Warns:
+        ResultWarning: it did.
+    """
+    made = None if raw.statement is None else raw.statement.camera
+    if camera is None or told is None or made is None or made.hash is None:
+        return
+    given = CameraMark.of(camera)
+    if given.hash is not None and given.hash != made.hash:
+        warnings.warn(
+            f"{raw.path} says that {made} made it, and {told} is another camera ({given.hash}): views and "
+            "distances are right only if the difference does not matter",
+            ResultWarning,
+            stacklevel=2,
+        )
+
+
+def _read_lytro(path: Path, color_filter: str | None, recorded: Recorded) -> RawRecording:
+    lytro = read_lytro(path)
+    if color_filter not in (None, lytro.color_filter):
+        raise InputError(f"{path} says that its mosaic is {lytro.color_filter}: leave out --color-filter")
+    if recorded.transfer == "srgb":
+        raise InputError(f"{path} holds raw numbers, which are linear: leave out --transfer")
+    levels = lytro.black or (0.0,) * 4 if recorded.black is None else (recorded.black,) * 4
+    dark = np.empty(lytro.mosaic.shape, np.float32)
+    for place, number in enumerate(levels):
+        dark[place // 2 :: 2, place % 2 :: 2] = number
+    most = 2.0**lytro.bits - 1 if lytro.white is None else float(np.mean(lytro.white))
+    return _as_recorded(RawRecording(path, lytro.mosaic, dark, most, lytro.color_filter, bool(recorded.upright)))
+
+
+def _stated(picture: StatedPicture, said: Statement, color_filter: str | None, recorded: Recorded) -> RawRecording:
+    """Of a file that says what its numbers are: irradiance."""
+    path = picture.path
+    check_told(path, said, recorded.transfer or "")
+    if recorded.upright not in (None, said.upright):
+        option = "--upright" if recorded.upright else "--upside-down"
+        raise InputError(f"{path} says that its numbers are {said.in_words}: leave out {option}")
+    if recorded.black is not None:
+        raise InputError(f"{path} says that its numbers are {said.in_words}: leave out --black")
+    tile: Tile | None = color_filter
+    if said.recording is not None:
+        tile = said.recording.color_filter
+        if color_filter not in (None, tile):
+            raise InputError(f"{path} says that its colour filter is {tile}: leave out --color-filter")
+    if said.clipped and said.recording is None:
+        warnings.warn(clipping(picture), ResultWarning, stacklevel=2)
+    if said.transfer == "srgb" and picture.samples.dtype == np.uint8:
+        warnings.warn(
+            f"{path} has 8 bits: light is known to a step of the sRGB curve, up to 0.9 % of white. 16 bits "
+            "(.tif), .exr and .npy keep more",
+            ResultWarning,
+            stacklevel=2,
+        )
+    return _as_recorded(RawRecording(path, light_of(picture), None, 1.0, tile, said.upright, said))
+
+
+def _told(
+    picture: StatedPicture, camera: Train | None, color_filter: str | None, recorded: Recorded
+) -> RawRecording:
+    """Of a file that does not say what its numbers are."""
+    path, numbers, black = picture.path, picture.samples, recorded.black
     whole = numbers.dtype.kind == "u"
+    missing = []
+    if whole and recorded.transfer is None:
+        missing.append("--transfer linear (raw numbers, proportional to light) or srgb (a picture for people)")
+    if recorded.upright is None:
+        missing.append("--upside-down (as light lies on a sensor) or --upright (as people see it)")
+    if missing:
+        raise InputError(f"{unknown(picture)}: say it with {', and with '.join(missing)}")
+    if recorded.transfer == "srgb":
+        if not whole or black:
+            why = "--black counts raw numbers" if whole else "it holds floating point, which is linear"
+            raise InputError(f"{path} cannot be taken as sRGB, because {why}: leave out --transfer srgb")
+        numbers, whole = transfer.decode(numbers), False
     largest = float(np.iinfo(numbers.dtype).max) if whole else 1.0
     electronics = None if camera is None else camera.sensor.electronics
+    turned = bool(recorded.upright)
     if electronics is None or not whole:
         level = None if black is None else np.full(numbers.shape[:2], black, np.float32)
-        return RawRecording(path, numbers, level, largest, color_filter)
+        return _as_recorded(RawRecording(path, numbers, level, largest, color_filter, turned))
     if color_filter is not None and electronics.color_filter not in (None, color_filter):
         raise InputError(
             f"the camera file says that the colour filter is {electronics.color_filter}: leave out --color-filter"
         )
     even = np.full(numbers.shape[:2], electronics.black_level if black is None else black, np.float32)
     largest = min(electronics.black_level + electronics.gain * electronics.full_well, electronics.largest_number)
-    return RawRecording(path, numbers, even, largest, electronics.color_filter or color_filter)
+    found = _as_recorded(RawRecording(path, numbers, even, largest, color_filter, turned))
+    return replace(found, color_filter=electronics.color_filter or found.color_filter)
+
+
+def _as_recorded(raw: RawRecording) -> RawRecording:
+    """As it lies on the sensor, upside down: what was turned, is turned back, its tile of filters too."""
+    if not raw.turned:
+        return raw
+    black = None if raw.black is None else raw.black[::-1, ::-1]
+    tile = None if raw.color_filter is None else turned_tile(raw.color_filter, raw.numbers.shape)
+    return replace(raw, numbers=raw.numbers[::-1, ::-1], black=black, color_filter=tile)
+
+
+def turned_tile(tile: Tile, shape: tuple[int, ...]) -> Tile:
+    """The tile of filters of a mosaic of that shape when it is turned by 180°.
+
+    Raises:
+        InputError: what `vcc.Electronics` refuses.
+    """
+    known = Electronics(color_filter=tile).color_filter
+    assert known is not None
+    rows = (known[:2], known[2:]) if isinstance(known, str) else known
+    down, across = len(rows), len(rows[0])
+    return tuple(
+        "".join(rows[(shape[0] - 1 - row) % down][(shape[1] - 1 - column) % across] for column in range(across))
+        for row in range(down)
+    )

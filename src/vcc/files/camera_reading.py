@@ -65,7 +65,7 @@ def _train_of(tables: Mapping[str, Any], file: Path) -> Train:
     built = [_read_element(entry, number, file) for number, entry in enumerate(elements, start=1)]
     sensor = _build(Sensor, tables["sensor"], f"{file}: sensor", file.parent)
     with checks.within(f"{file}"):
-        return Train(built, sensor)
+        return Train(built, sensor, name=file.stem)
 
 
 def _read_toml(file: Path) -> dict[str, Any]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -17,6 +16,7 @@ from vcc.base.reading import check_file
 from vcc.files import transfer
 from vcc.files.atomic import atomic_path
 from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_png
+from vcc.files.statement import Statement, in_png, statement_of, tiff_tags, write_npy
 
 READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
 """The endings that `read_picture` knows."""
@@ -111,8 +111,10 @@ def read_grey(path: str | PathLike[str]) -> NDArray[np.float64]:
     floating-point values are the transmission itself.
 
     Raises:
-        InputError: what `read_picture` refuses, or a floating-point value outside 0…1.
+        InputError: what `read_picture` refuses, a floating-point value outside 0…1, or a picture that says that
+            its numbers are something else: coded for people, or a raw recording.
     """
+    refuse_coded(Path(path), "a mask's file states how much light passes")
     samples, bits = read_picture(path)
     values = samples.astype(np.float64) / (2**bits - 1 if bits < 32 else 1)
     if values.ndim == 3:
@@ -123,6 +125,24 @@ def read_grey(path: str | PathLike[str]) -> NDArray[np.float64]:
             f"{path} holds values from {low:g} to {high:g}: a transmission is between 0 and 1. Scale it"
         )
     return values
+
+
+def refuse_coded(path: Path, wanted: str) -> None:
+    """Refuse a picture that says of itself that its numbers are not simply proportional to what they state.
+
+    Args:
+        path: the picture.
+        wanted: what its numbers are to be, a clause for the message.
+
+    Raises:
+        InputError: it was written for people (sRGB, exposed), or as the raw numbers of a sensor.
+    """
+    said = statement_of(path)
+    if said is not None and (said.transfer == "srgb" or not said.is_neutral):
+        raise InputError(
+            f"{path} says that its numbers are {said.in_words}: {wanted}, so this is another picture. Write the "
+            "numbers themselves, with numpy.save or as .exr"
+        )
 
 
 @dataclass(frozen=True)
@@ -148,6 +168,7 @@ def save_picture(
     values: NDArray[np.float32],
     path: str | PathLike[str],
     *,
+    statement: Statement,
     exposure: Exposure = "auto",
     bits: int | None = None,
 ) -> SavedPicture:
@@ -156,6 +177,7 @@ def save_picture(
     Args:
         values: as they are to be seen, shape (rows, columns) or (rows, columns, channels).
         path: where to.
+        statement: what the values are; how they are written is added.
         exposure: see `vcc.Image.save`, likewise the bits and what is returned.
         bits: see there.
 
@@ -165,20 +187,19 @@ def save_picture(
     path = Path(path)
     ending = checks.ending("a picture", path, *WRITE_ENDINGS)
     save = _save_linear if ending in (".exr", ".npy") else _save_display
-    return save(_grey_if_one(values), path, exposure, bits)
+    return save(_grey_if_one(values), path, statement, exposure, bits)
 
 
 def save_numbers(
-    values: NDArray[Any], path: str | PathLike[str], meaning: dict[str, Any], words: str, saturated: float
+    values: NDArray[Any], path: str | PathLike[str], statement: Statement, words: str
 ) -> SavedPicture:
     """Write a camera's raw numbers as they are: linear, not scaled, not turned.
 
     Args:
         values: uint8 or uint16, shape (rows, columns) or (rows, columns, channels).
         path: where to, .tif, .tiff, .png or .npy.
-        meaning: what the numbers mean; a TIFF holds it as JSON in its description.
+        statement: what the numbers are; ``clipped`` is the share of the pixels that are saturated.
         words: the same for people.
-        saturated: the share of the pixels that are saturated, 0 to 1.
 
     Raises:
         InputError: another ending, a number of channels that the format does not have, or a place that cannot be
@@ -193,11 +214,11 @@ def save_numbers(
         )
     with atomic_path(path) as temporary:
         if ending == ".npy":
-            _write_npy(values, temporary)
+            write_npy(values, temporary, statement.text(values))
         else:
-            write_codes(values, temporary, ending, description=json.dumps(meaning))
+            write_codes(values, temporary, ending, statement)
     description = f"{path}: {_size(values)}, {words}; {values.dtype} numbers as recorded, upside down"
-    return SavedPicture(path, 1.0, saturated, description)
+    return SavedPicture(path, 1.0, statement.clipped or 0.0, description)
 
 
 def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
@@ -215,32 +236,36 @@ def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
 
 
 def write_codes(
-    codes: NDArray[Any], path: Path, ending: str, *, png_level: int | None = None, description: str | None = None
+    codes: NDArray[Any], path: Path, ending: str, statement: Statement, *, png_level: int | None = None
 ) -> None:
-    """Write stored numbers as they are, in a PNG or a TIFF.
+    """Write stored numbers as they are, in a PNG or a TIFF that says what they are.
 
     Args:
         codes: uint8 or uint16, shape (rows, columns) or (rows, columns, channels).
         path: where to; not atomic.
         ending: ".png"; any other is TIFF.
+        statement: what they are; of raw numbers the full scale stays, else it is that of the type.
         png_level: how hard a PNG is packed, 0 to 9; None for the library's own.
-        description: what a TIFF says of itself.
     """
     codes = np.ascontiguousarray(_grey_if_one(codes))
+    if statement.recording is None:
+        statement = replace(statement, full_scale=float(np.iinfo(codes.dtype).max))
+    text = statement.text(codes)
     if ending == ".png":
         import imagecodecs
 
-        path.write_bytes(imagecodecs.png_encode(codes, level=png_level))
+        path.write_bytes(in_png(bytes(imagecodecs.png_encode(codes, level=png_level)), statement, text))
         return
     import tifffile
 
     photometric = "rgb" if codes.ndim == 3 else "minisblack"
-    tifffile.imwrite(
-        path, codes, photometric=photometric, compression="zlib", metadata=None, description=description
-    )
+    tags = tiff_tags(statement, text)
+    tifffile.imwrite(path, codes, photometric=photometric, compression="zlib", metadata=None, **tags)
 
 
-def _save_linear(values: NDArray[np.float32], path: Path, exposure: Exposure, bits: int | None) -> SavedPicture:
+def _save_linear(
+    values: NDArray[np.float32], path: Path, statement: Statement, exposure: Exposure, bits: int | None
+) -> SavedPicture:
     ending = path.suffix.lower()
     if exposure not in ("auto", 1):
         raise InputError(
@@ -250,12 +275,14 @@ def _save_linear(values: NDArray[np.float32], path: Path, exposure: Exposure, bi
     if bits not in (None, 32):
         raise InputError(f"{ending} files hold 32-bit floating-point values, not {bits} bits")
     with atomic_path(path) as temporary:
-        (_write_npy if ending == ".npy" else _write_exr)(values, temporary)
+        (write_npy if ending == ".npy" else _write_exr)(values, temporary, statement.text(values))
     size = _size(values)
     return SavedPicture(path, 1.0, 0.0, f"{path}: {size}, linear float32, values untouched (exposure 1)")
 
 
-def _save_display(values: NDArray[np.float32], path: Path, exposure: Exposure, bits: int | None) -> SavedPicture:
+def _save_display(
+    values: NDArray[np.float32], path: Path, statement: Statement, exposure: Exposure, bits: int | None
+) -> SavedPicture:
     ending = path.suffix.lower()
     if bits is None:
         bits = 8 if ending == ".png" else 16
@@ -277,8 +304,9 @@ def _save_display(values: NDArray[np.float32], path: Path, exposure: Exposure, b
     exposed = values * np.float32(factor)
     clipped = _share_beyond(exposed > 1 + 0.5 / (2**bits - 1))  # what rounds to white is not lost
     negative = _share_beyond(exposed < 0)
+    said = replace(statement, transfer="srgb", exposure=factor, automatic=automatic, clipped=clipped)
     with atomic_path(path) as temporary:
-        write_codes(transfer.encode(exposed, bits), temporary, ending)
+        write_codes(transfer.encode(exposed, bits), temporary, ending, said)
     reason = " (auto: the 99.5th percentile of the luminance is white)" if automatic else ""
     below = f", {negative:.2%} below 0 and shown black" if negative > 0 else ""
     description = (
@@ -319,12 +347,7 @@ def _grey_if_one(values: NDArray[Any]) -> NDArray[Any]:
     return values[..., 0] if values.ndim == 3 and values.shape[2] == 1 else values
 
 
-def _write_npy(values: NDArray[Any], path: Path) -> None:
-    with path.open("wb") as file:  # np.save would append an ending of its own
-        np.save(file, values)
-
-
-def _write_exr(values: NDArray[np.float32], path: Path) -> None:
+def _write_exr(values: NDArray[np.float32], path: Path, text: str) -> None:
     import OpenEXR
 
     channels: dict[str, NDArray[np.float32]]
@@ -333,7 +356,7 @@ def _write_exr(values: NDArray[np.float32], path: Path) -> None:
     else:
         names = "RGB" if values.shape[2] == 3 else [f"C{n}" for n in range(values.shape[2])]
         channels = {name: np.ascontiguousarray(values[..., n]) for n, name in enumerate(names)}
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, "comments": text}
     with OpenEXR.File(header, channels) as file:
         file.write(str(path))
 

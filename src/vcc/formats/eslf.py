@@ -17,7 +17,9 @@ from vcc.fields.arrays import all_samples
 from vcc.fields.samples import Samples
 from vcc.files import transfer as curves
 from vcc.files.atomic import atomic_path
-from vcc.files.pictures import read_picture, read_stored
+from vcc.files.pictures import read_picture, read_stored, write_codes
+from vcc.files.stated import check_usual
+from vcc.files.statement import Statement
 from vcc.formats import orders
 from vcc.formats.grid import Decoded, weights_apart
 from vcc.formats.orders import Order, counted_from, running_numbers
@@ -60,6 +62,7 @@ def read(
     """
     orders.check(views, order)
     check(layout)
+    check_usual(path)
     samples, weights = _samples(path)
     height, width = samples.shape[:2]
     known = _KNOWN.get((height, width))
@@ -113,8 +116,6 @@ def save(
     Raises:
         InputError: another ending, other channels, values above 1, or a place that cannot be written to.
     """
-    import imagecodecs
-
     path = Path(path).expanduser()
     check(kind)
     what = "an ESLF" if kind == "eslf" else "a mosaic of views"
@@ -131,9 +132,7 @@ def save(
     codes = curves.encode(values, bits)
     tiled = put_together(codes, kind)
     with atomic_path(path) as temporary:
-        temporary.write_bytes(
-            imagecodecs.png_encode(np.ascontiguousarray(tiled[..., 0] if tiled.shape[2:] == (1,) else tiled))
-        )
+        write_codes(tiled, temporary, ".png", Statement("radiance", transfer="srgb"))
     return path
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +15,7 @@ from vcc.files.pictures import read_picture
 from vcc.formats.cameras import Cameras, Pair
 from vcc.formats.grid import DEFAULT_SPACING, Decoded, Geometry, ViewGrid
 from vcc.formats.hci import parameters_file
+from vcc.formats.stated_views import StatedViews
 
 
 @dataclass(frozen=True, repr=False)
@@ -44,6 +45,7 @@ class FolderInfo(Brief):
         frame: the full 5×5 frame, where the format states one; spacing and the next two are then read from it.
         remarks: what the format's reader has to say, sentences.
         sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; means unless the files say otherwise.
+        stated: what the pictures of a folder say of their numbers.
     """
 
     format: str
@@ -65,6 +67,15 @@ class FolderInfo(Brief):
     frame: Affine | None = None
     remarks: tuple[str, ...] = ()
     sample: Sample = "mean"
+    stated: StatedViews = field(default_factory=lambda: StatedViews({}, None))
+
+    @property
+    def codes(self) -> tuple[Literal["as-is", "auto"], Literal["srgb", "linear"]]:
+        """As which ``transfer`` to open it to have the stored numbers, and how these stand for light.
+
+        Numbers that were exposed or turned when they were written are had as linear light only.
+        """
+        return ("as-is", self.transfer) if self.stated.is_neutral else ("auto", "linear")
 
     @property
     def picture_shape(self) -> tuple[int, ...]:
@@ -76,7 +87,8 @@ def info_of_grid(grid: ViewGrid) -> FolderInfo:
     """What a grid of files holds, from its first picture.
 
     Raises:
-        InputError: a picture that cannot be read, or of another size than stated.
+        InputError: a picture that cannot be read, or of another size than stated; pictures that say contradictory
+            things of their numbers.
     """
     some = next(iter(grid.present.values()))
     first, bits = read_picture(some)
@@ -88,7 +100,9 @@ def info_of_grid(grid: ViewGrid) -> FolderInfo:
             "pictures were cropped or scaled, sensor_size_mm, disp_min and disp_max)"
         )
     info = _info(grid.format, grid.shape, first.shape, bits, grid.geometry)
-    return replace(info, files=grid.files, missing=grid.missing)
+    said = StatedViews.of(grid.present.values())
+    transfer = said.transfer or info.transfer
+    return replace(info, files=grid.files, missing=grid.missing, transfer=transfer, stated=said)
 
 
 def info_of_file(decoded: Decoded) -> FolderInfo:

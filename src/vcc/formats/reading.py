@@ -33,7 +33,7 @@ from vcc.formats.remarks import assumed_remark, vergence_remark
 from vcc.formats.sparse import SparseViews
 from vcc.light_field import LightField
 
-Transfer = Literal["auto", "srgb", "linear"]
+Transfer = Literal["auto", "srgb", "linear", "as-is"]
 
 _STORED: dict[int, type[np.generic]] = {8: np.uint8, 16: np.uint16, 32: np.float32}
 
@@ -100,7 +100,9 @@ def open_light_field(
         transfer: "srgb" takes stored samples as display-referred sRGB, as nearly all published
             light fields are, and makes linear float32 of them; "linear" takes them as proportional
             to light and keeps their type (an unsigned integer is a fraction of full scale).
-            Floating-point pictures are linear either way. "auto" takes what the format has: sRGB for pictures.
+            Floating-point pictures are linear either way. "auto" takes what the pictures say of themselves (those
+            that were written here do; their exposure is undone, too), else what the format has: sRGB for pictures.
+            "as-is" keeps the stored numbers, whatever they stand for.
         spacing: distance between neighbouring views, metres, one number or (dv, du); goes before
             what the folder states, as do the next two.
         slope_per_pixel: pixel pitch over focal length of the cameras, one number or (pt, ps).
@@ -178,7 +180,7 @@ def open_sparse_views(
         cameras = cameras_for(info, grid.geometry, given, path)
         assert cameras is not None  # no folder states a frame
         pictures = read_views(
-            grid.present, info.picture_shape, _STORED[info.bits], linear=transfer == "linear", progress=progress
+            grid.present, info.picture_shape, _STORED[info.bits], **_how_stored(info, transfer), progress=progress
         )
     assumed = [name for name in info.unknown if name not in given.names]
     dark = dark_remark(dict(zip(grid.present, pictures, strict=True)))
@@ -291,13 +293,26 @@ def _opened_folder(
         grid.present,
         picture,
         _STORED[info.bits],
-        linear=transfer == "linear",
+        **_how_stored(info, transfer),
         progress=progress,
         first=[place for place in grid.present if place[0] in looked_at(rows) or place[1] in looked_at(columns)],
         meanwhile=glance,
     )
     values = pictures.reshape(rows, columns, *picture)
     return _Opened(info, grid.geometry, cameras, values, info.bits < 32, None, seen, turned)
+
+
+def _how_stored(info: FolderInfo, transfer: Transfer) -> dict[str, Any]:
+    """How `read_views` is to take the numbers of a folder's pictures.
+
+    Raises:
+        InputError: the pictures say otherwise than told.
+    """
+    if transfer == "as-is":
+        return {"linear": True}
+    info.stated.check(transfer)
+    linear = (info.transfer if transfer == "auto" else transfer) == "linear"
+    return {"linear": linear, "stated": None if info.stated.is_usual else info.stated}
 
 
 def _put_in_order(

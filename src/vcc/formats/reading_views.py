@@ -18,6 +18,7 @@ from vcc.base.workers import Workers
 from vcc.files.claims import LIGHT_FIELD, check_claim
 from vcc.files.pictures import read_picture, read_png_into
 from vcc.files.transfer import decode
+from vcc.formats.stated_views import StatedViews
 
 _THREADS = 2  # decoding releases the interpreter's lock
 
@@ -28,6 +29,7 @@ def read_views(
     stored: type[np.generic],
     *,
     linear: bool,
+    stated: StatedViews | None = None,
     progress: Progress | None = None,
     first: Collection[tuple[int, int]] = (),
     meanwhile: Callable[[NDArray[Any]], None] | None = None,
@@ -39,6 +41,8 @@ def read_views(
         picture: the shape that all pictures must have.
         stored: the type that they must have.
         linear: keep that type; else decode from sRGB to float32.
+        stated: what the pictures say of their numbers, where that makes a difference. Where they were exposed or
+            turned, all become float32.
         progress: called as progress(done, total) after each picture.
         first: places of the views to read before the others.
         meanwhile: called with the array when these have been read, beside the reading of the others: what takes
@@ -48,7 +52,9 @@ def read_views(
         InputError: pictures that differ in size or type, a damaged picture, more samples than so few bytes may
             hold, or more memory needed than there is.
     """
-    kind = stored if linear else np.float32
+    undone = stated is not None and not stated.is_neutral
+    as_stored = linear and not undone
+    kind = stored if as_stored else np.float32
     shape = (len(files), *picture)
     stored_bytes = sum(file.stat().st_size for file in set(files.values()) if file.is_file())
     folder = next(iter(files.values())).parent
@@ -66,9 +72,9 @@ def read_views(
 
     def read(number: int) -> None:
         file = listed[number]
-        if not linear and not hasattr(own, "scratch"):
+        if not as_stored and not hasattr(own, "scratch"):
             own.scratch = np.empty(picture, stored)
-        into = values[number] if linear else own.scratch
+        into = values[number] if as_stored else own.scratch
         if not read_png_into(file, into):
             samples, _ = read_picture(file)
             if samples.shape != picture or samples.dtype != stored:
@@ -79,7 +85,11 @@ def read_views(
                     "All views have the same size and type"
                 )
             into[...] = samples
-        if not linear:
+        if stated is not None and undone:
+            values[number] = stated.light(file, into)
+        elif stated is not None:
+            stated.picture(file, into)
+        elif not linear:
             decode(into, values[number])
 
     def when_read(awaited: list[Future[None]]) -> None:

@@ -32,6 +32,7 @@ from vcc.base.progress import Progress, tell
 from vcc.base.reading import most_unpacked, read_bytes
 from vcc.base.units import mm
 from vcc.files.pictures import read_picture
+from vcc.files.stated import check_usual
 from vcc.formats.grid import Decoded, Geometry, Place, arrange
 
 ENDINGS = (".zip", ".xml")
@@ -117,7 +118,9 @@ class _Folder:
         return lists[0].name, read_bytes(lists[0], "list of views")
 
     def picture(self, name: str) -> NDArray[Any]:
-        return read_picture(self._root / _inside(name, self.path))[0]
+        file = self._root / _inside(name, self.path)
+        check_usual(file)
+        return read_picture(file)[0]
 
 
 class _Zip:
@@ -142,6 +145,7 @@ class _Zip:
         unpacked = self._room / f"view{PurePosixPath(member).suffix}"
         unpacked.write_bytes(self._bytes(member))
         try:
+            check_usual(unpacked)
             return read_picture(unpacked)[0]
         except InputError as error:
             raise InputError(str(error).replace(str(unpacked), f"{self.path}: {member}")) from None

@@ -22,6 +22,7 @@ from vcc.base.progress import Progress, tell
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
 from vcc.files.pictures import Exposure, save_picture, write_codes
+from vcc.files.statement import Statement
 from vcc.formats import arrays, eslf, lftoolbox, video
 from vcc.formats.cameras import Cameras, cameras_of
 from vcc.formats.exposing import Codes, stored_view
@@ -50,6 +51,8 @@ _HOW: dict[Kind, str] = {
     "mosaic": "one picture of all views side by side, sRGB; it holds no geometry",
 }
 _PNG_LEVEL = 4  # a third of the usual level's time, for 5 % more bytes
+DARK = 0.05
+"""Of white: views whose brightest parts are darker hold little of it in 8 bits, and look black."""
 _POINTS_UNSAID = (
     "nothing here says that its samples are values at points, and they are read back as means over pixels: "
     'dataclasses.replace(light_field, sample="point") says it again'
@@ -110,8 +113,8 @@ def save_light_field(
         Where it was written and what had to be done for it.
 
     Warns:
-        ResultWarning: samples too bright for a file were clipped; or a format has no room to say that samples are
-            values at points.
+        ResultWarning: samples too bright for a file were clipped, or all are dark; or a format has no room to say
+            that samples are values at points.
 
     Raises:
         InputError: an ending that is not known or is not that of the kind, an option that the format does not
@@ -133,6 +136,7 @@ def save_light_field(
     if chosen == "mp4":
         count, exposure, clipped = writer(light_field, path, **options)
         _warn_of_clipping(path, clipped, options.get("exposure", 1.0))
+        _warn_of_darkness(light_field, path, options.get("exposure", 1.0))
         said = f"{count} frames of a flight, exposure {exposure:.6g}, {clipped:.2%} of the samples clipped"
         saved = SavedLightField(path, chosen, exposure, clipped, _words(light_field.grid, path, said))
     else:
@@ -166,14 +170,14 @@ def save_folder(
         path: the folder, not there yet or empty. It appears whole or not at all.
         kind: "hci" for the names of the HCI benchmark, "views" for ``view_RR_CC``, counted from 00.
         bits: 8 or 16.
-        transfer: "linear" stores numbers proportional to light; open it with ``transfer="linear"`` again.
+        transfer: "linear" stores numbers proportional to light; the pictures say so.
         ending: of the pictures: ``.png``; with "views" also ``.tif`` and ``.exr`` (linear float32, no exposure).
         exposure: factor from radiance to full scale; "auto" takes 1 over the 99.5th percentile of the luminance.
         progress: called as progress(done, total) after each view.
 
     Warns:
-        ResultWarning: samples too bright were clipped; or ``parameters.cfg`` cannot hold the cameras ("views"
-            only), with what to pass when the folder is opened.
+        ResultWarning: samples too bright were clipped, or all are dark; or ``parameters.cfg`` cannot hold the
+            cameras ("views" only), with what to pass when the folder is opened.
 
     Raises:
         InputError: another number of channels, impossible options, a folder with something in it or that cannot
@@ -185,6 +189,8 @@ def save_folder(
     text, remark = _parameters(grid, cameras_of(grid), path, kind)
     rows, columns = grid.shape[:2]
     codes = Codes(light_field, bits, transfer, exposure)
+    linear = Statement("radiance")
+    coded = replace(linear, transfer=transfer, exposure=codes.exposure, automatic=exposure == "auto")
     with _new_folder(path) as folder:
         if text:
             (folder / PARAMETERS).write_text(text, encoding="utf-8")
@@ -193,9 +199,9 @@ def save_folder(
             file = folder / f"{name}{ending}"
             if ending == ".exr":
                 samples, full_scale = stored_view(light_field, row, column)
-                save_picture(samples.astype(np.float32) / np.float32(full_scale), file)
+                save_picture(samples.astype(np.float32) / np.float32(full_scale), file, statement=linear)
             else:
-                write_codes(codes.view(row, column), file, ending, png_level=_PNG_LEVEL)
+                write_codes(codes.view(row, column), file, ending, coded, png_level=_PNG_LEVEL)
             tell(progress, number + 1, rows * columns)
     if remark:
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
@@ -203,7 +209,8 @@ def save_folder(
     layout = "HCI-style folder" if kind == "hci" else "folder of views"
     if ending == ".exr":
         return SavedLightField(path, kind, 1.0, 0.0, _words(light_field.grid, path, f"{layout}, linear float32"))
-    curve = "sRGB" if transfer == "srgb" else 'linear numbers (open with transfer="linear")'
+    _warn_of_darkness(light_field, path, exposure)
+    curve = "sRGB" if transfer == "srgb" else "linear numbers"
     words = (
         f"{layout}, {bits}-bit {curve}, exposure {codes.exposure:.6g}, {codes.clipped:.2%} of the samples clipped"
     )
@@ -254,6 +261,20 @@ def _warn_of_clipping(path: Path, clipped: float, exposure: Exposure) -> None:
         warnings.warn(
             f"{path}: {clipped:.2%} of the samples are brighter than the files can hold and were clipped. "
             'exposure="auto", or a smaller number, keeps more of them; .exr, .npz and .zarr keep all',
+            ResultWarning,
+            stacklevel=4,
+        )
+
+
+def _warn_of_darkness(light_field: Samples, path: Path, exposure: Exposure) -> None:
+    if exposure == "auto" or light_field.grid.kind.kind == "u":  # integers are what somebody else counted
+        return
+    brightest = exposure / Codes(light_field, 8, "srgb", "auto").exposure
+    if brightest < DARK:
+        warnings.warn(
+            f"{path}: the views are dark: their brightest parts are {brightest:.2g} of white (the 99.5th "
+            'percentile of the middle view). exposure="auto", or a larger number, keeps more of them; .exr, .npz '
+            "and .zarr keep all",
             ResultWarning,
             stacklevel=4,
         )

@@ -120,6 +120,7 @@ class Train(Value):
     Args:
         elements: in any order; kept sorted by z. Elements at the same z commute.
         sensor: where the picture is recorded.
+        name: what pictures say made them, that of the camera's file where there is one; not compared.
 
     Raises:
         InputError: an element before the entrance plane or behind the sensor, two elements of one name.
@@ -127,8 +128,10 @@ class Train(Value):
 
     elements: tuple[Element, ...]
     sensor: Sensor
+    name: str = field(default="", compare=False)
 
-    def __init__(self, elements: Iterable[Element], sensor: Sensor) -> None:
+    def __init__(self, elements: Iterable[Element], sensor: Sensor, *, name: str = "") -> None:
+        object.__setattr__(self, "name", name)
         listed = tuple(elements)
         for element in listed:
             if not isinstance(element, Element):

@@ -23,7 +23,8 @@ from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
 from vcc.files.picture_decoders import read_exr_channels
-from vcc.files.pictures import read_picture, read_stored
+from vcc.files.pictures import read_stored
+from vcc.files.stated import light_in
 from vcc.files.transfer import decode
 
 Array = NDArray[Any]
@@ -184,31 +185,32 @@ class Picture:
 
     @classmethod
     def read(
-        cls, path: str | PathLike[str], width: float, *, transfer: Literal["srgb", "linear"] = "srgb"
+        cls, path: str | PathLike[str], width: float, *, transfer: Literal["auto", "srgb", "linear"] = "auto"
     ) -> Picture:
         """The picture in a file, with its opacity where it is a PNG or OpenEXR file that has one.
 
         Args:
             path: a file that `vcc.files.pictures.read_picture` reads.
             width: of the sheet, metres.
-            transfer: how stored integers stand for light: ``"srgb"``, as pictures for people do, or ``"linear"``.
-                Floating point is linear.
+            transfer: how stored integers stand for light: ``"srgb"``, as pictures for people do, or ``"linear"``;
+                ``"auto"`` is as the file says, sRGB where it says nothing. Floating point is linear.
 
         Raises:
-            InputError: a file that cannot be read, an opacity in another kind of file, or a transfer that there is
-                not.
+            InputError: a file that cannot be read or says otherwise than told, an opacity in another kind of file,
+                or a transfer that there is not.
         """
-        checks.one_of("transfer", transfer, ("srgb", "linear"))
-        samples, opacity = _read_with_opacity(Path(path))
-        full = float(np.iinfo(samples.dtype).max) if samples.dtype.kind == "u" else 1.0
-        values = decode(samples).astype(np.float64) if transfer == "srgb" else samples.astype(np.float64) / full
-        if values.ndim == 2:
-            values = np.repeat(values[..., None], 3, axis=-1)
-        if opacity is not None:
-            # PNG stores colours by themselves, OpenEXR stores them times opacity.
-            factor = opacity[..., None] if samples.dtype.kind == "u" else 1.0
-            values = np.concatenate([values * factor, opacity[..., None]], axis=-1)
-        return cls(values, width)
+        checks.one_of("transfer", transfer, ("auto", "srgb", "linear"))
+        seen = _read_with_opacity(Path(path))
+        if seen is None:
+            return cls(_three(light_in(Path(path), transfer).astype(np.float64)), width)
+        samples, opacity = seen
+        if transfer == "linear" and samples.dtype.kind == "u":
+            values = _three(samples.astype(np.float64) / np.iinfo(samples.dtype).max)
+        else:
+            values = _three(decode(samples).astype(np.float64))
+        # PNG stores colours by themselves, OpenEXR stores them times opacity.
+        factor = opacity[..., None] if samples.dtype.kind == "u" else 1.0
+        return cls(np.concatenate([values * factor, opacity[..., None]], axis=-1), width)
 
     @property
     def height(self) -> float:
@@ -271,8 +273,13 @@ def _averaged(values: Array, axis: int, count: int) -> Array:
     return np.moveaxis(np.diff(at_border, axis=0) * (count / len(moved)), 0, axis)
 
 
-def _read_with_opacity(path: Path) -> tuple[Array, Array | None]:
-    """Samples as stored, (rows, columns[, 3]), and opacity, 0 to 1, if there is any that is not 1."""
+def _three(values: Array) -> Array:
+    """Grey in three channels."""
+    return np.repeat(values[..., None], 3, axis=-1) if values.ndim == 2 else values
+
+
+def _read_with_opacity(path: Path) -> tuple[Array, Array] | None:
+    """Samples as stored, (rows, columns[, 3]), and opacity, 0 to 1; None for a picture without any."""
     if path.suffix.lower() == ".png":
         samples = read_stored(path)
         if samples.ndim == 3 and samples.shape[2] in (2, 4):
@@ -286,7 +293,7 @@ def _read_with_opacity(path: Path) -> tuple[Array, Array | None]:
             channels = {}
         if set(channels) == set("RGBA"):
             return np.stack([channels[name] for name in "RGB"], axis=-1), channels["A"].astype(np.float64)
-    return read_picture(path)[0], None
+    return None
 
 
 class Painting:

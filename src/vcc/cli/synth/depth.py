@@ -13,8 +13,8 @@ from vcc.cli.console import show
 from vcc.cli.options import Counts, Length
 from vcc.cli.synth.rendering import SampleType, Store, Views, check_store, make
 from vcc.files.pfm import read_pfm
-from vcc.files.pictures import read_picture
-from vcc.files.transfer import decode
+from vcc.files.pictures import read_picture, refuse_coded
+from vcc.files.stated import light_in
 from vcc.sources.depth_map import DepthMapScene
 
 
@@ -27,18 +27,16 @@ class ReadingDepth:
         meaning: Whether DEPTH holds distances, or disparities in pixels per view, positive nearer than where they
             converge.
         depth_unit: What a value of 1 in DEPTH stands for, "1 mm" in most 16-bit files.
-        transfer: How whole numbers in PICTURE stand for light.
+        transfer: How whole numbers in PICTURE stand for light; auto: as the file says, srgb where it says nothing.
     """
 
     meaning: Literal["depth", "disparity"] = "depth"
     depth_unit: Length = 1.0
-    transfer: Literal["srgb", "linear"] = "srgb"
+    transfer: Literal["auto", "srgb", "linear"] = "auto"
 
     def picture(self, path: Path) -> NDArray[np.float32]:
         """Linear light, (rows, columns, channels)."""
-        samples = read_picture(path)[0]
-        full = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
-        return decode(samples) if self.transfer == "srgb" else samples.astype(np.float32) / np.float32(full)
+        return light_in(path, self.transfer)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +110,7 @@ def _depth_samples(path: Path) -> NDArray[np.float64]:
     """
     if path.suffix.lower() == ".pfm":
         return read_pfm(path).astype(np.float64)
+    refuse_coded(path, "a depth map holds distances or disparities")
     samples = np.asarray(read_picture(path)[0], dtype=np.float64)
     if samples.ndim == 3:
         if not (samples == samples[..., :1]).all():
