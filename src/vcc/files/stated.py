@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded
 from vcc.files import transfer
@@ -18,8 +19,8 @@ from vcc.files.statement import RawNumbers, Statement, statement_of
 from vcc.optics.electronics import Electronics
 
 
-@dataclass(frozen=True, eq=False)
-class StatedPicture:
+@dataclass(frozen=True, eq=False, repr=False)
+class StatedPicture(Brief):
     """A picture's numbers as they are stored, and what the file says of them.
 
     Args:
