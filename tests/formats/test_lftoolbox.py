@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import resource
+import signal
 import warnings
 from pathlib import Path
 from typing import Any
@@ -199,3 +201,19 @@ def test_what_cannot_be_written(name: str, options: dict[str, Any], message: str
     field = LightField.from_views(np.zeros((1, 1, 2, 2), np.float32), 1e-3, 1e-3)
     with pytest.raises(InputError, match=message):
         lftoolbox.save(field, tmp_path / name, **options)
+
+
+def test_a_full_disk_is_told_once_and_keeps_nothing(tmp_path, capfd):
+    """A limit on the size of files stands for the disk; HDF5 would fail for each thing that it closes."""
+    lf = LightField.from_views(np.random.default_rng(0).random((2, 2, 64, 64), np.float32), 1e-3, 1e-3, 1.0)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        with pytest.raises(InputError, match=r"a\.mat could not be written: File too large.*Nothing of it"):
+            lftoolbox.save(lf, tmp_path / "a.mat")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    assert not capfd.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import resource
 import signal
 import subprocess
@@ -19,6 +20,7 @@ import zarr
 
 import vcc
 from vcc.base.affine import Affine
+from vcc.files import parts
 from vcc.files.transfer import decode
 from vcc.sources import CameraArray
 from vcc.store import (
@@ -565,3 +567,77 @@ def test_views_in_shards_of_several_are_refused(tmp_path):
     group.create_array("samples", shape=SHAPE, dtype="uint8", chunks=(1, 2, 10, 12))
     with pytest.raises(vcc.InputError, match="each view is a file of its own"):
         open_store(tmp_path / "a.zarr")
+
+
+# --- replaced, and written by two ---
+
+
+def test_a_store_whose_writer_died_between_two_renames_is_put_back_where_it_is_looked_for(tmp_path, monkeypatch):
+    path = tmp_path / "a.zarr"
+    lf = vcc.LightField.from_views(np.arange(48, dtype=np.uint8).reshape(2, 2, 3, 4), 1e-3, 1e-3, 1.0)
+    dead = subprocess.run(["sh", "-c", "echo $$"], capture_output=True, check=True)
+    monkeypatch.setattr(os, "getpid", lambda: int(dead.stdout))
+    for look in (open_store, is_store, lambda path: save_store(lf, path, overwrite=True)):
+        save_store(lf, path, overwrite=True)
+        path.rename(parts.set_aside(path))
+        with pytest.warns(vcc.ResultWarning, match="what stood there before is back"):
+            assert look(path)
+        np.testing.assert_array_equal(open_store(path).read().values, lf.values)
+        assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
+
+
+def test_a_store_has_one_writer_and_the_earlier_one_is_told(tmp_path):
+    made = {"provenance": {}, "description": {}}
+    first = create_store(tmp_path / "a.zarr", CAMERAS, SHAPE, "float32", **made)
+    second = create_store(tmp_path / "a.zarr", CAMERAS, SHAPE, "float32", **made)
+    with pytest.raises(vcc.InputError, match=r"this writer of .* has ended"):
+        first.write_view(0, 0, np.ones(SHAPE[2:], np.float32))
+    second.write_view(0, 0, np.ones(SHAPE[2:], np.float32))
+    assert open_store(tmp_path / "a.zarr").view(0, 0).values.all()  # readers are not hindered
+    second.__exit__(None, None, None)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
+
+
+LOCKS = """
+import sys
+from pathlib import Path
+from vcc.files.writer_lock import WriterLock
+lock = WriterLock(Path(sys.argv[1]))
+print("held", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_another_process_is_told_who_writes_a_store(tmp_path):
+    path = tmp_path / "a.zarr"
+    made = {"provenance": {}, "description": {}}
+    create_store(path, CAMERAS, SHAPE, "float32", **made).__exit__(None, None, None)
+    command = [sys.executable, "-c", LOCKS, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout.readline() == "held\n"
+        with pytest.raises(vcc.InputError, match=f"is being written by process {other.pid}"):
+            create_store(path, CAMERAS, SHAPE, "float32", **made)
+        with pytest.raises(vcc.InputError, match=f"is being written by process {other.pid}"):
+            save_store(light_field(), path, overwrite=True)
+        assert not open_store(path).complete  # readers are not hindered
+        other.communicate("")
+    save_store(light_field(), path, overwrite=True)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
+
+
+def test_a_full_disk_under_a_store_written_as_a_whole_keeps_what_stood_there(tmp_path, monkeypatch):
+    def full(self, key, value):
+        raise OSError(28, "No space left on device")
+
+    lf = vcc.LightField.from_views(np.zeros((2, 2, 4, 4), np.uint8), 1e-3, 1e-3, 1.0)
+    words = r"a\.zarr could not be written: No space left.* MB are free there: make room.* as a whole: "
+    monkeypatch.setattr(zarr.Array, "__setitem__", full)
+    with pytest.raises(vcc.InputError, match=words + "nothing of it is kept"):
+        save_store(lf, tmp_path / "a.zarr")
+    monkeypatch.undo()
+    save_store(lf, tmp_path / "a.zarr")
+    monkeypatch.setattr(zarr.Array, "__setitem__", full)
+    with pytest.raises(vcc.InputError, match=words + "the store that was there stays"):
+        save_store(lf, tmp_path / "a.zarr", overwrite=True)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
+    assert open_store(tmp_path / "a.zarr").complete

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import os
-import secrets
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
 from vcc.base.errors import InputError
+from vcc.files.parts import clear_leftovers, part_of
 
 
 @contextmanager
@@ -23,7 +25,7 @@ def atomic_path(path: str | PathLike[str]) -> Iterator[Path]:
 
     If the block fails, nothing is left behind and an older file of that name stays as it was. The
     temporary file is in the same folder (a rename across disks is not atomic) and has the same
-    ending.
+    ending. What killed writers of the same file left is removed.
 
     Raises:
         InputError: the folder does not exist or cannot be written to, ``path`` is a folder, or the
@@ -31,17 +33,45 @@ def atomic_path(path: str | PathLike[str]) -> Iterator[Path]:
     """
     target = Path(os.path.realpath(path))  # a link stays a link: what it points to is replaced
     _check_target(target)
-    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
+    temporary = part_of(target)
     try:
+        clear_leftovers(target)
         yield temporary
         temporary.replace(target)
     except OSError as error:
-        raise InputError(
-            f"{target} could not be written: {error.strerror or error}. "
-            "Write to another folder or make room on the disk"
-        ) from error
+        kept = "An older file of that name stays as it was" if target.exists() else "Nothing of it is kept"
+        raise InputError(f"{target} could not be written: {refusal(error, temporary)}. {kept}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def refusal(error: OSError, part: Path) -> str:
+    """Why the disk refuses to write, with the room that there is and the way out.
+
+    Args:
+        error: what was raised.
+        part: the file or folder in the making, which is still there.
+    """
+    reason = error.strerror or str(error)
+    if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+        return f"{reason}. Write to another folder, or get permission"
+    files = part.rglob("*") if part.is_dir() else [part]
+    written = sum(_taken(file) for file in files if file.is_file())
+    free = shutil.disk_usage(part.parent).free
+    return (
+        f"{reason}. {_megabytes(written)} MB of it were written, and {_megabytes(free)} MB are free there: make "
+        "room on the disk, or write to another"
+    )
+
+
+def _taken(file: Path) -> int:
+    """Bytes that a file takes on the disk; what was skipped in writing takes none."""
+    found = file.stat()
+    return min(found.st_size, 512 * found.st_blocks) if hasattr(found, "st_blocks") else found.st_size
+
+
+def _megabytes(count: int) -> str:
+    return f"{count / 1e6:.3g}"
 
 
 def _check_target(target: Path) -> None:

@@ -25,6 +25,7 @@ from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
 from vcc.formats import hdf5, hdf5_reading
 from vcc.formats.grid import Decoded, Geometry, weights_apart
+from vcc.formats.hdf5_writing import new_file
 
 _TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
 _FROM_ZERO = Affine.translation(1, 1, 1, 1)  # from indices counted from 0 to MATLAB's
@@ -140,7 +141,7 @@ def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[An
     """
     path = Path(path).expanduser()
     checks.ending("a light field of the Light Field Toolbox", path, ".mat")
-    h5py = hdf5.library()
+    hdf5.library()
     grid, values = light_field.grid, all_samples(light_field)
     if values.dtype == np.float16:
         values = values.astype(np.float32)
@@ -154,7 +155,7 @@ def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[An
         scaled = np.rint(weights * whole) if values.dtype.kind == "u" else weights
         values = np.concatenate([colours, scaled[..., None].astype(values.dtype)], axis=4)
     with atomic_path(path) as temporary:
-        with h5py.File(temporary, "w", userblock_size=512) as file:
+        with new_file(temporary, userblock_size=512) as file:
             _variable(
                 file, "LF", np.ascontiguousarray(values.T), compression="gzip", compression_opts=1, shuffle=True
             )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import os
-import secrets
 import shutil
 import warnings
 from collections.abc import Callable, Iterator
@@ -21,6 +20,8 @@ from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress, tell
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
+from vcc.files.atomic import refusal
+from vcc.files.parts import clear_leftovers, part_of
 from vcc.files.pictures import Exposure, save_picture, write_codes
 from vcc.files.statement import Statement
 from vcc.formats import arrays, eslf, lftoolbox, video
@@ -307,8 +308,9 @@ def _new_folder(path: Path) -> Iterator[Path]:
         raise InputError(f"{path} {what}: give the name of a new folder, or move it away")
     if not path.parent.is_dir():
         raise InputError(f"{path.name} cannot be written: there is no folder {path.parent}. Make it first")
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    temporary = part_of(path)
     try:
+        clear_leftovers(path)
         temporary.mkdir()
         yield temporary
         if path.exists():
@@ -316,8 +318,7 @@ def _new_folder(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)  # noqa: PTH105  (Path.replace of a folder is the same)
     except OSError as error:
         raise InputError(
-            f"{path} could not be written: {error.strerror or error}. Write to another folder or make room "
-            "on the disk"
+            f"{path} could not be written: {refusal(error, temporary)}. Nothing of it is kept"
         ) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import secrets
 import shutil
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 
 from vcc.base.errors import InputError
 from vcc.fields.disparity import DisparityMaps
+from vcc.files.parts import clear_leftovers, part_of
 
 FOLDER = "disparity"
 """The name of the array in the group."""
@@ -60,8 +60,9 @@ def keep_maps(store: Path, maps: DisparityMaps) -> None:
     import zarr
 
     folder = store / FOLDER
-    part = store / f".{FOLDER}.{secrets.token_hex(4)}.part"
+    part = part_of(folder)
     try:
+        clear_leftovers(folder)
         array = zarr.create_array(
             store=zarr.storage.LocalStore(part), shape=maps.values.shape, chunks=(1, *maps.values.shape[1:]),
             dtype="float32", fill_value=float("nan"),

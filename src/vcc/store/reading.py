@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.base.errors import CacheWarning, InputError
+from vcc.base.errors import CacheWarning, InputError, ResultWarning
 from vcc.base.progress import Progress, tell
 from vcc.base.reading import (
     check_path,
@@ -34,6 +34,7 @@ from vcc.fields.parallax import Axis, disparity_range
 from vcc.fields.plane_sweep import disparity_maps
 from vcc.fields.sampled import Index, as_slice
 from vcc.fields.samples import OnGrid
+from vcc.files.parts import put_back
 from vcc.files.transfer import decode
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -378,6 +379,7 @@ def open_store(path: str | PathLike[str]) -> StoredLightField:
             an array that cannot be used (named).
     """
     folder = expanded(path)
+    restored(folder)
     with reading(folder, "a light field in a store"):
         array, attributes = read_metadata(folder)
         _check_array(folder, array, attributes)
@@ -411,9 +413,31 @@ def _check_array(folder: Path, array: Any, attributes: Attributes) -> None:
             raise InputError(f"{where}: index_codecs of the shards are bytes and crc32c, not {index}")
 
 
+def restored(folder: Path) -> None:
+    """Put a store back that was taken away to be replaced by a writer that died in that moment, and say so.
+
+    Raises:
+        InputError: it cannot be put back.
+    """
+    try:
+        back = put_back(folder)
+    except OSError as error:
+        raise InputError(
+            f"{folder} was being replaced when its writer was stopped, and what stood there cannot be put back "
+            f"({error.strerror or error}): rename {error.filename} to {folder.name}"
+        ) from error
+    if back:
+        warnings.warn(
+            f"{folder} was being replaced when its writer was stopped: what stood there before is back",
+            ResultWarning,
+            stacklevel=3,
+        )
+
+
 def is_store(path: str | PathLike[str]) -> bool:
     """Whether a path is a Zarr group, of version 3 or older: what `open_store` has something to say about."""
     folder = expanded(path)
+    restored(folder)
     return any((folder / name).is_file() for name in ("zarr.json", ".zgroup", ".zarray"))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import secrets
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -27,10 +26,13 @@ from vcc.fields.arrays import one_view
 from vcc.fields.disparity import DisparityMaps
 from vcc.fields.grid import Grid, Sample
 from vcc.fields.samples import Samples
+from vcc.files.atomic import refusal
+from vcc.files.parts import clear_leftovers, part_of, put_in_place
+from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
 from vcc.store.compression import Compression, Lossless, Lossy, layout
 from vcc.store.disparity_maps import keep_maps
-from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata
+from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata, restored
 
 SETTINGS = "settings"
 """Under which the description of a store keeps how it was made, beside what the maker said."""
@@ -50,13 +52,15 @@ class StoreWriter:
     """Writes the views of a store, in any order; use it in a ``with`` block or plainly.
 
     A view is written under a temporary name and renamed, so that after a kill a view is there as a whole or not at
-    all. Made by `create_store`.
+    all. A store has one writer at a time: until it is finished, the ``with`` block is over or the process ends,
+    other processes are refused; a later writer of the same process takes its place. Made by `create_store`.
     """
 
     path: Path
     attributes: Attributes
     array: Any
     compression: Compression
+    _lock: WriterLock
     _errors: dict[tuple[int, int], float] = field(default_factory=dict)
 
     @property
@@ -96,14 +100,19 @@ class StoreWriter:
             raise InputError(f"there is no view ({row}, {column}) in a store of {nv}×{nu} views")
         if self.attributes.complete:
             raise InputError(f"{self.path} is finished: its views stay as they are")
+        if not self._lock.held:
+            raise InputError(
+                f"this writer of {self.path} has ended: its with block is over, or another was made since. Use "
+                "that, or make one by create_store"
+            )
         view = self._fitting(np.asarray(samples), f"view ({row}, {column}) for {self.path}")
         try:
             self.array[row, column] = view
         except OSError as error:
             kept = nv * nu - len(self.missing())
             raise InputError(
-                f"view ({row}, {column}) could not be written to {self.path}: {error.strerror or error}. "
-                f"{kept} of {nv * nu} views are kept: make room or get permission, and go on"
+                f"view ({row}, {column}) could not be written to {self.path}: {refusal(error, self.path)}. "
+                f"{kept} of {nv * nu} views are kept"
             ) from error
         if isinstance(self.compression, Lossy):
             kept_as = self._reader.stored_view(row, column, 0, self.shape[2])
@@ -117,6 +126,7 @@ class StoreWriter:
             InputError: views are missing (named), or the disk refuses.
         """
         if self.attributes.complete:
+            self._lock.give_back()
             return open_store(self.path)
         missing = self.missing()
         if missing:
@@ -126,6 +136,7 @@ class StoreWriter:
             )
         self.attributes = self.attributes.finished(self._measured_loss())
         _write_attributes(self.path, self.attributes)
+        self._lock.give_back()
         return open_store(self.path)
 
     def __enter__(self) -> Self:
@@ -134,7 +145,8 @@ class StoreWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Nothing is open, and nothing is finished: an unfinished store is one to go on with."""
+        """Others may write. Nothing is finished: an unfinished store is one to go on with."""
+        self._lock.give_back()
 
     @property
     def _reader(self) -> StoredLightField:
@@ -214,7 +226,7 @@ def create_store(
 
     Raises:
         InputError: a shape, type or attribute that no light field has; a path that is something else; a store of
-            another description (what differs is named); the disk refuses.
+            another description (what differs is named); another process writes it (named); the disk refuses.
     """
     folder = Path(path).expanduser()
     frame = cameras_or_frame if isinstance(cameras_or_frame, Affine) else cameras_or_frame.frame
@@ -244,11 +256,22 @@ def create_store(
     )
     attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
     attributes.as_json()  # refuses what JSON cannot hold, before anything is made
-    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
-        return _continued(folder, attributes, packing)
-    _make(folder, attributes, shape, kind, packing, chunks)
-    array, _ = read_metadata(folder, "r+")
-    return StoreWriter(folder, attributes, _writable(array), packing)
+    restored(folder)
+    there = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
+    if there:
+        attributes = _continued(folder, attributes)
+    lock = WriterLock(folder)
+    try:
+        clear_leftovers(folder, lock.patience)
+        if not there:
+            _make(folder, attributes, shape, kind, packing, chunks)
+        for left in (folder / ARRAY).rglob("*.partial"):  # of a run that was killed
+            left.unlink(missing_ok=True)
+        array, _ = read_metadata(folder, "r+")
+        return StoreWriter(folder, attributes, _writable(array), packing, lock)
+    except BaseException:
+        lock.give_back()
+        raise
 
 
 def save_store(
@@ -321,10 +344,12 @@ def write_views(
         InputError: see `save_store`.
     """
     folder = Path(path).expanduser()
+    restored(folder)
     if os.path.lexists(folder):
         _check_replaceable(folder, overwrite)
-    part = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
+    lock, part = WriterLock(folder), part_of(folder)
     try:
+        clear_leftovers(folder, lock.patience)
         stated |= {"disparity_range": grid.disparity_range, "sample": grid.sample}
         with create_store(part, grid.frame, grid.shape, grid.kind, **stated) as writer:
             total = grid.shape[0] * grid.shape[1]
@@ -334,11 +359,16 @@ def write_views(
             writer.finish()
             if disparity is not None:
                 _keep(part, disparity)
-        _put_in_place(part, folder)
+        _put_in_place(part, folder, overwrite)
     except InputError as error:
-        raise InputError(str(error).replace(str(part), str(folder))) from error.__cause__
+        if str(part) not in str(error) or not isinstance(error.__cause__, OSError):
+            raise InputError(str(error).replace(str(part), str(folder))) from error.__cause__
+        stays = "the store that was there stays" if folder.exists() else "nothing of it is kept"
+        reason = refusal(error.__cause__, part)
+        raise InputError(f"{folder} could not be written: {reason}. It is written as a whole: {stays}") from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
+        lock.give_back()
     return open_store(folder)
 
 
@@ -374,7 +404,7 @@ def _make(
     if not folder.parent.is_dir():
         raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
     cut = layout(shape, kind, packing, chunks)
-    part = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.new")
+    part = part_of(folder)
     try:
         store = zarr.storage.LocalStore(part)
         group = zarr.create_group(store, attributes={KEY: attributes.as_json()})
@@ -398,11 +428,11 @@ def _writable(array: Any) -> Any:
     return array.with_config({"write_empty_chunks": True})
 
 
-def _continued(folder: Path, wanted: Attributes, packing: Compression) -> StoreWriter:
-    """The writer of a store that is there already."""
+def _continued(folder: Path, wanted: Attributes) -> Attributes:
+    """What a store states that is there already and is gone on with."""
     if not folder.is_dir() or not is_store(folder):
         raise InputError(f"{folder} is there already, and is no store: choose another name")
-    array, found = read_metadata(folder, "r+")
+    _, found = read_metadata(folder, "r+")
     if wanted.description is None or found.description is None:
         raise InputError(
             f"{folder} is there already{'' if found.complete else ', not finished'}, and without a description of "
@@ -414,9 +444,7 @@ def _continued(folder: Path, wanted: Attributes, packing: Compression) -> StoreW
             f"{folder} was made from another description, and views of two are never mixed. "
             f"{_difference(found.description, wanted.description)}. Remove it, or choose another name"
         )
-    for left in (folder / ARRAY).rglob("*.partial"):  # of a run that was killed
-        left.unlink(missing_ok=True)
-    return StoreWriter(folder, found, _writable(array), packing)
+    return found
 
 
 def _difference(there: Any, wanted: Any, name: str = "") -> str:
@@ -449,15 +477,9 @@ def _check_replaceable(folder: Path, overwrite: bool) -> None:
         raise InputError(f"{folder} is there already and is no store: it is not overwritten. Choose another name")
 
 
-def _put_in_place(part: Path, folder: Path) -> None:
-    """Rename a finished store to its name; what was there goes once the new one stands."""
-    old = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.old")
+def _put_in_place(part: Path, folder: Path, overwrite: bool) -> None:
+    """Give a finished store its name; what was there goes once the new one stands."""
     try:
-        if folder.exists():
-            folder.replace(old)
-        part.replace(folder)
+        put_in_place(part, folder, overwrite)
     except OSError as error:
-        if old.exists() and not folder.exists():
-            old.replace(folder)
         raise InputError(f"{folder} could not be written: {error.strerror or error}") from error
-    shutil.rmtree(old, ignore_errors=True)
