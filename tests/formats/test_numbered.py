@@ -13,7 +13,7 @@ from small_views import moving_texture, png
 
 from vcc.base.errors import InputError, ResultWarning
 from vcc.formats import open_light_field, open_sparse_views, read_geometry
-from vcc.formats.orders import running_numbers
+from vcc.formats.orders import arrangement, running_numbers
 
 Views = NDArray[np.uint8]
 GIVEN = {"spacing": 2e-3, "slope_per_pixel": 1e-3, "focus_distance": 1.0}
@@ -135,6 +135,18 @@ def test_bad_options(options: dict[str, Any], message: str, grid: Views, tmp_pat
     folder = write(grid, "row-major", tmp_path / "a")
     with pytest.raises(InputError, match=message):
         open_light_field(folder, **options)
+
+
+def test_too_many_to_be_compared() -> None:
+    with pytest.raises(InputError, match=r"5000 frames, too many to be compared .*views="):
+        arrangement([np.zeros((2, 2), np.float32)] * 5000, None, "chess", "a.mp4 gives 5000 frames")
+
+
+def test_pictures_of_several_sizes(grid: Views, tmp_path: Path) -> None:
+    folder = write(grid, "row-major", tmp_path / "a")
+    (folder / "frame_007.png").write_bytes(png(grid[0, 0, :40]))
+    with pytest.raises(InputError, match="20 numbered pictures, and they are not all of one size"):
+        read_geometry(folder)
 
 
 def test_one_number_twice(grid: Views, tmp_path: Path) -> None:

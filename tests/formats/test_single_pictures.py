@@ -18,6 +18,7 @@ from vcc.files import transfer
 from vcc.files.pfm import read_pfm
 from vcc.files.pictures import read_picture
 from vcc.formats import eslf, open_light_field, read_container, read_ground_truth, save_light_field
+from vcc.formats.tiles import mosaic_evidence, taken_apart
 from vcc.light_field import LightField
 
 GIVEN = {"spacing": 1e-3, "slope_per_pixel": 1e-3, "focus_distance": 1.0}
@@ -100,6 +101,14 @@ def test_the_layout_of_one_picture_is_seen(
     decoded = read_container(path, views=(rows, columns))
     np.testing.assert_array_equal(decoded.values, views)
     assert decoded.format.lower().startswith(kind)
+
+
+@pytest.mark.parametrize("views", [(10, 12), (1, 12), (10, 1), (1, 1)])
+def test_tiles_of_a_pixel_tell_no_layout(views: tuple[int, int], samples: NDArray[np.uint8]) -> None:
+    """Both layouts of such views, or of one view, are the same picture."""
+    picture = side_by_side(samples)
+    assert mosaic_evidence(picture, views) == 1
+    np.testing.assert_array_equal(taken_apart(picture, views, "eslf"), taken_apart(picture, views, "mosaic"))
 
 
 @pytest.mark.parametrize("flat", [True, False])

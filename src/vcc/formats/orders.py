@@ -33,6 +33,7 @@ ORDERS: tuple[Order, ...] = get_args(Order)
 _THUMBNAIL = 24  # pixels: parallax is then a small part of a feature, and differences grow with it
 _CLEARLY = 1.1  # by this factor the best arrangement must beat the next
 _LINE = 1.5  # and a single row of views the best grid
+_MOST = 4096  # views of which each is compared with each, within seconds
 
 
 def check(views: object, order: object) -> None:
@@ -98,6 +99,10 @@ def arrangement(
         return views, order or "row-major"
     if len({small.shape for small in thumbnails}) > 1:
         raise InputError(f"{what}, and they are not all of one size. Move away what is no view")
+    if count > _MOST:
+        raise InputError(
+            f"{what}, too many to be compared with one another: pass views=(rows, columns) and order="
+        )
     differences = _differences(thumbnails)
     # A square grid told as rows or as columns has the same neighbours: parallax decides later.
     orders: tuple[Order, ...] = (order,) if order else ("row-major", "serpentine", "chess")

@@ -108,7 +108,9 @@ def _along(lines: NDArray[np.float32], count: int) -> tuple[float, ...]:
 
 
 def _apart(lines: NDArray[np.float32], lag: int) -> float:
-    """The mean difference of pixels so many places apart along lines."""
+    """The mean difference of pixels so many places apart along lines; 0 where lines are shorter."""
+    if lag >= lines.shape[1]:
+        return 0.0
     return float(np.abs(lines[:, lag:] - lines[:, :-lag]).mean())
 
 
