@@ -36,6 +36,7 @@ COMMANDS = {
         "vcc info views/",
         "vcc info views/ --quick",
         "vcc info views/ --picture grid.png",
+        "vcc info mosaic.png --views 9 9",
         'vcc info views/ --keep --spacing "2 mm" --slope-per-pixel 0.0012 --focus-distance "1.3 m"',
     ),
     "plot": (
