@@ -66,7 +66,7 @@ def test_the_sensors_pixels_are_where_its_frame_says():
             [LENS, vcc.Prism(deflection=(0, 0), name="a"), vcc.Lens(focal_length=1.0, name="a")],
             '2 elements are named "a"',
         ),
-        (["lens"], "vcc.Element objects, not str"),
+        (["lens"], "vcc.Element objects, not a str"),
     ],
 )
 def test_cameras_that_cannot_be_are_refused(elements, message):

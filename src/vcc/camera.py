@@ -6,11 +6,13 @@ import warnings
 from os import PathLike
 from typing import Any, Literal, TypeVar, Unpack
 
+from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
 from vcc.advice.darkness import why_dark
 from vcc.advice.explain import Explanation, explained
+from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress
-from vcc.fields.samples import InMemory, Samples
+from vcc.fields.samples import InMemory, Samples, check_is_light_field
 from vcc.files.camera_writing import write_train
 from vcc.image import Image
 from vcc.optics.train import Train
@@ -19,7 +21,7 @@ from vcc.plan.how import OF_THE_RUN, How, Options
 from vcc.plan.model import Plan
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
-from vcc.run.drive import drive
+from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
 from vcc.run.operators import carried_to
 
@@ -39,6 +41,20 @@ def _check_of_the_run(options: Options) -> None:
             )
 
 
+def _caution(plan: Plan, light_field: Samples, found: Recorded, absurd: str) -> str:
+    """What to say of a picture that is dark or lacks rays, with absurd lengths, which may be the reason."""
+    caution = why_dark(plan, light_field, found) or ""
+    if not caution and found.missing_rays > MUCH_MISSING:
+        absurd = absurd if found.missing_rays > MANY_MISSING else ""
+        caution = (
+            f"{found.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
+            f"({found.missing_reason}); the picture is darker there"
+        )
+    if not caution and absurd and is_faint(found, light_field):
+        caution = "the picture is nearly black"
+    return f"{caution}. {absurd}" if caution and absurd else caution
+
+
 class Camera(Train):
     """Elements along an axis and a sensor behind them.
 
@@ -47,11 +63,12 @@ class Camera(Train):
 
     Args:
         elements: in any order; kept sorted by z. Elements at the same z commute.
-        sensor: where the picture is recorded.
+        sensor: where the picture is recorded; there is no camera without one.
         name: what pictures say made them, that of the camera's file where there is one; not compared.
 
     Raises:
-        InputError: an element before the entrance plane or behind the sensor, two elements of one name.
+        InputError: no sensor, or what is no element; an element before the entrance plane or behind the sensor;
+            two elements of one name.
     """
 
     def compile(
@@ -70,6 +87,7 @@ class Camera(Train):
             progress: called with (done, total) while disparities are found, where they are needed.
             options: as in `capture`.
         """
+        check_is_light_field(light_field)
         light_field.check_complete()
         chosen = How.of(how, options)
         if chosen.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
@@ -105,13 +123,19 @@ class Camera(Train):
             ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
                 tolerance was not reached, the cells of an array are smaller than a pixel, or the picture is 0
                 everywhere although the light field is not dark (by footprints, and no mask closes the camera).
+                Where the picture is 0, a quarter of the rays or more is missing, or the picture is nearly black,
+                and a length is 1 m or more, or a pitch 2 cm, it asks whether millimetres were meant.
 
         Raises:
             InputError: an option that does not exist or does not go with the method, an element that returns
                 what it must not; of a light field on disk, views that are missing or damaged, or a memory limit
                 that is too small; a plan for another camera, or for another shape or frame of light field.
         """
-        chosen = How.of(how, options)
+        check_is_light_field(light_field)
+        chosen, absurd = How.of(how, options), metres_meant(self, light_field.grid)
+        if absurd and light_share(self, light_field.grid) < FAINT:  # said before what may take minutes
+            warnings.warn(f"hardly any light will reach the sensor. {absurd}", ResultWarning, stacklevel=2)
+            absurd = ""
         if plan is None:
             plan = self.compile(light_field, chosen, progress=progress)
         else:
@@ -120,16 +144,8 @@ class Camera(Train):
         for caution in plan.cautions:
             warnings.warn(caution, ResultWarning, stacklevel=2)
         found = drive(plan, light_field, chosen, progress)
-        dark = why_dark(plan, light_field, found)
-        if dark is not None:
-            warnings.warn(dark, ResultWarning, stacklevel=2)
-        elif found.missing_rays > MUCH_MISSING:
-            warnings.warn(
-                f"{found.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
-                f"({found.missing_reason}); the picture is darker there",
-                ResultWarning,
-                stacklevel=2,
-            )
+        if caution := _caution(plan, light_field, found, absurd):
+            warnings.warn(caution, ResultWarning, stacklevel=2)
         return Image(
             found.values,
             self.sensor.frame,
@@ -173,6 +189,7 @@ class Camera(Train):
         Warns:
             ResultWarning: as `capture` and `vcc.expose_image`.
         """
+        check_is_light_field(light_field)
         chosen = How.of(how, {**options, "seed": ray_seed})
         asked = Exposure(self.sensor, exposure, seed, radiance, chosen.threads)
         asked.check_channels(light_field.grid.channels)  # before the work begins
@@ -218,6 +235,8 @@ class Camera(Train):
             InputError: a light field on disk, z outside the camera, an element on the way that bends rays not as a
                 lens or a prism does, or more memory needed than allowed.
         """
+        check_is_light_field(light_field)
+        checks.finite("z", z, "metres")
         if light_field.whole() is None:
             raise InputError(
                 "the light field inside a camera is made from samples in memory: pass stored.read(), or a part of "

@@ -12,7 +12,7 @@ from vcc.base.affine import Affine
 from vcc.camera import Camera
 from vcc.fields.grid import Sample, camera_array_frame
 from vcc.fields.sampled import to_numpy
-from vcc.fields.samples import InMemory
+from vcc.fields.samples import InMemory, shape_of
 from vcc.image import Image
 from vcc.run import operators
 
@@ -81,7 +81,7 @@ class LightField(InMemory):
         Raises:
             InputError: a spacing, slope or focus distance of zero or less, or what `LightField` refuses.
         """
-        frame = camera_array_frame(tuple(values.shape), spacing, slope_per_pixel, focus_distance)
+        frame = camera_array_frame(shape_of(values), spacing, slope_per_pixel, focus_distance)
         return cls(values, frame, disparity_range, sample, disparity)
 
     @property

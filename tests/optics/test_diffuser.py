@@ -51,7 +51,10 @@ def test_a_diffuser_is_unbounded_round_or_rectangular():
         ({"kernel": [[1.0]], "slope_pitch": 0}, "slope_pitch .* greater than 0, not 0"),
         ({"kernel": [1.0], "slope_pitch": 1e-3}, r"not of shape \(1,\)"),
         ({"kernel": [[1.0], [1.0, 2.0]], "slope_pitch": 1e-3}, "rows of equally many numbers"),
-        ({"kernel": "gaussian", "slope_pitch": 1e-3}, "Kernel or rows of equally many numbers, not str"),
+        (
+            {"kernel": "gaussian", "slope_pitch": 1e-3},
+            "is no kernel: names are for camera files; write vcc.kernels.Gaussian",
+        ),
         ({"kernel": KERNEL, "slope_pitch": 1e-3}, "are for an array, not for gaussian"),
         ({"kernel": KERNEL, "normalise": True}, "are for an array, not for gaussian"),
         ({"kernel": KERNEL, "diameter": 0}, "diameter of .* greater than 0 m, not 0"),
@@ -104,7 +107,10 @@ def test_weights_are_normalised_only_when_asked():
     ("arguments", "message"),
     [
         ({"kernels": ()}, "has no kernels"),
-        ({"kernels": (KERNEL, "top hat")}, "are vcc.kernels.Kernel, not str"),
+        (
+            {"kernels": (KERNEL, "top hat")},
+            r"is no kernel: names are for camera files; write vcc.kernels.TopHat\(width=…\)",
+        ),
         ({"kernels": TWO}, r"2 kernels and no weights: give an array \(2, rows, columns\)"),
         ({"kernels": KERNEL}, "alike everywhere, and that is vcc.Diffuser"),
         ({"kernels": TWO, "weights": HALVES[0]}, r"numbers \(2, rows, columns\).*not of shape \(3, 3\)"),

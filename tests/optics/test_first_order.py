@@ -98,8 +98,8 @@ def test_rounded_matrices_are_taken():
 @pytest.mark.parametrize(
     ("radii", "thickness", "index", "message"),
     [
-        ((0.0, 1.0), 1 * mm, 1.5, r'radii of thick lens "T" are .* none may be 0'),
-        ((math.nan, 1.0), 1 * mm, 1.5, r"radii"),
+        ((0.0, 1.0), 1 * mm, 1.5, r'a radius of thick lens "T" is 0\.0 m: it must not be 0; inf is a plane'),
+        ((math.nan, 1.0), 1 * mm, 1.5, r"a radius of thick lens .* is nan m: it must not be 0"),
         ((0.05, -0.05), -1 * mm, 1.5, r"thickness of thick lens .* not -0\.001"),
         ((0.05, -0.05), 1 * mm, 0.0, r"refractive_index of thick lens .* not 0"),
     ],

@@ -239,7 +239,8 @@ def test_arrays_that_are_no_transmission_are_refused(values, message):
         (lambda: Polygon(5, -1.0), "diameter of polygon .* not -1.0"),
         (lambda: CosineSum(0.0), "period of cosine sum .* not 0.0"),
         (lambda: CosineSum(1.0, 0), "harmonics of cosine sum is a whole number, 1 or more, not 0"),
-        (lambda: as_pattern("circle"), "a pattern is .*, not str"),
+        (lambda: as_pattern("circle"), r"'circle' is no pattern: .* write vcc.patterns.Circle\(diameter=…\)"),
+        (lambda: as_pattern(3), "a pattern is .*, not int"),
     ],
 )
 def test_sizes_that_make_no_pattern_are_refused_by_name_and_value(make, message):

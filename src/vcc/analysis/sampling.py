@@ -14,7 +14,7 @@ from vcc.advice.words import SamplingLimits
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
-from vcc.fields.samples import Samples
+from vcc.fields.samples import Samples, check_is_light_field
 from vcc.optics.train import Train
 from vcc.plan.parallax_rule import vergences
 from vcc.plot.sampling_plot import plot_sampling
@@ -126,13 +126,8 @@ def sampling_advice(
 
 
 def _grid_of(light_field: Samples) -> Grid:
-    grid = getattr(light_field, "grid", None)
-    if not isinstance(grid, Grid):
-        raise InputError(
-            f"light_field is a vcc.LightField, not a {type(light_field).__name__}: open files with "
-            "vcc.open_light_field(path)"
-        )
-    return grid
+    check_is_light_field(light_field)
+    return light_field.grid
 
 
 def _checked_depths(depths: tuple[float, float]) -> tuple[float, float]:

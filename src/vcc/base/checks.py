@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import units
 from vcc.base.errors import InputError
 
 Array = NDArray[np.float64]
@@ -94,7 +95,7 @@ def whole_number_between(
     if number is None or number < least or (most is not None and number > most):
         what = f"a whole number of {of}" if of else "a whole number"
         limits = f", {least} or more" if most is None else f" from {least} to {most}"
-        raise InputError(f"{name} is {what}{limits}, not {_told(value)}{_and(way_out)}")
+        raise InputError(f"{name} is {what}{limits}, not {_told(value)}{_and(instead(value), way_out)}")
     return number
 
 
@@ -114,7 +115,11 @@ def counts(name: str, value: Any, *axes: str) -> tuple[int, ...]:
     except TypeError:
         numbers = ()
     if len(numbers) != len(axes) or min(numbers) < 1:
-        raise InputError(f"{name} is ({', '.join(axes)}), whole numbers of 1 or more, not {_told(value)}")
+        one = whole_number(value)
+        square = f"for as many each way write ({', '.join([str(one)] * len(axes))})" if one else ""
+        raise InputError(
+            f"{name} is ({', '.join(axes)}), whole numbers of 1 or more, not {_told(value)}{_and(square)}"
+        )
     return numbers
 
 
@@ -165,8 +170,9 @@ def above_zero(
     if number > 0 and number <= most and (infinite or math.isfinite(number)):
         return number
     limit = "" if math.isinf(most) else f" and at most {_with(most, unit)}"
-    wanted = f"greater than {_with(0, unit)}{limit}"
-    raise InputError(f"{name} {f'is {what},' if what else 'must be'} {wanted}, not {_told(value)}{_and(way_out)}")
+    verb = f"is {what}," if what else "must be"
+    told = f"{_told(value)}{_and(instead(value), way_out)}"
+    raise InputError(f"{name} {verb} greater than {_with(0, unit)}{limit}, not {told}")
 
 
 def zero_or_more(name: str, value: object, *, unit: str = "", most: float = math.inf, way_out: str = "") -> float:
@@ -179,7 +185,7 @@ def zero_or_more(name: str, value: object, *, unit: str = "", most: float = math
     if 0 <= number <= most and math.isfinite(number):
         return number
     wanted = f"{_with(0, unit)} or more" if math.isinf(most) else f"from 0 to {_with(most, unit)}"
-    raise InputError(f"{name} must be {wanted}, not {_told(value)}{_and(way_out)}")
+    raise InputError(f"{name} must be {wanted}, not {_told(value)}{_and(instead(value), way_out)}")
 
 
 def finite(name: str, value: object, of: str = "") -> float:
@@ -195,7 +201,8 @@ def finite(name: str, value: object, of: str = "") -> float:
     """
     number = _number(value)
     if not math.isfinite(number):
-        raise InputError(f"{name} must be a finite number{f' of {of}' if of else ''}, not {_told(value)}")
+        wanted = f"a finite number{f' of {of}' if of else ''}"
+        raise InputError(f"{name} must be {wanted}, not {_told(value)}{_and(instead(value))}")
     return number
 
 
@@ -212,6 +219,9 @@ def not_zero(name: str, value: object, *, unit: str = "m", way_out: str = "") ->
         InputError: 0, NaN or no number.
     """
     number = _number(value)
+    if math.isnan(number) and not isinstance(value, float | np.floating):
+        of = "metres" if unit == "m" else unit
+        raise InputError(f"{name} is a number of {of}, not {_told(value)}{_and(instead(value), way_out)}")
     if number == 0 or math.isnan(number):
         raise InputError(f"{name} is {_told(value)} {unit}: it must not be 0{_and(way_out)}")
     return number
@@ -233,7 +243,8 @@ def pair(name: str, value: Any, what: str) -> tuple[float, float]:
     except (TypeError, ValueError):
         one = other = math.nan
     if not (math.isfinite(one) and math.isfinite(other)):
-        raise InputError(f"{name} is {what}, not {_told(value)}")
+        parts = value if isinstance(value, tuple | list) else [value]
+        raise InputError(f"{name} is {what}, not {_told(value)}{_and(*map(instead, parts))}")
     return one, other
 
 
@@ -383,6 +394,26 @@ def package(doing: str, name: str, extra: str, way_out: str = "") -> Iterator[No
 # --- words of refusals ---
 
 
+def instead(value: object) -> str:
+    """What to write instead of a quantity that is no plain number, for a refusal; empty for anything else.
+
+    Lengths are numbers of metres, and text with a unit is for camera files and the command line: with both here,
+    each class of each user would have to read both.
+
+    Args:
+        value: text, such as "50 mm"; a quantity of pint or astropy.
+    """
+    if isinstance(value, str):
+        python = units.as_python(value)
+        if python is None:
+            return ""
+        unit = python.partition(" * ")[2]
+        return f"write {python} (from vcc.units import {unit})" if unit else f"write {python}, without quotes"
+    if hasattr(value, "to_base_units"):
+        return "give its number in SI units: quantity.to_base_units().magnitude"
+    return "give its number in SI units: quantity.si.value" if hasattr(value, "si") else ""
+
+
 def _number(value: Any) -> float:
     """A number as a float; NaN for truth values, text and whatever else is none."""
     if isinstance(value, bool | np.bool_ | str | bytes):
@@ -401,8 +432,8 @@ def _with(number: float, unit: str) -> str:
     return f"{number:g} {unit}".rstrip()
 
 
-def _and(way_out: str) -> str:
-    return f"; {way_out}" if way_out else ""
+def _and(*ways_out: str) -> str:
+    return "".join(f"; {way}" for way in dict.fromkeys(ways_out) if way)
 
 
 def _place(found: NDArray[np.bool_]) -> tuple[int, ...]:

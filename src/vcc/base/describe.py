@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any
 
@@ -86,6 +87,24 @@ def kind_in_words(kind: type, gap: str = " ") -> str:
         gap: what stands between its words.
     """
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", gap, kind.__name__).lower()
+
+
+def instead_of_name(given: str | type, module: str, kinds: Iterable[type]) -> str:
+    """What to write where a name, as camera files have it, or a class stands for a thing, for a refusal.
+
+    Args:
+        given: such as "circle", or the class itself.
+        module: where users find them, such as "vcc.patterns".
+        kinds: the dataclasses that there are.
+    """
+    by_name = {kind.__name__.lower(): kind for kind in kinds}
+    said = given.__name__ if isinstance(given, type) else given
+    kind = by_name.get(re.sub(r"[\s_-]", "", said).lower())
+    if kind is None:
+        return f"{module} has {', '.join(each.__name__ for each in by_name.values())}"
+    needed = [each.name for each in fields(kind) if each.default is MISSING and each.default_factory is MISSING]
+    why = "that is the class" if isinstance(given, type) else "names are for camera files"
+    return f"{why}; write {module}.{kind.__name__}({', '.join(f'{name}=…' for name in needed)})"
 
 
 def with_parameters(name: str, parameters: str) -> str:

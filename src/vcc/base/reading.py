@@ -102,8 +102,10 @@ def expanded(path: str | PathLike[str]) -> Path:
     """A path with ``~`` and ``~user`` replaced.
 
     Raises:
-        InputError: there is no such user, or a NUL in it, which no name has.
+        InputError: neither text nor a path; there is no such user, or a NUL in it, which no name has.
     """
+    if not isinstance(path, str | PathLike):
+        raise InputError(f"the name of a file or folder is text or a pathlib.Path, not a {type(path).__name__}")
     found = Path(path)
     if "\0" in str(found):
         raise InputError(shown(f"{found} is no path: it holds a NUL character"))

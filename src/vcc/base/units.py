@@ -44,6 +44,25 @@ _QUANTITY: Final = re.compile(r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|in
 _UNIT_NAME: Final = re.compile(r"[^\W\d]+|°")
 
 
+_IN_PYTHON: Final = {"µm": "um", "μm": "um", "µs": "us", "μs": "us", "°": "deg"}
+
+
+def as_python(text: str) -> str | None:
+    """A quantity or a number in text as one writes it in Python, ``"50 * mm"`` for "50 mm"; None for other text.
+
+    Args:
+        text: as camera files and the command line have it.
+    """
+    match = _QUANTITY.fullmatch(text.strip())
+    if match is None:
+        return None
+    number, unit = match[1].replace("inf", "math.inf"), match[2]
+    if not unit:
+        return number
+    known = any(unit in units for units in _UNITS.values())
+    return f"{number} * {_IN_PYTHON.get(unit, unit)}" if known else None
+
+
 @functools.cache
 def _registry() -> Any:
     import pint  # 0.3 s to import: only those who write uncommon units pay for it

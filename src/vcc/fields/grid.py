@@ -241,6 +241,11 @@ def check_frame(frame: Affine) -> None:
     Raises:
         InputError: not 5×5, or not invertible.
     """
+    if not isinstance(frame, Affine):
+        raise InputError(
+            f"the frame of a light field is a vcc.Affine, 5×5, not {type(frame).__name__}: "
+            "vcc.LightField.from_views(values, spacing=…, slope_per_pixel=…) makes it"
+        )
     if frame.dimensions != 4:
         raise InputError("a light field needs a 5×5 frame, from (i, j, k, l, 1) to (u, v, s, t, 1)")
     if not frame.is_invertible():

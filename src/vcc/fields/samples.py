@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from os import PathLike
 from typing import Any, Protocol, Self, get_args
 
 import numpy as np
@@ -113,7 +114,7 @@ class InMemory(OnGrid):
     extent: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        check_shape(tuple(self.values.shape))
+        check_shape(shape_of(self.values))
         check_frame(self.frame)
         if self.disparity_range is not None and not self.disparity_range[0] <= self.disparity_range[1]:
             raise InputError(f"disparity_range is (lowest, highest), not {self.disparity_range}")
@@ -210,6 +211,49 @@ class InMemory(OnGrid):
         sizes = "×".join(map(str, self.shape))
         samples = f"{to_dtype(self.values)} {SAMPLES_IN_WORDS[self.sample]}"
         return f"{type(self).__name__}({sizes} {samples}, {self.grid.geometry})"
+
+
+def shape_of(values: Any) -> tuple[int, ...]:
+    """The shape of an array of any library.
+
+    Raises:
+        InputError: no array.
+    """
+    if isinstance(values, str | PathLike):
+        raise InputError(
+            f"values of a light field are an array: vcc.open_light_field({str(values)!r}) opens files"
+        )
+    if not hasattr(values, "shape"):
+        raise InputError(
+            f"values of a light field are an array, not a {type(values).__name__}: numpy.asarray(values, "
+            "dtype='float32') makes one of lists"
+        )
+    return tuple(values.shape)
+
+
+def check_is_light_field(given: Any) -> None:
+    """Refuse what is no light field, with how to make one of it: an array, the name of a file.
+
+    Raises:
+        InputError: it has no grid of samples to be read.
+    """
+    if hasattr(given, "grid") and hasattr(given, "read"):
+        return
+    name = type(given).__name__
+    if isinstance(given, str | PathLike):
+        store = str(given).endswith(".zarr")
+        opened = f"vcc.{'store.open_store' if store else 'open_light_field'}({str(given)!r})"
+        raise InputError(f"light_field is a vcc.LightField, not a {name}: open files with {opened}")
+    if hasattr(given, "__array__") or isinstance(given, tuple | list):
+        raise InputError(
+            f"light_field is a vcc.LightField, not a {name}: numbers alone do not say which rays they are. "
+            "vcc.LightField.from_views(values, spacing=…, slope_per_pixel=…) does, of an array (rows of views, "
+            "columns of views, rows, columns[, channels])"
+        )
+    raise InputError(
+        f"light_field is a vcc.LightField, not a {name}: vcc.open_light_field(path) opens files, and "
+        "vcc.LightField.from_views(values, …) makes one of an array"
+    )
 
 
 def check_samples(values: Any) -> None:

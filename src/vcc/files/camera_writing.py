@@ -17,6 +17,7 @@ from vcc.base import units
 from vcc.base.affine import Affine
 from vcc.base.describe import is_default
 from vcc.base.errors import InputError
+from vcc.base.reading import expanded
 from vcc.files.atomic import atomic_path
 from vcc.files.camera_families import (
     ELEMENT_KINDS,
@@ -41,7 +42,7 @@ def write_train(train: Train, path: str | PathLike[str]) -> None:
     """Write an optical train as TOML that reads as an equal one; see `vcc.camera_file.save_camera`."""
     import tomli_w
 
-    file = Path(path).expanduser()
+    file = expanded(path)
     arrays: dict[str, NDArray[np.float64]] = {}
     tables = {
         "elements": [

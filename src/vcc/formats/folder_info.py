@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
@@ -175,6 +176,11 @@ class Given:
         return tuple(name for name, value in vars(self).items() if value is not None)
 
 
+def _both(name: str, given: Pair) -> tuple[float, float]:
+    one, other = pair(given)
+    return checks.above_zero(name, one), checks.above_zero(name, other)
+
+
 def cameras_for(info: FolderInfo, stated: Geometry, given: Given, path: Path) -> Cameras | None:
     """The cameras of a folder or file: what is given goes before what is stated. None where a frame is stated.
 
@@ -195,8 +201,9 @@ def cameras_for(info: FolderInfo, stated: Geometry, given: Given, path: Path) ->
                 "would contradict it. Leave that out; vcc.LightField.from_views takes cameras of your own"
             )
         return None
-    spacing = pair(info.spacing if given.spacing is None else given.spacing)
-    slope = pair(info.slope_per_pixel if given.slope_per_pixel is None else given.slope_per_pixel)
+    spacing = _both("spacing", info.spacing if given.spacing is None else given.spacing)
+    slope_given = info.slope_per_pixel if given.slope_per_pixel is None else given.slope_per_pixel
+    slope = _both("slope_per_pixel", slope_given)
     focus = given.focus_distance
     if focus is None:
         focus = _focus(stated, spacing[1], slope[1]) if spacing[1] > 0 and slope[1] > 0 else math.inf

@@ -19,7 +19,7 @@ from vcc.base import checks
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress, tell
 from vcc.fields.grid import Grid
-from vcc.fields.samples import Samples
+from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import refusal
 from vcc.files.parts import clear_leftovers, part_of
 from vcc.files.pictures import Exposure, save_picture, write_codes
@@ -121,6 +121,7 @@ def save_light_field(
         InputError: an ending that is not known or is not that of the kind, an option that the format does not
             take, or what the format's writer refuses.
     """
+    check_is_light_field(light_field)
     path = Path(path).expanduser()
     chosen = kind_of(path, kind)
     writer = _WRITERS[chosen]

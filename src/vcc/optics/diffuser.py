@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
-from vcc.base.describe import Brief
+from vcc.base.describe import Brief, instead_of_name
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.base.values import Value
 from vcc.optics.faces import Element, Faces
 from vcc.optics.scatter import Scatter, SheetMap
-from vcc.shapes.kernels import SUM_TOLERANCE, Kernel, Samples
+from vcc.shapes.kernels import SUM_TOLERANCE, Gaussian, Kernel, Radial, Samples, TopHat
 from vcc.shapes.patterns import Bounded, Circle, Open, Pattern
 
 Array = NDArray[np.float64]
+
+
+def _refuse_names(kernel: object, label: str) -> None:
+    """Refuse a name, a class or a mere number where a kernel is wanted."""
+    if isinstance(kernel, int | float):
+        raise InputError(f"{label}: {kernel!r} is no kernel: write vcc.kernels.Gaussian(sigma={kernel!r})")
+    if isinstance(kernel, str | type):
+        kinds = (Gaussian, TopHat, Radial, Samples)
+        raise InputError(f"{label}: {kernel!r} is no kernel: {instead_of_name(kernel, 'vcc.kernels', kinds)}")
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,6 +74,7 @@ class Diffuser(Brief, Element):
                     f"not for {self.kernel.described()}"
                 )
             return self.kernel
+        _refuse_names(self.kernel, self.label)
         if self.slope_pitch is None:
             raise InputError(
                 f"the kernel of {self.label} is an array: give the width of its cells in slope, "
@@ -125,8 +136,10 @@ class CodedDiffuser(Brief, Value, Element):
     def __post_init__(self) -> None:
         super().__post_init__()
         checks.sizes(self.label, width=self.width, height=self.height)
-        kernels = (self.kernels,) if isinstance(self.kernels, Kernel) else tuple(self.kernels)
+        given: Any = self.kernels
+        kernels = (given,) if isinstance(given, Kernel | str | type) else tuple(given)
         for kernel in kernels:
+            _refuse_names(kernel, self.label)
             if not isinstance(kernel, Kernel):
                 raise InputError(f"kernels of {self.label} are vcc.kernels.Kernel, not {type(kernel).__name__}")
         object.__setattr__(self, "kernels", kernels)

@@ -121,7 +121,8 @@ class Element(abc.ABC):
     name: str = ""
 
     def __post_init__(self) -> None:
-        checks.finite(f"z of {self.label}", self.z, "metres")
+        named = f' "{self.name}"' if self.name else ""
+        checks.finite(f"z of {self.kind}{named}", self.z, "metres")  # which its label states
         middle = checks.pair(f"decentre of {self.label}", self.decentre, "(x, y) in metres")
         object.__setattr__(self, "decentre", middle)
 

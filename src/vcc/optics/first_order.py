@@ -151,10 +151,10 @@ class FirstOrder(Element):
             InputError: a radius of 0 or not a number, a negative thickness, an index that is not greater than 0.
         """
         label = f'thick lens "{name}"' if name else f"thick lens at z = {z * 1e3:g} mm"
-        if len(radii) != 2 or any(radius == 0 or math.isnan(radius) for radius in radii):
-            raise InputError(
-                f"radii of {label} are (R1, R2) in metres, not {radii}: none may be 0, inf is a plane"
-            )
+        if not isinstance(radii, tuple | list) or len(radii) != 2:
+            raise InputError(f"radii of {label} are (R1, R2) in metres, not {radii}")
+        for radius in radii:
+            checks.not_zero(f"a radius of {label}", radius, way_out="inf is a plane")
         checks.zero_or_more(f"thickness of {label}", thickness, unit="m")
         checks.above_zero(f"refractive_index of {label}", refractive_index)
         first, last = (

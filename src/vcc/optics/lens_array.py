@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,12 +63,14 @@ class LensArray(Brief, Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.focal_length, int | float):
-            object.__setattr__(self, "focal_length", tuple(float(length) for length in self.focal_length))
-        if not self.focal_lengths:
+        given: Any = self.focal_length
+        several = isinstance(given, tuple | list | np.ndarray)
+        focal_lengths = tuple(given) if several else (given,)
+        if not focal_lengths:
             raise InputError(f"focal_length of {self.label} is an empty list: give one or more, in metres")
-        for focal_length in self.focal_lengths:
-            checks.not_zero(f"focal_length of {self.label}", focal_length)
+        checked = tuple(checks.not_zero(f"focal_length of {self.label}", each) for each in focal_lengths)
+        if several:
+            object.__setattr__(self, "focal_length", checked)
         object.__setattr__(self, "offset", _lattice(self, self.offset).offset)
         self._check_fill_factor()
         checks.opening(self.label, self.width, self.height)

@@ -46,8 +46,9 @@ class Mask(Element):
 
     def _as_pattern(self) -> Pattern:
         given: Any = self.pattern
-        if isinstance(given, Pattern) or callable(given):
-            return as_pattern(given)
+        if not isinstance(given, tuple | list) and not hasattr(given, "__array__"):
+            with checks.within(self.label):
+                return as_pattern(given)
         if self.width is None:
             raise InputError(f"{self.label} is an array of cells: give its width in metres, e.g. width=30 * mm")
         try:
@@ -57,7 +58,7 @@ class Mask(Element):
 
     def faces(self) -> Faces:
         """A transmission, opaque outside the sheet."""
-        pattern = as_pattern(self.pattern)  # type: ignore[arg-type]
+        pattern = as_pattern(self.pattern)
         if isinstance(pattern, Cells) or self.width is None:
             return Faces(transmission=pattern)
         height = self.width if self.height is None else self.height

@@ -42,10 +42,8 @@ class Sensor:
 
     def __post_init__(self) -> None:
         checks.finite("the sensor's z", self.z, "metres")
-        if len(self.shape) != 2 or any(int(n) != n or n < 1 for n in self.shape):
-            raise InputError(f"the sensor's shape is (rows, columns), each at least 1, not {self.shape}")
-        for pitch in self.pitches:
-            checks.above_zero("the sensor's pitch", pitch, unit="m")
+        shape = checks.counts("the sensor's shape", self.shape, "rows", "columns")
+        self._check_pitch()
         middle = checks.pair("the sensor's decentre", self.decentre, "(x, y) in metres")
         fill = checks.above_zero("the sensor's fill_factor", self.fill_factor, "a share of the pixel", most=1)
         object.__setattr__(self, "fill_factor", fill)
@@ -55,8 +53,17 @@ class Sensor:
             )
         if not isinstance(self.pitch, int | float):
             object.__setattr__(self, "pitch", self.pitches)
-        object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
+        object.__setattr__(self, "shape", shape)
         object.__setattr__(self, "decentre", middle)
+
+    def _check_pitch(self) -> None:
+        pitches = self.pitch if isinstance(self.pitch, tuple | list) else (self.pitch, self.pitch)
+        if len(pitches) != 2:
+            raise InputError(
+                f"the sensor's pitch is one number of metres or (vertical, horizontal), not {self.pitch!r}"
+            )
+        for pitch in pitches:
+            checks.above_zero("the sensor's pitch", pitch, unit="m")
 
     @property
     def pitches(self) -> tuple[float, float]:

@@ -8,11 +8,13 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, cmp_to_key
+from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import short
@@ -99,6 +101,48 @@ def _order(one: Element, other: Element) -> int:
     return int(np.sign(difference))
 
 
+def _check_sensor(sensor: object, elements: Any) -> None:
+    """Refuse what is no sensor, and whatever else people put in its place, each with what to write."""
+    if isinstance(elements, str | PathLike):
+        raise InputError(f"a camera in a file is opened with vcc.load_camera({str(elements)!r})")
+    inside = [each for each in elements if isinstance(each, Sensor)] if isinstance(elements, tuple | list) else []
+    if sensor is None and inside:
+        raise InputError(
+            "the sensor stands in the list of elements: it comes behind the list, vcc.Camera([lens, …], sensor)"
+        )
+    if isinstance(elements, Sensor) and isinstance(sensor, Element | tuple | list):
+        raise InputError("elements and sensor are exchanged: write vcc.Camera([lens, …], sensor)")
+    if not isinstance(sensor, Sensor):
+        given = "nothing" if sensor is None else _called(sensor)
+        raise InputError(
+            f"a camera needs a vcc.Sensor, and {given} is given: vcc.Camera([lens, …], vcc.Sensor(z=52 * mm, "
+            "shape=(rows, columns), pitch=5 * um))"
+        )
+
+
+def _listed(elements: Any) -> tuple[Element, ...]:
+    """The elements, each of which is one."""
+    if isinstance(elements, Element):
+        raise InputError(f"elements are a list, for one too: write vcc.Camera([{_name(elements)}], sensor)")
+    try:
+        listed = tuple(elements)
+    except TypeError:
+        raise InputError(f"elements are a list of vcc.Element objects, not {_called(elements)}") from None
+    for element in listed:
+        if not isinstance(element, Element):
+            raise InputError(f"a camera's elements are vcc.Element objects, not {_called(element)}")
+    return listed
+
+
+def _name(element: Element) -> str:
+    return element.kind.replace(" ", "_")
+
+
+def _called(thing: object) -> str:
+    """What a thing is, for an error: an instance by its class, a class by its name."""
+    return f"the class {thing.__name__} itself" if isinstance(thing, type) else f"a {type(thing).__name__}"
+
+
 def _distance(start: float, end: float) -> float:
     """The way along the axis, metres; 0 where only rounding lies between."""
     return 0.0 if touch(start, end) else end - start
@@ -119,23 +163,24 @@ class Train(Value):
 
     Args:
         elements: in any order; kept sorted by z. Elements at the same z commute.
-        sensor: where the picture is recorded.
+        sensor: where the picture is recorded; there is no camera without one.
         name: what pictures say made them, that of the camera's file where there is one; not compared.
 
     Raises:
-        InputError: an element before the entrance plane or behind the sensor, two elements of one name.
+        InputError: no sensor, or what is no element; an element before the entrance plane or behind the sensor;
+            two elements of one name.
     """
 
     elements: tuple[Element, ...]
     sensor: Sensor
     name: str = field(default="", compare=False)
 
-    def __init__(self, elements: Iterable[Element], sensor: Sensor, *, name: str = "") -> None:
+    def __init__(self, elements: Iterable[Element], sensor: Sensor | None = None, *, name: str = "") -> None:
+        _check_sensor(sensor, elements)
+        assert sensor is not None
+        listed = _listed(elements)
         object.__setattr__(self, "name", name)
-        listed = tuple(elements)
         for element in listed:
-            if not isinstance(element, Element):
-                raise InputError(f"a camera's elements are vcc.Element objects, not {type(element).__name__}")
             if element.z < 0:
                 raise InputError(
                     f"{element.label} stands before the entrance plane z = 0, where the light field is given: "
@@ -227,7 +272,7 @@ class Train(Value):
         Raises:
             InputError: z is before the entrance plane, or inside a thick element.
         """
-        if z < 0:
+        if checks.finite("z", z, "metres") < 0:
             raise InputError(f"z = {z * 1e3:g} mm lies before the entrance plane of the camera")
         ray, here = Affine.identity(), 0.0
         for element in self.elements:

@@ -16,6 +16,7 @@ from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress, tell
 from vcc.camera import Camera
 from vcc.fields.grid import Grid, skew
+from vcc.fields.samples import check_is_light_field
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Element, Lens, Mask
@@ -62,6 +63,7 @@ def ideal_camera(
         InputError: a distance or diameter of zero or less, a centre without a diameter, or a light field given in
             the plane of that distance, where all pixels of a view show the same place.
     """
+    check_is_light_field(light_field)
     check_distance(distance, "distance")
     if diameter is not None:
         above_zero("the diameter of the aperture", diameter, unit="m", infinite=True)

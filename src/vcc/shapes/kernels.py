@@ -130,8 +130,11 @@ class Gaussian(Kernel):
     sigma: float | tuple[float, float]
 
     def __post_init__(self) -> None:
+        for sigma in self.sigma if isinstance(self.sigma, tuple | list) else (self.sigma,):
+            if way := checks.instead(sigma):
+                raise InputError(f"sigma of a Gaussian is a slope, a number without a unit, not {sigma!r}; {way}")
         if not isinstance(self.sigma, int | float):
-            object.__setattr__(self, "sigma", tuple(float(sigma) for sigma in self.sigma))
+            object.__setattr__(self, "sigma", tuple(float(sigma) for sigma in np.atleast_1d(self.sigma)))
         if len(self.sigmas) != 2 or not all(sigma > 0 and math.isfinite(sigma) for sigma in self.sigmas):
             raise InputError(
                 f"sigma of a Gaussian is a slope greater than 0, or two for (s, t), not {self.sigma}: for light "

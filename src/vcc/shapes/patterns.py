@@ -12,6 +12,7 @@ import abc
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
-from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
+from vcc.base.describe import instead_of_name, kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
 from vcc.base.units import text
@@ -286,7 +287,12 @@ class Cells(Value, Pattern):
     middle: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
-        values = np.asarray(self.values, dtype=np.float64)
+        try:
+            values = np.asarray(self.values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"a transmission array is rows of equally many numbers, not {type(self.values).__name__}"
+            ) from None
         if values.ndim != 2:
             raise InputError(f"a transmission array has (rows, columns), not shape {values.shape}")
         if values.size == 0:
@@ -398,7 +404,7 @@ class CosineSum(Pattern):
     phase: float = field(default=0.0, metadata={"unit": "angle"})
 
     def __post_init__(self) -> None:
-        for period in self.periods:
+        for period in self.period if isinstance(self.period, tuple | list) else (self.period,):
             checks.above_zero("period of cosine sum", period, unit="m", infinite=True)
         checks.whole_number_between("harmonics of cosine sum", self.harmonics, 1)
 
@@ -469,17 +475,28 @@ def owned(pattern: Pattern, owner: str) -> Pattern:
     return pattern
 
 
-def as_pattern(pattern: Pattern | Callable[[Array, Array], ArrayLike]) -> Pattern:
+def as_pattern(pattern: Any) -> Pattern:
     """A pattern from a pattern or from any function of (x, y) in metres.
 
     Raises:
-        InputError: neither.
+        InputError: neither: a class or a name, for instance.
     """
     if isinstance(pattern, Pattern):
         return pattern
+    if pattern is mura or (isinstance(pattern, str) and pattern.lower() == "mura"):
+        raise InputError("a MURA is an array of cells: write vcc.Mask(vcc.patterns.mura(29), width=10 * mm)")
+    if isinstance(pattern, str) and Path(pattern).suffix:
+        read = f"vcc.files.pictures.read_grey({pattern!r})"
+        raise InputError(f"{pattern!r} is the name of a file: write vcc.Mask({read}, width=30 * mm)")
+    if isinstance(pattern, str | type):
+        kinds = (Open, Circle, Polygon, CosineSum, Cells, Bounded)
+        raise InputError(f"{pattern!r} is no pattern: {instead_of_name(pattern, 'vcc.patterns', kinds)}")
     if callable(pattern):
         return FunctionPattern(pattern)
-    raise InputError(f"a pattern is a vcc.patterns.Pattern or a function of (x, y), not {type(pattern).__name__}")
+    raise InputError(
+        "a pattern is a vcc.patterns.Pattern, a function of (x, y) or, for a mask, an array of transmissions, "
+        f"not {type(pattern).__name__}"
+    )
 
 
 @dataclass(frozen=True)
@@ -490,11 +507,18 @@ class Bounded(Pattern):
         pattern: what the sheet carries.
         width: of the sheet, metres.
         height: of the sheet, metres.
+
+    Raises:
+        InputError: what is no pattern, or a size of 0 or less.
     """
 
     pattern: Pattern
     width: float = field(metadata={"unit": "length"})
     height: float = field(metadata={"unit": "length"})
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pattern", as_pattern(self.pattern))
+        checks.sizes("a bounded pattern", width=self.width, height=self.height)
 
     @property
     def size(self) -> tuple[float, float]:

@@ -25,7 +25,7 @@ from vcc.base.words import first_few
 from vcc.fields.arrays import one_view
 from vcc.fields.disparity import DisparityMaps
 from vcc.fields.grid import Grid, Sample
-from vcc.fields.samples import Samples
+from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import refusal
 from vcc.files.parts import clear_leftovers, part_of, put_in_place
 from vcc.files.writer_lock import WriterLock
@@ -303,6 +303,7 @@ def save_store(
         InputError: the path exists (and is no store, or is not to be replaced), or what `create_store` and
             `StoreWriter.write_view` refuse.
     """
+    check_is_light_field(light_field)
     grid = light_field.grid
     return write_views(
         path,

@@ -1,0 +1,86 @@
+"""Lengths that no camera has, where a picture shows that something is wrong: millimetres given as metres."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from vcc.base.units import short
+from vcc.fields.grid import Block, Grid
+from vcc.fields.samples import Samples
+from vcc.optics.train import Train
+from vcc.run.drive import Recorded
+
+LONG = 1.0
+"""Metres from which on a length of a camera, but for pitches, may be one of millimetres (or of a telescope)."""
+WIDE_PITCH = 0.02
+"""Likewise a pitch of pixels or lenslets, metres."""
+FAINT = 1e-5
+"""Share of the scene's radiance below which a picture is nearly black: what passes at f/280, π/4/N²."""
+MANY_MISSING = 0.25
+"""Share of the rays asked for of which so many are missing that lengths are looked at."""
+_NAMED = 3
+
+
+def metres_meant(train: Train, grid: Grid) -> str:
+    """The lengths of a camera and a light field that are absurd as metres, and what was meant; empty for none.
+
+    Large cameras have such lengths by right: this is to be said only where rays are missing or a picture is dark.
+    """
+    absurd = [(what, value) for what, value in _lengths(train, grid) if _is_absurd(what, value)]
+    if not absurd:
+        return ""
+    named = ", ".join(f"{what} is {short(value)}" for what, value in absurd[:_NAMED])
+    more = ", …" if len(absurd) > _NAMED else ""
+    what, value = absurd[0]
+    unit = "um" if "pitch" in what and abs(value) >= LONG else "mm"
+    return f"{named}{more}: these are metres; did you mean {value:g} {unit} ({value:g} * {unit} in Python)?"
+
+
+def _is_absurd(what: str, value: float) -> bool:
+    return math.isfinite(value) and abs(value) >= (WIDE_PITCH if what.startswith("pitch") else LONG)
+
+
+def _lengths(train: Train, grid: Grid) -> Iterator[tuple[str, float]]:
+    """All lengths, by what they are of."""
+    for element in train.elements:
+        yield from _of(element, element.label)
+    yield from _of(train.sensor, "the sensor")
+    yield "spacing of the light field's views", float(abs(grid.frame.linear[0, 0]))
+
+
+def _of(thing: Any, label: str) -> Iterator[tuple[str, float]]:
+    for field in fields(thing):
+        value = getattr(thing, field.name)
+        if is_dataclass(value) and not isinstance(value, type):
+            yield from _of(value, f"the {field.name} of {label}")
+        elif field.metadata.get("unit") == "length" and isinstance(value, int | float | tuple):
+            for each in value if isinstance(value, tuple) else (value,):
+                if isinstance(each, int | float):
+                    yield f"{field.name} of {label}", float(each)
+
+
+def light_share(train: Train, grid: Grid) -> float:
+    """Irradiance over radiance that all views together give the middle of the sensor: their area / (Bx·By).
+
+    With x' = A·u + B·s on the sensor and A·D − B·C = 1, views du apart meet a place there at slopes du/B apart.
+    What bends rays not as a lens does is passed over, and so is what stops them.
+    """
+    views = abs(np.linalg.det(grid.frame.linear[:2, :2])) * grid.shape[0] * grid.shape[1]
+    across = abs(np.linalg.det(train.arriving_at_sensor.linear[:2, 2:]))
+    return float(views / across) if across else math.inf
+
+
+def is_faint(found: Recorded, samples: Samples) -> bool:
+    """Whether a picture holds less than `FAINT` of the radiance of the middle view; NumPy pictures only."""
+    if not isinstance(found.values, np.ndarray):
+        return False
+    grid = samples.grid
+    j, i = grid.shape[0] // 2, grid.shape[1] // 2
+    whole = Block.all_of(grid.shape)
+    view = np.asarray(samples.read(Block((j, j + 1), (i, i + 1), whole.pixel_rows, whole.pixel_columns)))
+    return bool(found.values.mean(dtype=np.float64) < FAINT * view.mean(dtype=np.float64) / grid.full_scale)
