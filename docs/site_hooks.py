@@ -108,6 +108,7 @@ def _command_line() -> str:
     text = app.generate_docs(output_format="markdown")
     contents, commands = text.index("## Table of Contents"), text.index("**Commands**")  # the site has its own
     text = text[text.index("\n") : contents] + text[commands:]  # and the page its title
+    text = re.sub(r"^(#+ vcc --([\w-]+))$", r"\1 {#vcc-\2}", text, flags=re.M)  # what it links to
     for group, listed in (("vcc", COMMANDS), ("vcc synth", RENDERERS)):
         for name, (_, *examples) in listed.items():
             usage = re.compile(rf"```console\n{group} {name}[ \n].*?```\n", re.DOTALL)
