@@ -290,7 +290,7 @@ def prism_array(slopes=((0.0, 0.0),), **changed) -> vcc.PrismArray:
         (lambda: vcc.Biprism(math.nan), "deflection of biprism at z = 0 mm .* nan"),
         (lambda: vcc.Biprism(0.1, math.inf, name="B"), 'rotation of biprism "B" .* inf'),
         (lambda: vcc.Biprism(0.1, diameter=0), "diameter of biprism .* not 0"),
-        (lambda: vcc.Pyramid(2, 0.1), "sides of pyramid .* 3 or more, not 2; two sides make a vcc.Biprism"),
+        (lambda: vcc.Pyramid(2, 0.1), "sides of pyramid .* 3 to 1000, not 2; two sides make a vcc.Biprism"),
         (lambda: vcc.Pyramid(3.5, 0.1), "sides of pyramid .* not 3.5"),
         (lambda: vcc.Pyramid(math.nan, 0.1), "sides of pyramid .* not nan"),
         (lambda: vcc.Pyramid(4, math.inf), "deflection of pyramid .* inf"),

@@ -86,15 +86,23 @@ def test_what_no_file_is_to_blame_for_passes():
 
 
 def test_refusals_pass_but_are_short_and_steer_no_terminal():
-    inner = InputError("a.csv: line 3")
-    with pytest.raises(InputError, match=r"^a\.csv: line 3$") as refused, reading("folder", "a light field"):
+    inner = InputError("folder/a.csv: line 3")
+    with (
+        pytest.raises(InputError, match=r"^folder/a\.csv: line 3$") as refused,
+        reading("folder", "a light field"),
+    ):
         raise inner
     assert refused.value is inner
+    with (
+        pytest.raises(InputError, match=r"^some/views: radiance is not negative$"),
+        reading("some/views", "views"),
+    ):
+        raise InputError("radiance is not negative")
     with pytest.raises(InputError) as refused, reading("folder", "a light field"):
-        raise InputError("views.csv: \x1b[2J\u202e\udcff" + "9" * 10**6 + ". Correct it")
+        raise InputError("folder/views.csv: \x1b[2J\u202e\udcff" + "9" * 10**6 + ". Correct it")
     said = str(refused.value)
     assert len(said) <= LONGEST_MESSAGE
-    assert said.startswith("views.csv: \\x1b[2J\\u202e\\udcff999")
+    assert said.startswith("folder/views.csv: \\x1b[2J\\u202e\\udcff999")
     assert said.endswith("999. Correct it")
     assert " … " in said
     assert shown("Ünïcode, 中文 …\nsecond line") == "Ünïcode, 中文 …\nsecond line"

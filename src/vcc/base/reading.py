@@ -48,12 +48,13 @@ def reading(path: str | PathLike[str], what: str) -> Iterator[None]:
         what: it is read as, such as "a light field".
 
     Raises:
-        InputError: as raised within, at most `LONGEST_MESSAGE` long; or in place of any other exception.
+        InputError: as raised within, with the name of the file if that is not in it, at most `LONGEST_MESSAGE`
+            long; or in place of any other exception.
     """
     try:
         yield
     except InputError as error:
-        error.args = (shown(str(error)),)
+        error.args = (shown(_named(str(error), path)),)
         raise
     except (*_FAULTS_OF_PROGRAMS, Warning):
         raise
@@ -61,6 +62,10 @@ def reading(path: str | PathLike[str], what: str) -> Iterator[None]:
         if hasattr(error, ENDS_WORK):
             raise
         raise InputError(shown(f"{os.fspath(path)} cannot be read as {what}: {in_words(error)}")) from error
+
+
+def _named(said: str, path: str | PathLike[str]) -> str:
+    return said if Path(path).name in said else f"{os.fspath(path)}: {said}"
 
 
 def shown(text: str, most: int = LONGEST_MESSAGE) -> str:

@@ -49,14 +49,14 @@ class Pyramid(Element):
     """A pyramid of plane facets around the axis: one picture of the scene through each of them.
 
     Args:
-        sides: how many facets, 3 or more.
+        sides: how many facets, 3 to 1000.
         deflection: δ, a slope: each facet bends light by δ against the direction in which it lies, towards the
             axis where greater than 0, away from it where less; 0 does nothing.
         rotation: of the facets, radians, from x towards y; at 0 the middle of a facet lies to the right.
         diameter: of a round rim, metres; None lets rays pass at any distance from the axis.
 
     Raises:
-        InputError: fewer than 3 sides, a deflection or rotation that is not finite, a diameter of 0 or less.
+        InputError: another number of sides, a deflection or rotation that is not finite, a diameter of 0 or less.
     """
 
     sides: int
@@ -66,9 +66,9 @@ class Pyramid(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not (self.sides >= 3 and self.sides % 1 == 0):  # 3.0 will do
+        if not (3 <= self.sides <= 1000 and self.sides % 1 == 0):  # 3.0 will do
             raise InputError(
-                f"sides of {self.label} is a whole number, 3 or more, not {self.sides}; "
+                f"sides of {self.label} is a whole number, 3 to 1000, not {self.sides}; "
                 "two sides make a vcc.Biprism"
             )
         _check(self)

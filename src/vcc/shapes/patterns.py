@@ -238,7 +238,7 @@ class Polygon(Pattern):
     """A regular polygon, as the blades of an iris form it.
 
     Args:
-        sides: how many, 3 or more.
+        sides: how many, 3 to 1000.
         diameter: of the circle through the corners, metres.
         rotation: radians, clockwise as seen looking at the scene; at 0 a corner points right.
     """
@@ -249,7 +249,9 @@ class Polygon(Pattern):
 
     def __post_init__(self) -> None:
         checks.above_zero("diameter of polygon", self.diameter, unit="m")
-        checks.whole_number_between("sides of polygon", self.sides, 3)
+        checks.whole_number_between(
+            "sides of polygon", self.sides, 3, 1000, way_out="more are a vcc.patterns.Circle"
+        )
 
     @property
     def size(self) -> tuple[float, float]:
@@ -395,7 +397,7 @@ class CosineSum(Pattern):
 
     Args:
         period: of the first harmonic, metres: one number, or (x, y), where infinity leaves an axis flat.
-        harmonics: h, how many equal cosines along each axis.
+        harmonics: h, how many equal cosines along each axis, 1 to 1000.
         phase: radians, added to every first harmonic (n times to the n-th).
     """
 
@@ -406,7 +408,7 @@ class CosineSum(Pattern):
     def __post_init__(self) -> None:
         for period in self.period if isinstance(self.period, tuple | list) else (self.period,):
             checks.above_zero("period of cosine sum", period, unit="m", infinite=True)
-        checks.whole_number_between("harmonics of cosine sum", self.harmonics, 1)
+        checks.whole_number_between("harmonics of cosine sum", self.harmonics, 1, 1000)
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The product of the two axes' sums."""

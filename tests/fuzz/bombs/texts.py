@@ -82,7 +82,7 @@ BOMBS = {
     "camera 5000 digits": camera(SHAPE, f"shape = [{'9' * 5000}, 2]"),
     "camera sensor negative": camera(SHAPE, "shape = [-5, 5]"),
     "camera mura 10^9+7": camera(CELLS, '{ name = "mura", prime = 1000000007 }'),
-    "camera harmonics 10^9": camera("harmonics = 2", "harmonics = 1000000000", refused=False),
+    "camera harmonics 10^9": camera("harmonics = 2", "harmonics = 1000000000"),
     "lens dat 20000 lines": _lens("a.dat", LENS + "0.0001 0 1.5 1\n" * 20000, refused=False),
     "lens dat tiny radius": _lens("a.dat", "1e-320 1 1.5 10\n-1e-320 1 1 10\n"),
     "lens dat huge": _lens("a.dat", "1e308 1e308 1e308 1e308\n-1e308 1 1 1e308\n", refused=False),
