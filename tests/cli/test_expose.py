@@ -1,5 +1,7 @@
 """``vcc expose``: raw numbers from a camera file and a folder of views."""
 
+import inspect
+
 import imagecodecs
 import numpy as np
 import pytest
@@ -7,6 +9,10 @@ import tifffile
 
 import vcc
 from command_line import KNOWN, refused, run, write_views
+from vcc.cli import capture, convert, decode, expose, refocus
+from vcc.formats import video
+from vcc.formats.writing import save_folder
+from vcc.recover.focal_stack import FocalStack
 
 CAMERA = """
 [[elements]]
@@ -83,3 +89,17 @@ def test_a_camera_without_electronics_is_refused_before_the_light_field_is_read(
 def test_bad_options_are_refused(arguments, message):
     output = [] if "-o" in arguments else ["-o", "raw.tif"]
     assert message in refused("expose", "camera.toml", "views", *output, *KNOWN, *arguments)
+
+
+def test_exposures_have_one_default_here_and_in_python():
+    """Pictures and recordings are exposed automatically, views keep their brightness."""
+    assert default(capture.capture) == default(refocus.refocus) == default(vcc.Image.save) == "auto"
+    assert default(FocalStack.save) == "auto"
+    assert default(expose.expose) == default(vcc.Camera.expose) == default(vcc.expose_image) == "auto"
+    assert (
+        default(convert.convert) == decode.Written().exposure == default(save_folder) == default(video.save) == 1
+    )
+
+
+def default(function):
+    return inspect.signature(function).parameters["exposure"].default

@@ -11,8 +11,10 @@ import imagecodecs
 import numpy as np
 import pytest
 
-from vcc import Affine, InputError, LightField, ResultWarning, open_light_field
+from command_line import refused, run
+from vcc import Affine, Image, InputError, LightField, ResultWarning, open_light_field
 from vcc.files import transfer
+from vcc.files.statement import statement_of
 from vcc.formats import arrays, eslf, lftoolbox, read_geometry
 from vcc.formats.writing import save_folder, save_light_field
 from vcc.store import open_store, save_store
@@ -233,6 +235,47 @@ def test_what_is_too_bright_is_said(tmp_path):
     kept = bright.values * saved.exposure <= 1
     assert np.abs(back - bright.values)[kept].max() <= 0.52 * 2.4 / 1.055 / 255 / saved.exposure
     assert save_light_field(bright, tmp_path / "c", exposure=0.5).clipped == 0
+
+
+def test_views_that_are_dark_are_said(tmp_path):
+    dark = field_of().replaced(field_of().values * np.float32(0.03))
+    with pytest.warns(ResultWarning, match=r"the views are dark: .* 0\.02\d+ of white"):
+        save_light_field(dark, tmp_path / "a")
+    for name, options in {"b": {"exposure": "auto"}, "c": {"exposure": 20}}.items():
+        save_light_field(dark, tmp_path / name, **options)
+        assert np.abs(reopened(tmp_path / name).values - dark.values).max() < 0.03
+    # Integers are what somebody else counted.
+    save_light_field(field_of(np.uint16), tmp_path / "d")
+
+
+def test_one_picture_of_all_views_is_for_people(tmp_path):
+    save_light_field(field_of(), tmp_path / "a.png")
+    said = statement_of(tmp_path / "a.png")
+    assert (said.quantity, said.transfer, said.exposure, said.upright) == ("radiance", "srgb", 1, True)
+    picture = Image(RNG.random((12, 12), np.float32), Affine.identity(2), inverted=False)
+    picture.save(tmp_path / "b.png", exposure=2)
+    with pytest.raises(
+        InputError, match=r"b\.png says that its numbers are light, sRGB, upright, exposure 2, and"
+    ):
+        open_light_field(tmp_path / "b.png", views=(3, 3))
+
+
+def test_a_folder_that_was_exposed_becomes_a_store_of_its_radiance(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    light_field = field_of()
+    save_light_field(light_field, "views", bits=16, exposure=0.5)
+    for command in (["field.zarr"], ["again", "--exposure", "0.25"]):
+        result = run("convert", "views", *command)
+        assert result.exit_code == 0, result.output
+    half_a_code, half_of_8_bits = 0.51 * 2.4 / 1.055 / 65535 / 0.5, 0.51 * 2.4 / 1.055 / 255 / 0.25
+    assert np.abs(open_store("field.zarr").read().values - light_field.values).max() <= half_a_code
+    assert read_geometry("again").stated.is_neutral is False
+    assert np.abs(reopened("again").values - light_field.values).max() <= half_a_code + half_of_8_bits
+    for output in ("b.zarr", "b.npz"):
+        assert "--exposure is for folders" in refused("convert", "views", output, "--exposure", "auto")
+        assert not (tmp_path / output).exists()
+    said = run("info", "views", "--quick").output
+    assert "radiance, sRGB, upright, exposure 0.5, as the pictures say" in said
 
 
 def test_cameras_that_are_not_square(tmp_path):

@@ -20,11 +20,12 @@ from vcc.cli.options import (
     Reading,
     ViewExposure,
     Whole,
+    exposed,
     told,
 )
 from vcc.cli.store_words import written
 from vcc.formats import read_geometry
-from vcc.formats.writing import save_light_field
+from vcc.formats.writing import kind_of, save_light_field
 from vcc.light_field import LightField
 from vcc.store import Lossless, Lossy, StoredLightField, is_store
 from vcc.store import convert as convert_to_store
@@ -84,9 +85,9 @@ def convert(
         InputError: an output that is there, or what reading and writing refuse.
     """
     if output.suffix.lower() == ".zarr":
-        if kind or exposure != 1:
-            option = "--kind" if kind else "--exposure"
-            raise InputError(f"{option} is for folders and pictures of views: OUT is a store")
+        if kind:
+            raise InputError("--kind is for folders and pictures of views: OUT is a store")
+        exposed(exposure, "zarr")
         packing = storing.packing()
         output = free_output(output, overwrite)
         show(_to_store(light_field, output, storing, packing, overwrite, reading))
@@ -96,10 +97,10 @@ def convert(
                 f"{', '.join(wrong)} {'is' if len(wrong) == 1 else 'are'} for stores: end OUT in .zarr"
             )
         output = free_output(output, overwrite)
+        options = exposed(exposure, kind_of(output, kind))
         field = reading.light_field(light_field)
         with progress("Writing views") as advance:
-            exposed = {} if exposure == 1 else {"exposure": exposure}
-            show(save_light_field(field, output, kind=kind, progress=advance, **exposed).description)
+            show(save_light_field(field, output, kind=kind, progress=advance, **options).description)
 
 
 def _to_store(

@@ -5,7 +5,7 @@ What recorded it decides the way: lenslets (`decode_lenslets`), or a mask of cos
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Group, Parameter
 
@@ -16,7 +16,7 @@ from vcc.camera_file import load_camera
 from vcc.cli.console import free_output, progress, show
 from vcc.cli.decode_cosines import Cosines, through_a_mask
 from vcc.cli.decode_lenslets import Lenslets, through_lenslets
-from vcc.cli.options import FolderNames, OutputFile, Overwrite, ViewExposure, told
+from vcc.cli.options import FolderNames, OutputFile, Overwrite, ViewExposure, exposed, told
 from vcc.cli.raw_recordings import Recorded
 from vcc.formats.writing import kind_of, save_light_field
 from vcc.light_field import LightField
@@ -52,7 +52,7 @@ def decode(
 ) -> None:
     """Turn the raw recording of a plenoptic or mask-modulated camera into a light field."""
     output = free_output(output, written.overwrite)
-    kind_of(output, written.kind)  # an ending that is not known, before the work
+    exposed(written.exposure, kind_of(output, written.kind))  # what cannot be written, before the work
     camera = None if recorded.camera is None else load_camera(recorded.camera)
     if camera is not None and has_carrier(camera):
         _refuse(told(lenslets), "for lenslets, and this camera has a mask of cosines")
@@ -99,7 +99,7 @@ def write(field: LightField, output: Path, written: Written, source: Path) -> No
         InputError: what `vcc.formats.writing.save_light_field` refuses.
     """
     ending = output.suffix.lower()
-    options: dict[str, Any] = {} if written.exposure == 1 else {"exposure": written.exposure}
+    options = exposed(written.exposure, kind_of(output, written.kind))
     if ending == ".zarr":
         made = {"decoded_from": source.name, "decoded_by": f"vcc {__version__}, vcc decode"}
         options |= {"provenance": made, "overwrite": written.overwrite}

@@ -185,6 +185,8 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         "views are": ("parallel" if math.isinf(focus) else f"converge {short(focus)} away")
         + assumed("focus_distance"),
     }
+    if facts.stated.said:
+        lines["numbers"] = f"{facts.stated.in_words}, as the pictures say"
     if facts.unknown:
         options = ", ".join(f"--{name.replace('_', '-')}" for name in facts.unknown)
         keep = "; with --keep they are kept in the folder" if facts.files else ""

@@ -20,6 +20,7 @@ from vcc.cli.console import as_options, progress
 from vcc.formats import open_light_field
 from vcc.formats.orders import Order
 from vcc.formats.tiles import Layout
+from vcc.formats.writing import Kind
 from vcc.light_field import LightField
 from vcc.plan.how import BetweenViews, EngineName, How, Interpolation, Method  # noqa: F401  # How's fields name them
 from vcc.store import StoredLightField, is_store, open_store
@@ -194,6 +195,19 @@ ViewExposure = Annotated[
     ),
 ]
 Overwrite = Annotated[bool, Parameter(help="Replace what has that name.")]
+
+
+def exposed(exposure: float | Literal["auto"], kind: Kind) -> dict[str, Any]:
+    """What the writer of a format takes of an exposure of views.
+
+    Raises:
+        InputError: an exposure for a format that has none.
+    """
+    if exposure == 1:
+        return {}
+    if kind not in ("hci", "views", "mp4"):
+        raise InputError("--exposure is for folders of views and films; others keep the numbers: leave it out")
+    return {"exposure": exposure}
 
 
 # --- records ---

@@ -69,6 +69,13 @@ class StatedViews:
         """Whether nothing is said that would not be assumed of pictures that say nothing."""
         return self.transfer in (None, "srgb") and self.is_neutral
 
+    @property
+    def in_words(self) -> str:
+        """For people, in a few words; empty where nothing is said."""
+        differ = len({each.exposure for each in self.said.values()}) > 1
+        first = next(iter(self.said.values()), None)
+        return "" if first is None else first.in_words + (" and others" if differ else "")
+
     def check(self, told: str) -> None:
         """Refuse a transfer function that the files contradict.
 
