@@ -392,7 +392,7 @@ def test_what_capture_wrote_is_decoded_as_what_was_captured(written, ending):
     camera = vcc.load_camera("camera.toml")
     image = camera.capture(written, samples=16, seed=0)
     raw = f"raw.{ending}"
-    for more in ([], ["--as-recorded"]):
+    for more in ([], ["--as-recorded"]) if ending == "exr" else ([],):
         result = run("capture", "camera.toml", "field.npz", "-o", raw, "--samples", 16, *more)
         assert result.exit_code == 0, result.output
         exposure = statement_of(Path(raw)).exposure
@@ -404,15 +404,21 @@ def test_what_capture_wrote_is_decoded_as_what_was_captured(written, ending):
         assert np.abs(values - expected.values).max() <= bound
         assert ("too bright for the automatic exposure" in notes) == (exposure != 1)
         assert ("has 8 bits" in notes) == (ending == "png")
-    image.save("python.png")  # as the tutorial does
-    values, notes = decoded("python.png")
-    seen = np.minimum(image.to_numpy(), np.float32(1 / image.save("python.png").exposure))
-    bound = HALF_A_CODE["png"] * float(image.to_numpy().max()) + 1e-9
+
+
+def test_what_python_saved_is_decoded_as_what_was_captured(written):
+    """As the tutorial saves it."""
+    camera = vcc.load_camera("camera.toml")
+    image = camera.capture(written, samples=16, seed=0)
+    exposure = image.save("raw.png").exposure
+    values, notes = decoded("raw.png")
+    seen = np.minimum(image.to_numpy(), np.float32(1 / exposure))
+    bound = HALF_A_CODE["png"] / exposure + 1e-5 * float(image.to_numpy().max())
     assert np.abs(values - decode_plenoptic(seen, camera=camera, views=3).values).max() <= bound
     assert "another camera" not in notes
 
 
-@pytest.mark.parametrize("ending", ["tif", "png", "npy"])
+@pytest.mark.parametrize("ending", ["tif", "npy"])  # a .png is decoded through its filters above
 def test_what_expose_wrote_is_decoded_as_the_recording(written, ending):
     camera = vcc.load_camera("camera.toml")
     recording = camera.expose(written, seed=3, samples=16)
