@@ -126,10 +126,10 @@ def early(file: Any) -> None:
         (raw_chunk(zlib.compress(bytes(10**6))), "truncated or too long"),
         (raw_chunk(zlib.compress(VIEWS.tobytes())[:-2]), "truncated or too long"),
         (raw_chunk(b"no zlib"), "is damaged"),
-        (lambda f: f.create_dataset("LF", (1000, 1000, 1000, 1000, 3), "u1"), "claims 3,000,000,000,000 samples"),
+        (lambda f: f.create_dataset("LF", (1000, 1000, 1000, 1000, 3), "u1"), "claims 3,000,000,000,000 bytes"),
         (
             lambda f: f.create_dataset("LF", (2, 2, 2**15, 2**15), "u1", chunks=True),
-            "claims 4,294,967,296 samples",
+            "claims 4,294,967,296 bytes",
         ),
         (external, "lies in another file"),
         (virtual, "lies in another file"),

@@ -232,7 +232,9 @@ def test_frames_that_need_no_bytes_have_an_end(tmp_path, monkeypatch):
     """A frame that repeats the last one takes a few bytes: so many may unpack to any size."""
     path = written(tmp_path / "a.mp4", np.zeros((6, 48, 64, 3), np.uint8))
     monkeypatch.setattr(video, "LIGHT_FIELD", 5 * 48 * 64 * 3)
-    with pytest.raises(InputError, match=r"a\.mp4 claims 55,296 samples in .*take fewer frames with every="):
+    with pytest.raises(
+        InputError, match=r"a\.mp4 claims 55,296 bytes of samples in .*take fewer frames with every="
+    ):
         video.read(path)
     assert video.read(path, every=2).values.shape == (1, 3, 48, 64, 3)
 

@@ -16,7 +16,6 @@ _FRAMES = {0xC0: "sequential", 0xC1: "sequential", 0xC2: "progressive", 0xC3: "l
 _OTHER_FRAMES = frozenset(range(0xC5, 0xD0)) - {0xC8, 0xCC}
 _ALONE = frozenset({0x01, *range(0xD0, 0xD9)})  # markers without a segment
 _SCAN, _RESTARTS, _END = 0xDA, 0xDD, 0xD9
-_MOST_SCANS = 100  # a progressive picture has some ten; each passes over the whole picture
 
 
 class NotThere(Exception):
@@ -85,7 +84,7 @@ def parsed(data: bytes) -> Jpeg:
 
     Raises:
         NotThere: no JPEG, one that ends before its end marker, of several frames, without a size, of a coding that
-            is not known, of too many scans, or in which restarts are missing.
+            is not known, or in which restarts are missing.
     """
     if not data.startswith(b"\xff\xd8"):
         raise NotThere("it does not begin as one")
@@ -117,8 +116,6 @@ def parsed(data: bytes) -> Jpeg:
             end = _END_OF_SCAN.search(data, place)
             scans.append(_scan(segment, head[4], restarts, place, end.start() if end else len(data)))
             place = scans[-1].end
-            if len(scans) > _MOST_SCANS:
-                raise NotThere(f"it has more than {_MOST_SCANS} scans")
     raise NotThere("the end of the picture is missing")
 
 

@@ -27,6 +27,7 @@ NOT_OPAQUE = (
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_CHANNELS = {0: 1, 2: 3, 3: 4, 4: 2, 6: 4}  # by the type of colour; a palette may have opacity
+_SCANS = 16  # of a JPEG: a progressive picture has some ten, and each passes over all of it
 _TIFF_JPEG = 7
 _PALETTE_NOT_GREY = ("P", "1")
 _PLAIN_BMP = (0, 3)  # as it is, with bit fields
@@ -69,7 +70,7 @@ def read_exr_channels(path: Path) -> dict[str, NDArray[Any]]:
                 raise Unsuitable("this OpenEXR file has several samples for a pixel (deep); flatten it")
             first, last = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
             width, height = (max(0, int(n)) for n in last - first + 1)
-            check_claim(width * height * len(header["channels"]), 4, path.stat().st_size, "it")
+            check_claim(4 * width * height * len(header["channels"]), path.stat().st_size, "it")
     with OpenEXR.File(str(path), separate_channels=True) as file:
         return {name: np.asarray(channel.pixels) for name, channel in file.channels().items()}
 
@@ -87,8 +88,8 @@ def _check_png(data: bytes) -> None:
                 break
             width, height = (int.from_bytes(data[n : n + 4], "big") for n in (place + 8, place + 12))
             bits, colour = data[place + 16], data[place + 17]
-            claimed = width * height * _PNG_CHANNELS.get(colour, 4)
-            check_claim(claimed, 2 if bits > 8 else 1, len(data), "it")
+            channels = _PNG_CHANNELS.get(colour, 4)
+            check_claim(width * height * channels * (2 if bits > 8 else 1), len(data), "it")
         if name == b"IEND":
             return
         place += 12 + length
@@ -107,7 +108,9 @@ def _decode_jpeg(data: bytes, tables: bytes | None = None) -> NDArray[Any]:
     import imagecodecs
 
     jpeg = jpeg_headers.parsed(data)
-    check_claim(jpeg.height * jpeg.width * len(jpeg.sampling), 1 if jpeg.bits == 8 else 2, len(data), "it")
+    claimed = jpeg.height * jpeg.width * len(jpeg.sampling) * (1 if jpeg.bits == 8 else 2)
+    check_claim(claimed, len(data), "it")
+    check_claim(claimed * len(jpeg.scans) // _SCANS, len(data), f"it, in {len(jpeg.scans)} scans,")
     if jpeg_headers.least_bytes(jpeg) > len(data):
         raise ValueError(f"{jpeg.width}×{jpeg.height} pixels take more than its {len(data):,} bytes")
     samples: NDArray[Any] = imagecodecs.jpeg8_decode(data, tables=tables)
@@ -152,9 +155,9 @@ def _check_tiff(page: Any, path: Path) -> None:
     """
     size, width = path.stat().st_size, page.dtype.itemsize
     palette = 3 if page.colormap is not None else 1
-    check_claim(math.prod(page.shaped) * palette, width, size, "it")
+    check_claim(math.prod(page.shaped) * palette * width, size, "it")
     if page.is_tiled:
-        check_claim(math.prod(page.chunked) * math.prod(page.chunks), width, size, "its tiles")
+        check_claim(math.prod(page.chunked) * math.prod(page.chunks) * width, size, "its tiles")
     places = list(zip(page.dataoffsets, page.databytecounts, strict=False))
     wanted = math.prod(page.chunked)
     there = [place for place in places[:wanted] if place[0] > 0 < place[1] and sum(place) <= size]
@@ -177,7 +180,7 @@ def _read_bmp(path: Path) -> NDArray[Any]:
 
     data = path.read_bytes()
     with Image.open(io.BytesIO(data), formats=("BMP",)) as picture:
-        check_claim(3 * picture.width * picture.height, 1, len(data), "it")
+        check_claim(3 * picture.width * picture.height, len(data), "it")
         if picture.info["compression"] not in _PLAIN_BMP:
             raise Unsuitable("this BMP is packed, which few programs do; save it as PNG")
         if picture.mode == "P":

@@ -105,7 +105,7 @@ def references(data: Any, path: Path) -> list[Any]:
     h5py = hdf5.library()
     if data.shape is None or h5py.check_ref_dtype(data.dtype) is not h5py.Reference:
         raise InputError(f"{path}: {data.name} holds {_kind(data)}, not references")
-    check_claim(data.size, data.dtype.itemsize, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
+    check_claim(data.nbytes, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
     return [data.file[reference] for reference in data[...].ravel()]
 
 
@@ -158,7 +158,7 @@ def _kind(data: Any) -> str:
 
 def _stored(data: Any, path: Path) -> NDArray[Any]:
     """The elements of a data set, once it is known that all of them are in the file."""
-    check_claim(data.size, data.dtype.itemsize, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
+    check_claim(data.nbytes, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
     if data.external or data.is_virtual:
         raise InputError(f"{path}: {data.name} lies in another file, which is not read. Copy it into this one")
     if data.chunks is not None:
@@ -173,7 +173,7 @@ def _stored(data: Any, path: Path) -> NDArray[Any]:
 def _from_chunks(data: Any, path: Path) -> NDArray[Any]:
     size, chunk = path.stat().st_size, data.chunks
     wanted = math.prod(-(-n // step) for n, step in zip(data.shape, chunk, strict=True))
-    check_claim(wanted * math.prod(chunk), data.dtype.itemsize, size, f"{path}: {data.name}", LIGHT_FIELD)
+    check_claim(wanted * math.prod(chunk) * data.dtype.itemsize, size, f"{path}: {data.name}", LIGHT_FIELD)
     masks: dict[tuple[int, ...], int] = {}
 
     def note(info: Any) -> None:

@@ -58,7 +58,7 @@ def read_views(
     shape = (len(files), *picture)
     stored_bytes = sum(file.stat().st_size for file in set(files.values()) if file.is_file())
     folder = next(iter(files.values())).parent
-    check_claim(math.prod(shape), np.dtype(stored).itemsize, stored_bytes, str(folder), LIGHT_FIELD)
+    check_claim(math.prod(shape) * np.dtype(stored).itemsize, stored_bytes, str(folder), LIGHT_FIELD)
     try:
         values: NDArray[Any] = np.empty(shape, kind)
     except MemoryError:

@@ -237,10 +237,15 @@ def _arranged(
 
 def _check_claim(frame: Any, count: int, path: Path) -> None:
     """Refuse so many frames of this size, if the file is too small for them: frames that repeat need no bytes."""
+    width = 1 if _bits(frame) <= 8 else 2
     try:
-        check_claim(3 * frame.height * frame.width * count, 2, path.stat().st_size, str(path), LIGHT_FIELD)
+        check_claim(3 * frame.height * frame.width * count * width, path.stat().st_size, str(path), LIGHT_FIELD)
     except InputError as error:
         raise InputError(f"{error}, or take fewer frames with every=, first= and last=") from None
+
+
+def _bits(frame: Any) -> int:
+    return max(int(component.bits) for component in frame.format.components)
 
 
 def _picture(frame: Any, path: Path) -> NDArray[Any]:
@@ -252,7 +257,7 @@ def _picture(frame: Any, path: Path) -> NDArray[Any]:
             f"{path} has the brightness curve {_HIGH_DYNAMIC_RANGE[frame.color_trc]} (high dynamic range), which "
             "is not sRGB: convert it to a video of standard dynamic range"
         )
-    bits = max(component.bits for component in frame.format.components)
+    bits = _bits(frame)
     source = "ITU709" if frame.colorspace == _UNSPECIFIED and frame.height >= _HD else None
     samples: NDArray[Any] = frame.to_ndarray(format="rgb24" if bits <= 8 else "rgb48le", src_colorspace=source)
     if frame.rotation % 90:
