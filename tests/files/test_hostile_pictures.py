@@ -108,8 +108,6 @@ def test_a_jpeg_that_is_grey_at_its_end_opens(how: dict[str, object], tmp_path: 
 def test_jpegs_with_many_scans_and_unknown_codings(tmp_path: Path) -> None:
     data = jpeg(GREY)
     path = tmp_path / "a.jpg"
-    scan = data[data.find(b"\xff\xda") : -2]
-    refused(path, data[:-2] + scan + b"\xff\xd9", "more than one scan")
     large = jpeg(np.zeros((4096, 4096), np.uint8), progressive=True)
     again = large[large.find(b"\xff\xda") : -2]
     refused(path, large[:-2] + 80 * again + b"\xff\xd9", r"in \d+ scans, claims 9\d,\d+,\d+ bytes")

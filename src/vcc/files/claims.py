@@ -2,8 +2,8 @@
 
 Some packings have no bound of their own (a run of zeros, a frame of a video that repeats the last one), and those
 that have one, like deflate's 1032 bytes for one, leave room for bombs. So what a file's header claims is held
-against the bytes that there are, before anything is unpacked. What pictures and light fields hold in earnest is far
-below: photographs have less than 50 bytes for one, the plainest of rendered views some hundred.
+against the bytes that there are, before anything is unpacked. What pictures and light fields hold in earnest is
+far below: photographs have less than 50 bytes for one, the plainest of rendered views some hundred.
 """
 
 from __future__ import annotations
