@@ -109,7 +109,7 @@ def test_jpegs_with_many_scans_and_unknown_codings(tmp_path: Path) -> None:
     data = jpeg(GREY)
     path = tmp_path / "a.jpg"
     large = jpeg(np.zeros((4096, 4096), np.uint8), progressive=True)
-    again = large[large.find(b"\xff\xda") : -2]
+    again = large[large.rfind(b"\xff\xda") : -2]
     refused(path, large[:-2] + 80 * again + b"\xff\xd9", r"in \d+ scans, claims 9\d,\d+,\d+ bytes")
     refused(path, data.replace(b"\xff\xc0", b"\xff\xc9"), "coding is not known")
     refused(path, jpeg_of_height(data, 0), "states 50×0 pixels")

@@ -60,7 +60,7 @@ def table(bits: int) -> NDArray[np.float32]:
     return entries
 
 
-_AT_ONCE = 65536  # pairs: their indices, which NumPy widens to 8 bytes each, stay in the cache
+_AT_ONCE = 65536  # samples or pairs: their indices, which NumPy widens to 8 bytes each, stay in the cache
 
 
 @functools.cache
@@ -96,6 +96,11 @@ def decode(samples: NDArray[Any], out: NDArray[np.float32] | None = None) -> NDA
         for start in range(0, len(codes), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
             np.take(_pairs(), codes[part], out=light[part], mode="clip")
+    elif samples.dtype == np.uint16 and _are_contiguous(samples, out):
+        numbers, values = samples.reshape(-1), out.reshape(-1)
+        for start in range(0, len(numbers), _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
+            np.take(table(16), numbers[part], out=values[part], mode="clip")
     elif samples.dtype in (np.uint8, np.uint16):
         # Every code is inside the table, so "clip" changes nothing; it spares NumPy a buffered
         # copy.
