@@ -9,8 +9,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 _MARKER = re.compile(rb"\xff+[^\x00\xff]")
-_END_OF_SCAN = re.compile(rb"\xff+[^\x00\xff\xd0-\xd7]")
 _RESTART = re.compile(rb"\xff[\xd0-\xd7]")
 _FRAMES = {0xC0: "sequential", 0xC1: "sequential", 0xC2: "progressive", 0xC3: "lossless"}
 _OTHER_FRAMES = frozenset(range(0xC5, 0xD0)) - {0xC8, 0xCC}
@@ -90,7 +92,7 @@ def parsed(data: bytes) -> Jpeg:
         raise NotThere("it does not begin as one")
     head: tuple[str, int, int, int, dict[int, tuple[int, int]]] | None = None
     scans: list[Scan] = []
-    restarts, place = 0, 2
+    restarts, place, ends = 0, 2, None
     while found := _MARKER.search(data, place):
         marker, place = data[found.end() - 1], found.end()
         if marker == _END and scans and head is not None:
@@ -113,10 +115,20 @@ def parsed(data: bytes) -> Jpeg:
         elif marker == _SCAN:
             if head is None:
                 break
-            end = _END_OF_SCAN.search(data, place)
-            scans.append(_scan(segment, head[4], restarts, place, end.start() if end else len(data)))
+            ends = _ends_of_scans(data) if ends is None else ends
+            end = int(ends[np.searchsorted(ends, place)])
+            scans.append(_scan(segment, head[4], restarts, place, end))
             place = scans[-1].end
     raise NotThere("the end of the picture is missing")
+
+
+def _ends_of_scans(data: bytes) -> NDArray[np.intp]:
+    """Where coded data may end: at markers that are no restarts, and where the file does."""
+    codes = np.frombuffer(data, np.uint8)
+    found = np.flatnonzero(codes[:-1] == 255)
+    after = codes[found + 1]
+    ends = found[(after != 0) & (after != 255) & (after & 0xF8 != 0xD0)]
+    return np.append(ends, len(data))
 
 
 def longer(jpeg: Jpeg, data: bytes, filling: bytes) -> bytes:
