@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from collections.abc import Iterable
 from os import PathLike
-from typing import Any, Literal, TypeVar, Unpack
+from typing import Any, Literal, Self, TypeVar, Unpack
 
 from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
 from vcc.advice.darkness import why_dark
@@ -15,6 +17,11 @@ from vcc.base.progress import Progress
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
 from vcc.files.camera_writing import write_train
 from vcc.image import Image
+from vcc.optics.electronics import Electronics
+from vcc.optics.faces import Element
+from vcc.optics.focusing import focused_train
+from vcc.optics.plenoptic import Plenoptic
+from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
 from vcc.plan.how import OF_THE_RUN, How, Options
@@ -70,6 +77,62 @@ class Camera(Train):
         InputError: no sensor, or what is no element; an element before the entrance plane or behind the sensor;
             two elements of one name.
     """
+
+    @classmethod
+    def focused(cls, elements: Iterable[Element], sensor: Sensor, distance: float, *, name: str = "") -> Self:
+        """The camera with its sensor moved to where a point is sharp, by first-order optics.
+
+        Lenses, first-order systems and quadratic plates count: 1/f = 1/Z + 1/d for one thin lens. Lens arrays,
+        other plates, masks and diffusers do not focus as a lens does, and are passed over.
+
+        Args:
+            elements: as for the camera itself.
+            sensor: its z is not looked at (0 will do): it is what is found.
+            distance: Z, from the point to the entrance plane, metres, above 0; ``math.inf`` for a distant scene.
+            name: as for the camera itself.
+
+        Raises:
+            InputError: there is no real image of the point, or it lies before the last element; it is sharp along
+                one axis only; or what the camera itself refuses.
+        """
+        train = focused_train(elements, sensor, distance)
+        return cls(train.elements, train.sensor, name=name)
+
+    @classmethod
+    def plenoptic(
+        cls,
+        focal_length: float,
+        *,
+        lenslet_pitch: float,
+        f_number: float,
+        pixels_per_lenslet: int,
+        lenslets: tuple[int, int],
+        focus_distance: float = math.inf,
+        electronics: Electronics | None = None,
+        name: str = "",
+    ) -> Self:
+        """A main lens, lenslets where it images a distance, and the sensor behind them at their focus.
+
+        F-numbers match, so that micro-images touch and do not overlap (Ng et al. 2005): with b from lenslets to
+        sensor, d from main lens to lenslets and the pitch p, b = f_number · p and the main lens is
+        D = d·p·(1 + b/d)/b wide. A micro-image is p·(1 + b/d) wide, so many pixels across.
+
+        Args:
+            focal_length: of the main lens, metres.
+            lenslet_pitch: p, metres.
+            f_number: of the lenslets, b/p, and of the main lens as the sensor sees it, (d + b)/D.
+            pixels_per_lenslet: across one micro-image: as many views each way.
+            lenslets: (rows, columns): the pixels of a view.
+            focus_distance: of the plane that the main lens images on the lenslets, metres; may be infinite.
+            electronics: of the sensor.
+            name: as for the camera itself.
+
+        Raises:
+            InputError: a length or f-number of 0 or less, no whole numbers of pixels and lenslets, or a distance
+                within the focal length.
+        """
+        design = Plenoptic(focal_length, lenslet_pitch, f_number, pixels_per_lenslet, lenslets, focus_distance)
+        return cls(design.elements, design.sensor(electronics), name=name)
 
     def compile(
         self,

@@ -29,7 +29,8 @@ Patterns, kernels and surfaces are written by name: the classes of `vcc.patterns
 ``top_hat``, ``radial``, ``samples``) and of `vcc.surfaces` (``cubic``, ``zernike``, ``height_map`` …). Arrays
 are the name of a file or rows of numbers (``[[0, 1], [1, 0]]``). A field that is a dataclass of its own, such
 as a sensor's electronics, is a table: ``[sensor.electronics]``. A real lens is a ``first_order`` with
-``lens_file = "dgauss.50mm.dat"`` instead of a matrix.
+``lens_file = "dgauss.50mm.dat"`` instead of a matrix. A sensor has a z, or ``focus = "1.2 m"``: the distance
+that is to be sharp (`vcc.Camera.focused`).
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import itertools
 import types
 import warnings
 from collections.abc import Iterable
@@ -23,6 +24,7 @@ from vcc.base.errors import InputError
 from vcc.base.reading import expanded
 from vcc.optics import Element, FirstOrder
 from vcc.prescriptions import load_lens
+from vcc.prescriptions.model import Reference
 from vcc.shapes import height_maps, kernels, lattice, patterns, surfaces, zernike
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern
@@ -129,6 +131,7 @@ class _LensFile:
     wavelength: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
     glasses: dict[str, float] | None = None
     rims: bool = False
+    z_of: str = "first surface"
     z: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
     decentre: tuple[float, float] = dataclasses.field(default=(0.0, 0.0), metadata={"unit": "length"})
     name: str = ""
@@ -146,8 +149,8 @@ class _LensFile:
     def of(cls, lens: FirstOrder, folder: Path) -> _LensFile | None:
         """The form that gives an equal lens; None if it came from no file, or that is gone or gives another."""
         rims = lens.exit_diameter is not None
-        for stop in (None, lens.stop_diameter):
-            form = cls(lens.source, stop, rims=rims, z=lens.z, decentre=lens.decentre, name=lens.name)
+        for stop, z_of in itertools.product((None, lens.stop_diameter), get_args(Reference)):
+            form = cls(lens.source, stop, rims=rims, z_of=z_of, z=lens.z, decentre=lens.decentre, name=lens.name)
             try:
                 with warnings.catch_warnings():  # of a wide stop, which was said when it was read
                     warnings.simplefilter("ignore")

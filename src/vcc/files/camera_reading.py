@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import inspect
+import math
 import os
 import re
 import tomllib
@@ -35,6 +36,7 @@ from vcc.files.camera_families import (
 from vcc.files.npy import read_npy
 from vcc.files.pictures import read_grey
 from vcc.files.toml_words import as_toml, in_toml
+from vcc.optics.focusing import focused_train
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.shapes.patterns import Pattern
@@ -63,9 +65,30 @@ def _train_of(tables: Mapping[str, Any], file: Path) -> Train:
     if not isinstance(tables["sensor"], dict):
         raise InputError(f"{file}: the sensor is a table that starts with a line [sensor]")
     built = [_read_element(entry, number, file) for number, entry in enumerate(elements, start=1)]
-    sensor = _build(Sensor, tables["sensor"], f"{file}: sensor", file.parent)
+    given, place = dict(tables["sensor"]), f"{file}: sensor"
+    focus = _focus(given, place)
+    sensor = _build(Sensor, given, place, file.parent)
     with checks.within(f"{file}"):
-        return Train(built, sensor, name=file.stem)
+        if focus is None:
+            return Train(built, sensor, name=file.stem)
+        return focused_train(built, sensor, focus, file.stem)
+
+
+def _focus(given: dict[str, Any], place: str) -> float | None:
+    """The distance to focus on, taken out of a sensor's fields, and a place put there; None where z is given."""
+    if "focus" not in given:
+        if "z" not in given:
+            raise InputError(
+                f'{place} has no field "z" (or "focus", the distance that is to be sharp), which it needs'
+            )
+        return None
+    if "z" in given:
+        raise InputError(f"{place} has a z and a focus, of which z would follow: leave one out")
+    focus = given.pop("focus")
+    given["z"] = "0 m"
+    if focus in ("inf", "infinity"):
+        return math.inf
+    return units.parse(focus, "length", f"{place}: focus")
 
 
 def _read_toml(file: Path) -> dict[str, Any]:

@@ -326,7 +326,7 @@ def _patterns_figure(judged: list[Judged]) -> Figure:
         axes.set_axis_off()
     for axes, each in zip(grid, judged, strict=False):
         axes.set_axis_on()
-        pattern = as_pattern(each.mask.pattern)
+        pattern = as_pattern(each.mask.pattern)  # type: ignore[arg-type]
         open_parts = pattern.mean(places[None, :], places[:, None], step, step).astype(np.float32)
         title = f"{each.name}\n{100 * each.kernel.sum():.0f} % of the light"
         figures.put(axes, open_parts, title, cmap="gray", vmin=0, vmax=1)

@@ -304,6 +304,43 @@ class FirstOrder(Element):
             )
         return float(-(a * object_distance + b) / slope)
 
+    def from_entrance_pupil(self, z: float = 0.0) -> FirstOrder:
+        """The same system told from its entrance pupil, which is then its first plane and stands at z.
+
+        Light before the first surface flies free, so that its rays can be told on any plane, on that of the pupil
+        even where glass stands: the matrix is multiplied by the flight from the pupil back to the old first plane.
+        Views of a light field that stand on the pupil are taken from the lens's own perspective centre, and its
+        stop asks for no others. Where the pupil lies behind the last plane, that plane moves to the pupil too.
+
+        Args:
+            z: of the pupil, metres; 0 is the plane of the light field.
+
+        Raises:
+            InputError: no stop, a pupil at infinity (telecentric), or a rim at the first plane (or, where that
+                moves, the last), which would no longer stand there.
+        """
+        distance = self.entrance_pupil.distance
+        if math.isinf(distance):
+            raise InputError(f"the entrance pupil of {self.label} lies at infinity: place it by its first plane")
+        beyond = max(distance - self.length, 0.0)
+        if self.entrance_diameter is not None or (beyond and self.exit_diameter is not None):
+            raise InputError(
+                f"a rim of {self.label} stands at a plane that moves to the entrance pupil: leave it out "
+                "(rims=False), or place the lens by its first plane"
+            )
+        back = np.array([[1.0, -distance], [0.0, 1.0]])
+        on = np.array([[1.0, beyond], [0.0, 1.0]])
+        stop = _abcd(as_ray_map(self.stop_from_entrance), self.label) @ back
+        stop[0, 1] = 0.0  # the pupil is the stop's image: all of a point's rays meet the stop at one place
+        return dataclasses.replace(
+            self,
+            matrix=on @ self.abcd @ back,
+            length=max(self.length - distance, 0.0),
+            stop_from_entrance=stop,
+            z=z,
+            source=f"{self.source}, from its entrance pupil" if self.source else "",
+        )
+
     def reversed(self) -> FirstOrder:
         """The same system met from its other end, at the same z: mirrored in a plane across the axis."""
         turn = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])

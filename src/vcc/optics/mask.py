@@ -58,7 +58,7 @@ class Mask(Element):
 
     def faces(self) -> Faces:
         """A transmission, opaque outside the sheet."""
-        pattern = as_pattern(self.pattern)
+        pattern = as_pattern(self.pattern)  # type: ignore[arg-type]
         if isinstance(pattern, Cells) or self.width is None:
             return Faces(transmission=pattern)
         height = self.width if self.height is None else self.height

@@ -13,7 +13,7 @@ from vcc.base.reading import expanded, read_bytes, reading
 from vcc.optics.first_order import FirstOrder
 from vcc.prescriptions import pbrt, zemax
 from vcc.prescriptions.glasses import D_LINE, Glasses
-from vcc.prescriptions.model import Prescription, Surface
+from vcc.prescriptions.model import Prescription, Reference, Surface
 
 __all__ = ["Prescription", "Surface", "load_lens", "read_prescription"]
 
@@ -51,6 +51,7 @@ def load_lens(
     path: str | PathLike[str],
     *,
     z: float = 0.0,
+    z_of: Reference = "first surface",
     stop_diameter: float | None = None,
     f_number: float | None = None,
     wavelength: float = D_LINE,
@@ -59,7 +60,7 @@ def load_lens(
     decentre: tuple[float, float] = (0.0, 0.0),
     name: str = "",
 ) -> FirstOrder:
-    """A real lens, reduced to first order: its first surface stands at z, light travels as the file lists them.
+    """A real lens, reduced to first order: light travels through its surfaces as the file lists them.
 
     Paraxial: principal planes, focal length, stop and pupils are the lens's own, aberrations are not, and of
     the rims only the stop (and with ``rims`` the first and the last surface) cuts light off.
@@ -67,7 +68,9 @@ def load_lens(
 
     Args:
         path: a PBRT lens table (``.dat``) or a sequential Zemax file (``.zmx``).
-        z: place of the first surface, metres.
+        z: place of the first surface, or of what ``z_of`` says, metres.
+        z_of: ``"first surface"``, or ``"entrance pupil"``: with z = 0 the lens then looks from where the views of
+            the light field stand, its glass before them; see `vcc.FirstOrder.from_entrance_pupil`.
         stop_diameter: metres; None for the file's own stop.
         f_number: focal length / entrance pupil, for a distant scene, by which to open the stop instead.
         wavelength: metres, at which catalogue glasses are taken.
@@ -85,5 +88,5 @@ def load_lens(
     prescription = read_prescription(path, wavelength=wavelength, glasses=glasses)
     with reading(path, "a lens"):
         return prescription.first_order(
-            z=z, stop_diameter=stop_diameter, f_number=f_number, rims=rims, decentre=decentre, name=name
+            z=z, z_of=z_of, stop_diameter=stop_diameter, f_number=f_number, rims=rims, decentre=decentre, name=name
         )

@@ -7,6 +7,7 @@ import math
 import warnings
 from dataclasses import dataclass, field
 from functools import reduce
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from vcc.optics.first_order import FirstOrder, gap, refraction, surface_power
 
 Matrix = NDArray[np.float64]
 
+Reference = Literal["first surface", "entrance pupil"]
+"""What of a lens stands at its z."""
 AIR_TOLERANCE = 1e-3
 """How far the index behind the last surface may be from that of air."""
 
@@ -151,13 +154,14 @@ class Prescription(Brief):
         self,
         *,
         z: float = 0.0,
+        z_of: Reference = "first surface",
         stop_diameter: float | None = None,
         f_number: float | None = None,
         rims: bool = False,
         decentre: tuple[float, float] = (0.0, 0.0),
         name: str = "",
     ) -> FirstOrder:
-        """The lens as an element, from its first surface to its last.
+        """The lens as an element, from its first surface (or its entrance pupil) to its last surface.
 
         Args: see `vcc.load_lens`.
 
@@ -179,10 +183,13 @@ class Prescription(Brief):
             self.matrix, self.length, entrance_diameter=ends[0], exit_diameter=ends[1],
             z=z, decentre=decentre, name=name, source=self.source,
         )  # fmt: skip
+        checks.one_of("z_of", z_of, get_args(Reference))
         opening = self._opening(lens, stop_diameter, f_number)
-        if opening is None:
+        if opening is not None:
+            lens = dataclasses.replace(lens, stop_from_entrance=self.stop_from_entrance, stop_diameter=opening)
+        if z_of == "first surface":
             return lens
-        return dataclasses.replace(lens, stop_from_entrance=self.stop_from_entrance, stop_diameter=opening)
+        return dataclasses.replace(lens.from_entrance_pupil(z), source=self.source)
 
     def _opening(self, lens: FirstOrder, stop_diameter: float | None, f_number: float | None) -> float | None:
         """The stop's diameter: what is asked for, else what the file states, else the stop surface's own."""

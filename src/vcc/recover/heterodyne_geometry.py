@@ -246,7 +246,7 @@ def _carrier_mask(camera: Camera) -> tuple[Mask, CosineSum]:
     found = []
     for element in camera.elements:
         if isinstance(element, Mask):
-            pattern = as_pattern(element.pattern)
+            pattern = as_pattern(element.pattern)  # type: ignore[arg-type]
             inner = pattern.pattern if isinstance(pattern, Bounded) else pattern
             if isinstance(inner, CosineSum):
                 found.append((element, inner))

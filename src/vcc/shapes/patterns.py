@@ -477,7 +477,7 @@ def owned(pattern: Pattern, owner: str) -> Pattern:
     return pattern
 
 
-def as_pattern(pattern: Any) -> Pattern:
+def as_pattern(pattern: Pattern | Callable[[Array, Array], ArrayLike]) -> Pattern:
     """A pattern from a pattern or from any function of (x, y) in metres.
 
     Raises:
@@ -485,19 +485,20 @@ def as_pattern(pattern: Any) -> Pattern:
     """
     if isinstance(pattern, Pattern):
         return pattern
-    if pattern is mura or (isinstance(pattern, str) and pattern.lower() == "mura"):
+    given: Any = pattern
+    if given is mura or (isinstance(given, str) and given.lower() == "mura"):
         raise InputError("a MURA is an array of cells: write vcc.Mask(vcc.patterns.mura(29), width=10 * mm)")
-    if isinstance(pattern, str) and Path(pattern).suffix:
-        read = f"vcc.files.pictures.read_grey({pattern!r})"
-        raise InputError(f"{pattern!r} is the name of a file: write vcc.Mask({read}, width=30 * mm)")
-    if isinstance(pattern, str | type):
+    if isinstance(given, str) and Path(given).suffix:
+        read = f"vcc.files.pictures.read_grey({given!r})"
+        raise InputError(f"{given!r} is the name of a file: write vcc.Mask({read}, width=30 * mm)")
+    if isinstance(given, str | type):
         kinds = (Open, Circle, Polygon, CosineSum, Cells, Bounded)
-        raise InputError(f"{pattern!r} is no pattern: {instead_of_name(pattern, 'vcc.patterns', kinds)}")
-    if callable(pattern):
-        return FunctionPattern(pattern)
+        raise InputError(f"{given!r} is no pattern: {instead_of_name(given, 'vcc.patterns', kinds)}")
+    if callable(given):
+        return FunctionPattern(given)
     raise InputError(
         "a pattern is a vcc.patterns.Pattern, a function of (x, y) or, for a mask, an array of transmissions, "
-        f"not {type(pattern).__name__}"
+        f"not {type(given).__name__}"
     )
 
 

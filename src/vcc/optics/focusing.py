@@ -1,0 +1,105 @@
+"""Where the sensor must stand, by first-order optics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import checks
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.units import short
+from vcc.optics.faces import Element
+from vcc.optics.sensor import Sensor
+from vcc.optics.train import Train, touch
+
+_FAR = 1e9
+"""Metres; a place behind all elements."""
+_PARALLEL = 1e-9
+"""Slopes per metre of aperture, 1/m, below which light counts as parallel: an image 10⁹ m away."""
+_ALIKE = 1e-6
+"""Share of the beam's size in focus by which two axes may differ: what rounding leaves of none."""
+
+
+def focused_train(elements: Iterable[Element], sensor: Sensor, distance: float, name: str = "") -> Train:
+    """A train whose sensor stands where a point is sharp.
+
+    Light of a point Z before the entrance plane meets it at u with the slope u/Z. All that is affine on the way
+    (thin lenses, first-order systems, quadratic plates) takes (u, u/Z) to (P·u, Q·u) behind the last element, and
+    the rays meet d behind that, where P + d·Q = 0; for one thin lens that is 1/f = 1/Z + 1/d. Prisms and decentred
+    lenses move the image sideways only. Lens arrays, other plates and diffusers are passed over: they do not focus
+    as a lens does.
+
+    Args:
+        elements: as a `vcc.Camera` takes them.
+        sensor: its z is not looked at.
+        distance: Z, metres before the entrance plane, above 0; may be infinite.
+        name: of the train.
+
+    Raises:
+        InputError: no distance; no real image, or one before the last element; an image that is sharp along one
+            axis only (astigmatism); or what `vcc.Camera` refuses.
+    """
+    distance = checks.above_zero("distance", distance, unit="m", infinite=True)
+    listed = Train(elements, _at(sensor, _FAR)).elements
+    end = max((element.z + element.length for element in listed), default=0.0)
+    rays = Train(listed, _at(sensor, end)).arriving_at_sensor.linear
+    beam, slopes = (rays[rows, :2] + rays[rows, 2:] / distance for rows in (slice(0, 2), slice(2, 4)))
+    behind = _meeting(beam, slopes, distance, end)
+    if behind < 0 and not touch(end + behind, end):
+        raise InputError(_why_not_behind(listed, end + behind, distance))
+    return Train(listed, _at(sensor, end + max(behind, 0.0)), name=name)
+
+
+def _at(sensor: Any, z: float) -> Any:
+    """The sensor at another place; what is none is left to the train, which refuses it with what to write."""
+    return replace(sensor, z=z) if isinstance(sensor, Sensor) else sensor
+
+
+def _meeting(beam: NDArray[np.float64], slopes: NDArray[np.float64], distance: float, end: float) -> float:
+    """The d at which beam + d·slopes is 0, both 2×2: from two places of the entrance plane."""
+    if np.abs(slopes).max() < _PARALLEL:
+        raise InputError(f"light of {_point(distance)} leaves the last element parallel: it is sharp nowhere")
+    d = -float((beam * slopes).sum() / (slopes * slopes).sum())
+    left = beam + d * slopes
+    if np.abs(left).max() > _ALIKE * max(np.abs(beam).max(), abs(d) * np.abs(slopes).max()):
+        across, down = (end - float(beam[n, n] / slopes[n, n]) if slopes[n, n] else np.inf for n in (0, 1))
+        raise InputError(
+            f"light of {_point(distance)} is sharp along x at z = {short(across)} and along y at z = "
+            f"{short(down)}: say where the sensor stands by its z"
+        )
+    return d
+
+
+def _why_not_behind(elements: tuple[Element, ...], image: float, distance: float) -> str:
+    bending = [element for element in elements if _bends(element)]
+    if not bending:
+        return f"nothing here focuses: light of {_point(distance)} spreads on. Add a lens, or say the sensor's z"
+    last = max(bending, key=lambda element: element.z + element.length)
+    if image < last.z + last.length:
+        return (
+            f"light of {_point(distance)} forms no real image: behind {last.label} it spreads, as if from "
+            f"z = {short(image)}. Take a point farther away, or a shorter focal length"
+        )
+    hidden = max(elements, key=lambda element: element.z + element.length)
+    return (
+        f"light of {_point(distance)} is sharp at z = {short(image)}, before {hidden.label}, where no sensor can "
+        "stand: move that element, or say the sensor's z"
+    )
+
+
+def _bends(element: Element) -> bool:
+    """Whether an element has a part that is affine and does more than to shift slopes."""
+    for part in element.parts():
+        step = part if isinstance(part, Affine) else part.affine
+        if step is not None and not np.array_equal(step.linear, np.eye(4)):
+            return True
+    return False
+
+
+def _point(distance: float) -> str:
+    return "a distant point" if np.isinf(distance) else f"a point {short(distance)} away"
