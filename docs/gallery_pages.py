@@ -1,7 +1,8 @@
 """Run cameras of the gallery and write their pages: python docs/gallery_pages.py [NAME…].
 
 Without a name, all of them; each takes up to two minutes. Writes docs/gallery/NAME.md with the pictures in
-docs/images/gallery/NAME, and the table of docs/gallery/index.md, which reads what the pages hold.
+docs/images/gallery/NAME, and the table of docs/gallery/index.md, which reads what the pages hold. Cameras of
+`RENDERED` are run on a rendered light field, too (--rendered: only that); pictures of it end their pages.
 """
 
 from __future__ import annotations
@@ -11,11 +12,12 @@ import ast
 import hashlib
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import vcc
 from vcc.gallery import ENTRIES, Entry, Result, entry, write_entry_markdown
-from vcc.gallery.page import plain
+from vcc.gallery.page import pictures_markdown, plain
 
 HERE = Path(__file__).parent
 PAGES = HERE / "gallery"
@@ -36,6 +38,14 @@ THUMBNAILS = {
     "diffuser-depth-of-field": ("scene-coded", (0, 0.2, 0.5, 0.7)),
 }
 """Where the first picture has words on it: which one to take, and what part of it (left, top, right, bottom)."""
+DESK = HERE / "data" / "desk.zarr"
+RENDERED = {
+    "plenoptic": ("raw", "views", "refocused"),
+    "coded-aperture-refocusing": ("scene-open-recorded", "scene-coded-recorded", "scene-open", "scene-coded"),
+    "diffuser-depth-of-field": ("scene-plain", "scene-coded", "scene-restored"),
+}
+"""Which pictures of a run on the rendered desk are shown."""
+_RENDERED_PART = re.compile(r"## On a rendered scene\n.*?(?=^---$)", re.M | re.S)
 _MARK = re.compile(r"<!-- run of ([\w-]+), source ([0-9a-f]+), claims reached (\d+) of (\d+) -->")
 _TABLE = re.compile(r"(<!-- table of the cameras -->\n).*?(<!-- end of the table -->)", re.S)
 
@@ -44,10 +54,15 @@ def main() -> None:
     """Run those named and write their pages, then the table."""
     parser = argparse.ArgumentParser(description="Run cameras of the gallery and write their pages.")
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(ENTRIES))
-    for name in parser.parse_args().names or ENTRIES:
+    parser.add_argument("--rendered", action="store_true", help="only what is shown of the rendered desk")
+    options = parser.parse_args()
+    for name in options.names or ENTRIES:
         print(name)
         made = entry(name)
-        write_page(made, made.run())
+        if not options.rendered:
+            write_page(made, made.run())
+        if name in RENDERED:
+            write_rendered(made, made.run(DESK))
     write_table()
 
 
@@ -83,6 +98,27 @@ def write_page(made: Entry, result: Result) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     write_entry_markdown(made, result, PAGES, pictures=folder, note=note)
     write_thumbnail(made.name, result.pictures[0][0].name)
+
+
+def write_rendered(made: Entry, result: Result) -> None:
+    """Put pictures of a run on the rendered desk at the end of a page, in place of those that are there."""
+    chosen = [
+        tuple(
+            replace(picture, name=f"desk-{picture.name}") for picture in row if picture.name in RENDERED[made.name]
+        )
+        for row in result.pictures
+    ]
+    command = f"vcc gallery {made.name} --light-field docs/data/desk.zarr"
+    words = (
+        "## On a rendered scene\n\nThe same camera before [a desk](../synthesis.md) that Mitsuba rendered, 9×9 "
+        f"views; what is far out of focus shows their grid. `{command}` writes the page of that run, with its "
+        "numbers.\n\n"
+    )
+    part = words + pictures_markdown([row for row in chosen if row], PAGES, PICTURES / made.name) + "\n\n"
+    page = PAGES / f"{made.name}.md"
+    text = _RENDERED_PART.sub("", page.read_text(encoding="utf-8"))
+    before, line, note = text.rpartition("---\n\nMade by")
+    page.write_text(before + part + line + note, encoding="utf-8")
 
 
 def write_thumbnail(name: str, first: str) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,19 +22,20 @@ from vcc.demo import run_demo
 from vcc.files.pictures import auto_exposure
 from vcc.files.transfer import encode
 from vcc.plot import style
+from vcc.showcase import figures
+from vcc.showcase.bench import from_someone
 from vcc.showcase.scene import demo_scene
 from vcc.units import mm
 
 HERE = Path(__file__).parent / "images"
-PICTURES = [
-    ("light-field-middle-view", "one of 20×20 views"),
-    ("example-1-focused-near", "lens, focused near"),
-    ("example-1-focused-far", "lens, focused far"),
-    ("example-2-cosine", "cosine mask near the sensor, exposure × 2"),
-    ("example-2-coded", "coded mask half-way, exposure × 2"),
-    ("check-sharp", "pinhole at the lens, exposure for it"),
+DESK = Path(__file__).parent / "data" / "desk.zarr"
+BRIGHTER = 2.5
+"""Exposure of the desk's pictures over the demo's own, which keeps its lamps from clipping."""
+DRAWN = [
+    ("example-2-cosine", "drawn scene: cosine mask near the sensor"),
+    ("check-sharp", "drawn scene: pinhole at the lens"),
 ]
-"""Of the demo; exposures as its page says."""
+"""Pictures of the demo, each as its page exposes it."""
 
 
 def main() -> None:
@@ -49,12 +51,29 @@ def main() -> None:
     element_images.main(HERE / "elements")
 
 
-def draw_demo(demo: Path, path: Path) -> None:
-    """README's first picture, of those in the demo's folder."""
-    figure = new_figure(10.8, 7.5)
-    for axes, (name, title) in zip(figure.subplots(2, 3).flat, PICTURES, strict=True):
-        picture(axes, matplotlib.image.imread(demo / f"{name}.png"), title)
+def draw_demo(drawn: Path, path: Path) -> None:
+    """README's first picture: the rendered desk through lens and mask, and pictures in the demo's folder."""
+    figure = new_figure(12, 5.9)
+    places = list(figure.subplots(2, 3).flat)
+    for axes, (title, shown) in zip(places, pictures_of_the_desk(), strict=False):
+        picture(axes, shown, title)
+    for axes, (name, title) in zip(places[4:], DRAWN, strict=True):
+        picture(axes, matplotlib.image.imread(drawn / f"{name}.png")[70:403], title)  # two thirds as high as wide
     figure.savefig(path)
+
+
+def pictures_of_the_desk() -> Iterator[tuple[str, np.ndarray]]:
+    """A view, focused near and far, and the demo's coded mask, all but the last with one exposure."""
+    bench = from_someone(DESK, small=False)
+    field = bench.light_field
+    view = field.view(field.shape[0] // 2, field.shape[1] // 2)
+    yield "one of 9×9 views, rendered", figures.shown(view, BRIGHTER)
+    exposure = BRIGHTER * bench.exposure(bench.conventional(bench.middle), bench.diameter)
+    for name, distance in (("near", bench.near), ("far", bench.far)):
+        image = bench.conventional(distance).capture(field, between_views="depth")
+        yield f"lens, focused {name}", figures.shown(image, exposure)
+    coded = bench.coded().capture(field, between_views="depth")
+    yield "coded mask half-way, exposure × 2", figures.shown(coded, 2 * exposure)
 
 
 def draw_sensor(path: Path) -> None:

@@ -150,7 +150,7 @@ def shows_only(scene: PlanesScene, camera: Camera, number: int, rows: Array, col
 def _depth_figure(
     recording: figures.Shown, depth: StereoDepth, trusted: NDArray[np.bool_], ends: tuple[float, float]
 ) -> Figure:
-    figure = figures.new_figure(6.4, 4.6)
+    figure = figures.new_figure(4.6, 4.6)
     picture, axes = figure.subplots(1, 2)
     # The blocks lie on the half at x > 0 as light lands: turned upright, the left one.
     rows, columns = recording.shape[:2]
@@ -161,10 +161,8 @@ def _depth_figure(
     far, near = 1 / ends[1], 1 / ends[0]
     margin = 0.1 * (near - far)
     axes.set_facecolor("#bbbbbb")
-    shown = figures.put(
-        axes, vergence, "1/distance of what is seen", vmin=max(far - margin, 0), vmax=near + margin, cmap="viridis"
-    )
-    bar = figure.colorbar(shown, ax=axes, shrink=0.8)
+    shown = figures.put(axes, vergence, "distance", vmin=max(far - margin, 0), vmax=near + margin, cmap="viridis")
+    bar = figure.colorbar(shown, ax=[picture, axes], shrink=0.8)
     bar.set_label("1/distance [1/m]", fontsize=figures.LABEL)
     return figure
 

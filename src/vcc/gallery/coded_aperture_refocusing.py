@@ -445,14 +445,16 @@ def _target_figure(deblurred: dict[str, Deblurred], target: Array) -> Figure:
 def _noise_figure(gains: dict[float, float]) -> Figure:
     figure = figures.new_figure(6.5, 3.4)
     axes = figure.subplots()
-    axes.semilogx(100 * np.array(list(gains)), list(gains.values()), "o-", color=figures.ACCENT, linewidth=1.4)
-    axes.axhline(2, color=figures.QUIET, linewidth=0.9, linestyle=(0, (6, 4)))
+    percent, measured = 100 * np.array(list(gains)), list(gains.values())
+    axes.semilogx(percent, measured, "o-", color=figures.ACCENT, linewidth=1.4, label="measured")
+    axes.axhline(2, color=figures.QUIET, linewidth=0.9, linestyle=(0, (6, 4)), label="what counts as reached")
     axes.axhline(0, color=figures.INK, linewidth=0.9)
     axes.set_xlabel("noise [% of white through the open aperture]", fontsize=figures.LABEL)
     axes.set_ylabel("gain of the mask [dB]", fontsize=figures.LABEL)
     axes.xaxis.set_major_formatter("{x:g}")
     axes.tick_params(labelsize=figures.LABEL)
     axes.grid(True, linewidth=0.4)
+    axes.legend(fontsize=figures.LABEL, frameon=False)
     return figure
 
 

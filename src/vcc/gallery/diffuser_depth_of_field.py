@@ -170,7 +170,7 @@ def _figures(found: dict[str, Measured], depths: tuple[float, ...]) -> tuple[Pic
             "contrast",
             "Contrast",
             "Modulation transfer along a row: in focus (full lines) and at the near end (dashed).",
-            _contrast_figure(found),
+            _contrast_figure(found, depths[0]),
         ),
     )
 
@@ -244,7 +244,7 @@ def contrast(spread: Array, frequency: ArrayLike) -> Array:
     return np.asarray(np.abs(wave @ spread.sum(axis=0)))
 
 
-def _contrast_figure(found: dict[str, Measured]) -> Figure:
+def _contrast_figure(found: dict[str, Measured], nearest: float) -> Figure:
     figure = figures.new_figure(7.5, 3.6)
     axes = figure.subplots()
     frequency = np.linspace(0, 0.5, 101)
@@ -256,6 +256,8 @@ def _contrast_figure(found: dict[str, Measured]) -> Figure:
     axes.set_ylabel("contrast left", fontsize=figures.LABEL)
     axes.set_xlim(0, 0.5)
     axes.set_ylim(0, 1.02)
+    for words, style in (("in focus", "-"), (away(nearest), "--")):
+        axes.plot([], [], style, color=figures.INK, label=words)
     axes.legend(fontsize=figures.LABEL, frameon=False)
     return figure
 

@@ -67,23 +67,33 @@ def write_entry_markdown(
     """
     folder = _made(folder)
     pictures = _made(folder / entry.name if pictures is None else pictures)
-    there = PurePath(os.path.relpath(pictures, folder)).as_posix()
     parts = [f"# {plain(entry.title)}", f"*{plain(entry.citation)}*", plain(entry.claim)]
     if result.assumed:
         parts.append(f"{plain(result.assumed)}.")
     if result.numbers:
         parts += ["## Measured in this run", numbers_markdown(result.numbers)]
     parts += ["## How", result.text]
-    parts += [
-        _row_markdown([(picture, _compact(picture, pictures)) for picture in row], there)
-        for row in result.pictures
-    ]
+    parts.append(pictures_markdown(result.pictures, folder, pictures))
     if note:
         parts.append(note)
     page = folder / f"{entry.name}.md"
     with atomic_path(page) as temporary:
         temporary.write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
     return page
+
+
+def pictures_markdown(rows: Sequence[Sequence[Picture]], folder: Path, pictures: Path) -> str:
+    """Write pictures, and say in Markdown what shows them.
+
+    Args:
+        rows: pictures side by side.
+        folder: of the page.
+        pictures: folder for the pictures, which must be there.
+    """
+    there = PurePath(os.path.relpath(pictures, folder)).as_posix()
+    return "\n\n".join(
+        _row_markdown([(picture, _compact(picture, pictures)) for picture in row], there) for row in rows
+    )
 
 
 def numbers_markdown(numbers: Sequence[Finding]) -> str:
