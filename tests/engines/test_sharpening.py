@@ -17,8 +17,8 @@ from vcc.engines import engine
 from vcc.plan.choice import compile_best
 from vcc.plan.how import How
 from vcc.plan.model import Plan
+from vcc.plan.operators import SharpenViews
 from vcc.plan.rays.compile import compile_rays
-from vcc.plan.rays.sharpening import sharpening
 from vcc.run.drive import drive
 from vcc.store import save_store
 
@@ -58,7 +58,7 @@ def random(shape: tuple[int, ...], kind: str) -> np.ndarray:
 
 @pytest.mark.parametrize(("sample", "power"), [("point", 2), ("mean", 3)])
 def test_the_filter_is_one_over_a_power_of_sinc(sample, power):
-    middle, near, far = np.array(sharpening(sample)) / 1024
+    middle, near, far = np.array(SharpenViews.of(sample).weights) / 1024
     f = np.array([0.02, 0.05, 0.1, 0.15])
     factor = middle + 2 * near * np.cos(2 * np.pi * f) + 2 * far * np.cos(4 * np.pi * f)
     # With h = sin(πf), 1/sinc(f) = arcsin(h)/h = 1 + h²/6 + 3h⁴/40 + 15h⁶/336 + …: its powers have coefficients
@@ -194,3 +194,18 @@ def test_other_interpolations_are_refused():
     lf = field(random((2, 2, 4, 4), "float32"))
     with pytest.raises(vcc.InputError, match="interpolation='cubic' is for pictures made by footprints"):
         compile_best(CAMERA, lf.grid, How(method="rays", interpolation="cubic"))
+
+
+def test_samples_wider_than_any_picture_need_no_room_around_it():
+    """A filter of the picture would look at 2·2·3000 pixels around 20; cubics find the samples as they are."""
+    samples = np.arange(33) - 16
+    line = 0.5 + 0.4 * np.cos(2 * np.pi * samples / 5.5)
+    light_field = field(np.repeat(line[None, :], 33, axis=0)[None, None].astype(np.float32))
+    sensor = vcc.Sensor(z=D, shape=(20, 20), pitch=SLOPE * D / 3000)
+    camera = vcc.Camera([vcc.Lens(focal_length=50 * mm)], sensor)
+    plan = camera.compile(light_field)
+    assert plan.core.raster_shape == sensor.shape
+    assert plan.core.interpolation == "cubic"
+    # One view of 2×2 mm at the distance D: radiance × steradian, without cos⁴; the sensor sees the cosine's top.
+    radiance = camera.capture(light_field).to_numpy() / (2 * mm / D) ** 2
+    np.testing.assert_allclose(radiance, 0.9, atol=1e-4)

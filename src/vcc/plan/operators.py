@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.values import Value
-from vcc.fields.grid import Block
+from vcc.fields.grid import Block, Sample
 from vcc.fields.sampled import to_dtype
+from vcc.plan.sharpening import MEAN, TENT, along_axis
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,9 @@ LONG = 64
 ROUNDING = 1e-13
 """Of the largest number: below it lies what Fourier transforms in double precision round to."""
 RANK_TOLERANCE = 1e-8
+SOFTENED: dict[Sample, int] = {"point": TENT, "mean": TENT + MEAN}
+"""How many times the averaging over a sample, sinc(f), stands in what is looked up: twice by interpolation, once
+more in samples that are means over their pixels."""
 
 
 class Before(Protocol):
@@ -185,13 +189,25 @@ class SharpenViews(Value):
 
     Args:
         weights: of a sample, of each of its neighbours and of those beyond, in 2⁻¹⁰ (`WEIGHT_DIGITS`), as
-            `vcc.plan.rays.sharpening.sharpening` gives them.
+            `of` gives them.
     """
 
     weights: tuple[int, int, int]
 
     reach = 2  # `REACH`
     copies = True
+
+    @classmethod
+    def of(cls, sample: Sample) -> SharpenViews:
+        """The filter of a picture whose samples are as large as its pixels (`vcc.plan.sharpening`), rounded.
+
+        Args:
+            sample: "mean" or "point": what samples are by themselves.
+        """
+        outer, inner = (
+            round(float(weight) * 2**WEIGHT_DIGITS) for weight in along_axis(SOFTENED[sample], 1.0)[:2]
+        )
+        return cls((2**WEIGHT_DIGITS - 2 * inner - 2 * outer, inner, outer))
 
     def apply(self, values: Any) -> Any:
         """Samples (v, u, t, s[, channels]) sharpened: 8 bits as whole numbers of 16 bits, exactly; else floats."""

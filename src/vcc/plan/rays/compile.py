@@ -25,7 +25,6 @@ from vcc.plan.rays.beam import footprint
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.points import table
-from vcc.plan.rays.sharpening import sharpening
 from vcc.plan.rays.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
 from vcc.plan.rays.windows import Aim, Window
 from vcc.shapes.lattice import CellApertures, CellBlock
@@ -110,7 +109,7 @@ def _before(grid: Grid, how: How, notes: list[str]) -> tuple[Before, ...]:
         "views are made sharper by what interpolating between their samples takes"
         + (", and by what their pixels' own averaging took" if grid.sample == "mean" else "")
     )
-    return (SharpenViews(sharpening(grid.sample)),)
+    return (SharpenViews.of(grid.sample),)
 
 
 def _missing(core: Rays, path: Path, asked: Aimed) -> float:
