@@ -1,6 +1,7 @@
 """Our pictures against a renderer's own thin lens, and against views shifted and added, over focus distances.
 
     python benchmarks/thin_lens.py --renders FOLDER        # renders once (half an hour), then compares (a minute)
+    python benchmarks/thin_lens.py --times                 # only times the three in turns (some minutes)
 
 A scene with detail from 0.5 to 4 m is rendered by Mitsuba (scalar_rgb) twice: as views of pinholes that fill the
 square around the stop, and by its ``thinlens`` sensor focused at several distances. Both have box pixels: a pixel
@@ -18,6 +19,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -290,11 +292,40 @@ def compared(folder: Path, every: int) -> list[tuple[float, float, float, float]
     return found
 
 
+def times(distance: float = 0.9, turns: int = 3) -> dict[str, float]:
+    """Seconds for one picture in each way, the fastest of some turns; what the views hold does not count."""
+    random = np.random.default_rng(0)
+    values = random.random((VIEWS, VIEWS, *PIXELS, 3), np.float32)
+    field = vcc.LightField.from_views(values, STOP / VIEWS, PIXEL, CONVERGENCE, disparity_range=(-4, 4))
+    shape = PIXELS[0] - 2 * BORDER, PIXELS[1] - 2 * BORDER
+    ways: dict[str, Callable[[], object]] = {
+        "this package": lambda: by_default(field, distance, shape),
+        "shift and add": lambda: shifted_and_added(field, distance, shape),
+        f"Mitsuba's thin lens, {LENS_SAMPLES} paths a pixel": lambda: through_thin_lens(
+            scene(), distance, shape, LENS_SAMPLES, 1
+        ),
+    }
+    by_default(field, distance, shape)  # compiled once
+    found = dict.fromkeys(ways, math.inf)
+    for _ in range(turns):
+        for name, picture in ways.items():
+            start = time.perf_counter()
+            picture()
+            found[name] = min(found[name], time.perf_counter() - start)
+    return found
+
+
 def main() -> None:
     """Render what is missing and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--renders", type=Path, required=True, help="folder that keeps the renders")
+    chosen = parser.add_mutually_exclusive_group(required=True)
+    chosen.add_argument("--renders", type=Path, help="folder that keeps the renders")
+    chosen.add_argument("--times", action="store_true", help="only time the three ways")
     given = parser.parse_args()
+    if given.times:
+        for name, seconds in times().items():
+            print(f"{name}: {seconds:.3g} s")
+        return
     render(given.renders)
     for every in (1, 2):
         side = len(range(0, VIEWS, every))
