@@ -127,7 +127,7 @@ def of_json(data: bytes, rng: Random) -> bytes:
     """JSON with other values in it."""
     try:
         tree = json.loads(data)
-    except ValueError:
+    except (ValueError, RecursionError):  # an earlier mutation has nested it too deeply
         return of_text(data, rng)
     for _ in range(rng.choice([1, 1, 2])):
         if isinstance(tree, dict | list):
@@ -291,7 +291,7 @@ def mutated(folder: Path, checked: bool, rng: Random) -> tuple[str, bool]:
     done, must = [], False
     for _ in range(times):
         what = "nothing: an earlier mutation left nothing to change"
-        with contextlib.suppress(IndexError, OSError, ValueError, struct.error):
+        with contextlib.suppress(IndexError, OSError, ValueError, struct.error, RecursionError):
             what, must = in_folder(folder, checked, rng)
         done.append(what)
     return "; ".join(done), must and times == 1
