@@ -1,8 +1,9 @@
-"""What the scripts that draw the docs' pictures share: figures, pictures with a title, and parallax."""
+"""What the scripts that draw the docs' pictures share: figures, titles, parallax, and a rendered light field."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from vcc.plot import style
+from vcc.store import StoredLightField, open_store
 
 
 def new_figure(width: float, height: float, dpi: float = 100) -> Figure:
@@ -65,3 +67,16 @@ def epipolar(axes: Axes, lines: NDArray[Any], guides: Sequence[float], title: st
 def _stand(axes: Axes, guides: Sequence[float]) -> None:
     for guide in guides:
         axes.axvline(guide, color=style.ORANGE, lw=1.4, ls=(0, (4, 3)))
+
+
+def desk() -> StoredLightField:
+    """The rendered desk of docs/synthesis.md: 9×9 views, with the true disparities of the middle one.
+
+    Its radiance is a fraction of the brightest sample's; ``white(desk())`` is what to multiply it by to see it.
+    """
+    return open_store(Path(__file__).parent / "data" / "desk.zarr")
+
+
+def white(light_field: StoredLightField) -> float:
+    """The factor from the desk's samples to radiance of which 1 is white."""
+    return float(light_field.provenance["full_scale"])
