@@ -159,6 +159,7 @@ def given(tmp_path_factory):
 def folder(given, tmp_path, monkeypatch):
     """A folder of a page's own."""
     shutil.copytree(given, tmp_path, dirs_exist_ok=True)
+    (tmp_path / "docs").symlink_to(ROOT / "docs")  # of the repository, with the light field that it keeps
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
