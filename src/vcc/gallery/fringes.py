@@ -87,7 +87,7 @@ class Sharpness:
 
     def figure(self) -> Figure:
         """Measured points on closed forms."""
-        figure = figures.new_figure(8.0, 3.8)
+        figure = figures.new_figure(10.0, 3.8)
         axes = figure.subplots()
         fine = np.linspace(0, self.blurs[-1] * 1.04, 400)
         best, number = np.sinc(1 / PERIOD), self.f_number
@@ -97,16 +97,19 @@ class Sharpness:
             (disc_mtf(fine / self.each), figures.QUIET, "--"),
         ):
             axes.plot(fine, best * curve, dashes, color=colour)
-        axes.plot(self.blurs, self.conventional, "o", color=figures.QUIET, label=f"no lenslets, f/{number:.2g}")
-        axes.plot(self.blurs, self.refocused, "o", color=figures.ACCENT, label="plenoptic, refocused there")
-        axes.plot([], [], "--", color=figures.QUIET, label=f"a lens stopped down to f/{number * self.each:.2g}")
+        axes.plot([], [], "-", color=figures.INK, label="closed forms")
+        axes.plot(
+            self.blurs, self.conventional, "o", color=figures.QUIET, label=f"no lenslets, f/{number:.2g}, measured"
+        )
+        axes.plot(self.blurs, self.refocused, "o", color=figures.ACCENT, label="refocused there, measured")
+        axes.plot([], [], "--", color=figures.QUIET, label=f"a lens at f/{number * self.each:.2g}, closed form")
         axes.set_xlabel("blur of the whole lens, in lenslets; above, the distance of the plane")
         axes.set_ylabel("contrast")
         axes.set_ylim(-0.15, 1)
         axes.axhline(0, color=figures.QUIET, linewidth=0.6)
         places = ["∞" if math.isinf(distance) else length(distance) for distance in self.distances]
         axes.secondary_xaxis("top").set_xticks(self.blurs, places)
-        axes.legend(frameon=False)
+        figure.legend(loc="outside right center", frameon=False)
         return figure
 
 

@@ -352,7 +352,13 @@ def _errors_figure(compared: Compared) -> Figure:
             axis.set_major_formatter("{x:g}")
         axes.grid(True, which="major", linewidth=0.4)
     grid[0].set_ylabel("squared error / that of the circle", fontsize=figures.LABEL)
-    grid[1].legend(fontsize=figures.LABEL - 1, loc="lower right")
+    handles, labels = grid[1].get_legend_handles_labels()
+    kinds = [
+        grid[0].plot([], [], "-", color=figures.INK, label="foretold: R(K)")[0],
+        grid[0].plot([], [], "o", color=figures.INK, markersize=4, label="measured")[0],
+    ]
+    grid[0].legend(handles=kinds, fontsize=figures.LABEL, loc="lower right")
+    figure.legend(handles, labels, fontsize=figures.LABEL, loc="outside right center")
     return figure
 
 
@@ -380,9 +386,11 @@ def _search_figure(found: dict[float, OptimisedAperture]) -> Figure:
     axes = figure.subplots()
     for noise, each in found.items():
         reference = expected_deblurring_error(circle, noise, power)
-        axes.plot(np.array(each.history) / reference, linewidth=1.4, label=f"noise {100 * noise:g} %: best")
+        axes.plot(np.array(each.history) / reference, linewidth=1.4, label=f"noise {100 * noise:g} %")
         colour = axes.lines[-1].get_color()
-        axes.plot(np.array(each.typical) / reference, ":", color=colour, linewidth=1.2, label="median survivor")
+        axes.plot(np.array(each.typical) / reference, ":", color=colour, linewidth=1.2)
+    for words, style in (("the best", "-"), ("median survivor", ":")):
+        axes.plot([], [], style, color=figures.INK, label=words)
     axes.set_xlabel("generation", fontsize=figures.LABEL)
     axes.set_ylabel("R(K) / that of the circle", fontsize=figures.LABEL)
     axes.tick_params(labelsize=figures.LABEL, which="both")
