@@ -188,7 +188,7 @@ def test_picture_files_with_and_without_opacity(tmp_path):
     for path, words in ((tmp_path / "none.png", "no picture file"), (tmp_path / "a.webp", "ending")):
         with pytest.raises(InputError, match=words):
             Picture.read(path, 0.8)
-    with pytest.raises(InputError, match=r"transfer is 'srgb' or 'linear', not 'gamma'"):
+    with pytest.raises(InputError, match=r"transfer is 'auto', 'srgb' or 'linear', not 'gamma'"):
         Picture.read(opaque, 0.8, transfer="gamma")
     opaque.write_bytes(opaque.read_bytes()[:60])
     with pytest.raises(InputError, match=r"opaque ü.png cannot be read"):

@@ -138,7 +138,7 @@ def check_path(path: Path, what: str) -> bool:
     except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError: a NUL
         raise InputError(shown(f"there is no {what} {path}")) from None
     except OSError as error:
-        raise InputError(shown(f"{path} cannot be read: {in_words(error)}")) from None
+        raise InputError(shown(f"{path} cannot be read: {error.strerror or in_words(error)}")) from None
     special = _SPECIAL.get(stat.S_IFMT(mode))
     if special is not None:
         raise InputError(shown(f"{path} is {special} and no {what}: nothing is read from it"))
