@@ -161,3 +161,14 @@ def test_the_light_field_behind_a_mask_is_dimmed_and_moved():
     assert behind.frame == before.frame
     rays = vcc.Affine.propagation(20 * mm) @ vcc.Affine.lens(50 * mm)
     assert behind.frame.isclose(rays @ field.frame)
+
+
+ELECTRONIC = vcc.Sensor(52 * mm, (8, 10), 50 * um, electronics=vcc.Electronics())
+
+
+@pytest.mark.parametrize("verb", [vcc.Camera.capture, vcc.Camera.expose], ids=["capture", "expose"])
+def test_what_is_said_of_a_picture_is_said_at_the_readers_line(verb):
+    lens_beyond_the_views = vcc.Camera([vcc.Lens(focal_length=50 * mm, diameter=6 * mm)], ELECTRONIC)
+    with pytest.warns(vcc.ResultWarning, match="of the rays that this camera asks for") as said:
+        verb(lens_beyond_the_views, light_field())
+    assert {each.filename for each in said} == {__file__}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable
 from os import PathLike
 from typing import Any, Literal, Self, TypeVar, Unpack
@@ -12,7 +11,7 @@ from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share
 from vcc.advice.darkness import why_dark
 from vcc.advice.explain import Explanation, explained
 from vcc.base import checks
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
 from vcc.files.camera_writing import write_train
@@ -197,7 +196,7 @@ class Camera(Train):
         check_is_light_field(light_field)
         chosen, absurd = How.of(how, options), metres_meant(self, light_field.grid)
         if absurd and light_share(self, light_field.grid) < FAINT:  # said before what may take minutes
-            warnings.warn(f"hardly any light will reach the sensor. {absurd}", ResultWarning, stacklevel=2)
+            warn_of_result(f"hardly any light will reach the sensor. {absurd}")
             absurd = ""
         if plan is None:
             plan = self.compile(light_field, chosen, progress=progress)
@@ -205,10 +204,10 @@ class Camera(Train):
             plan.check_fits(self, light_field.grid)
             _check_of_the_run(options)
         for caution in plan.cautions:
-            warnings.warn(caution, ResultWarning, stacklevel=2)
+            warn_of_result(caution)
         found = drive(plan, light_field, chosen, progress)
         if caution := _caution(plan, light_field, found, absurd):
-            warnings.warn(caution, ResultWarning, stacklevel=2)
+            warn_of_result(caution)
         return Image(
             found.values,
             self.sensor.frame,

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, fields
 from os import PathLike
 from typing import Literal
 
 import numpy as np
 
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, warn_of_result
 from vcc.base.units import short
 from vcc.files.pictures import SavedPicture, save_numbers
 from vcc.files.stated import read_stated, unknown
@@ -192,7 +191,7 @@ def recorded(image: Image, exposure: Exposure) -> Recording:
     raw = exposure.recorded(light, image.missing_rays)
     caution = below_zero(light)
     if caution is not None:
-        warnings.warn(caution, ResultWarning, stacklevel=3)
+        warn_of_result(caution)
     return Recording(**{each.name: getattr(raw, each.name) for each in fields(raw)}, camera=image.camera)
 
 

@@ -486,6 +486,10 @@ MASK = r'element 2 \(mask "code"\): pattern'
         ),
         (element(focal_length='"5 mm"', name=5) + SENSOR, "name is 5: it is text in quotes"),
         (element("prism", deflection="[1, '0']") + SENSOR, 'number 2 of 2, is "0": it is a number'),
+        (
+            LENS + '[sensor]\nz = "52 mm"\nshape = 500\npitch = "1 um"',
+            r"shape is 500: it is a list of 2, like \[200, 200\]",
+        ),
         (LENS.replace("0 mm", "60 mm") + SENSOR, "camera.toml: .* stands behind the sensor"),
         (mask('"lost.png"'), MASK + ': there is no file "lost.png" in '),
         (mask('"camera.toml"'), MASK + r": .*camera.toml has the ending \".toml\""),

@@ -78,7 +78,7 @@ def _cost(run: Drive, core: Footprints, seconds: float | None) -> str:
         f"  about {_memory(run) / 1e6:.0f} MB of memory beside it",
     ]
     if seconds is not None:
-        lines.append(f"  about {seconds:.2g} s expected (a slice was timed on this machine)")
+        lines.append(f"  about {seconds:.2g} s expected, once views are read (a slice was timed on this machine)")
     return "Cost\n" + "\n".join(lines)
 
 

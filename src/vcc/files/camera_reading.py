@@ -250,7 +250,12 @@ def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, 
         wanted, fits = f" of {len(hints)}", isinstance(given, list) and len(given) == len(hints)
         family = None
     if not fits:
-        example = {None: "0", "length": '"1 mm"', "angle": '"1 deg"', "time": '"1 ms"'}[unit]
+        example = {
+            None: "200" if hints[0] is int else "0",
+            "length": '"1 mm"',
+            "angle": '"1 deg"',
+            "time": '"1 ms"',
+        }[unit]
         if str in alternatives(hints[0]):
             example = '"…"'
         example = example if family is None else family.example

@@ -9,7 +9,6 @@ each the share that is there, and each block meets the same rays.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import late
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, warn_of_result
 from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.progress import Progress
 from vcc.engines import chosen, engine
@@ -179,11 +178,9 @@ class Drive:
         while tolerance is not None and sampling_error(found) > tolerance * abs(_mean(found.values)):
             if found.samples * 2 > LARGEST_SAMPLES:
                 error = sampling_error(found) / abs(_mean(found.values))
-                warnings.warn(
+                warn_of_result(
                     f"the sampling error is {error:.2g} of the picture's mean after {found.samples} rays a pixel, "
-                    f"the most there are; {tolerance:g} was asked for",
-                    ResultWarning,
-                    stacklevel=6,
+                    f"the most there are; {tolerance:g} was asked for"
                 )
                 break
             # From the block of points beside those taken: together they are one larger even set.
@@ -304,11 +301,9 @@ class _Counted:
 def _warn_of_unseen(views: Any) -> None:
     """Say it if much of what lies between views is seen by none."""
     if views.made and views.unseen > MUCH_UNSEEN * views.made:
-        warnings.warn(
+        warn_of_result(
             f"{views.unseen / views.made:.1%} of the samples between views show what none of the views around "
-            "them shows (it is hidden there, or outside their pictures): borders go on there",
-            ResultWarning,
-            stacklevel=6,
+            "them shows (it is hidden there, or outside their pictures): borders go on there"
         )
 
 
