@@ -117,6 +117,7 @@ def test_rounding_is_hidden_unless_every_bit_counts():
     assert 40 * um != 40e-6
     assert text(40e-6) == text(40 * um) == "40 um"
     assert text(40e-6, exact=True) == "0.04 mm"
+    assert text(0.0057859371919214125, exact=True) == "5.7859371919214126 mm"
     assert text(0.1 + 0.2, exact=True) != text(0.3, exact=True)
 
 

@@ -100,6 +100,13 @@ def test_kept_from_the_command_line(views, folder_of):
     assert "states the cameras already" in again.stderr
 
 
+def test_what_is_kept_without_anybody_having_said_it_is_named(views, folder_of):
+    kept = run(
+        "info", folder_of(views, lambda j, i: f"view_{j}_{i}.png"), "--keep", "--spacing", "2 mm", "--quick"
+    )
+    assert "parameters.cfg; assumed, since nobody said it: slope per pixel, focus distance." in kept.stdout
+
+
 def test_beside_a_camera_file_that_says_less(square_views, folder_of):
     """Cambridge's says where the cameras stand, and which way they are counted: that stays."""
     folder = folder_of(square_views[::-1, ::-1], lambda j, i: f"{j:02d}_{i:02d}.png")

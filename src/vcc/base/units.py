@@ -38,6 +38,8 @@ _WRITTEN: Final[dict[str, tuple[str, ...]]] = {
     "angle": ("rad", "mrad", "deg"),
     "time": ("s", "ms", "us"),
 }
+_CLEARLY: Final = 4
+"""Letters by which a number must be shorter to be written in another unit than that in which it reads best."""
 SI_NAMES: Final = {"length": "metre", "angle": "radian", "time": "second"}
 _EXAMPLES: Final = {"length": "50 mm", "angle": "2 deg", "time": "10 ms"}
 _QUANTITY: Final = re.compile(r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*(.*)", re.DOTALL)
@@ -137,7 +139,10 @@ def text(value: float, dimension: str = "length", *, exact: bool = False) -> str
     candidates = [_written(value, name, dimension, n) for n in (15, 17) for name in ordered]
     faithful = [each for each in candidates if parse(each, dimension, "it") == value]
     short = [each for each in faithful if "e" not in each]
-    return faithful[0] if faithful[0] == candidates[0] else min(short or faithful, key=len)
+    if faithful[0] == candidates[0]:
+        return faithful[0]
+    # Another unit only where it is clearly shorter: 0.04 mm for 40e-6, but no millions of nanometres.
+    return min(short or faithful, key=lambda each: len(each) + _CLEARLY * (each.split()[1] != ordered[0]))
 
 
 def short(value: float, dimension: str = "length", digits: int = 6) -> str:

@@ -82,11 +82,21 @@ def describe(
         else:
             kept = {}
             if keep:
-                kept["kept"] = f"{keep_geometry(path, **how.given(ViewCameras), **how.given(Arrangement))}"
+                kept["kept"] = _keep(path, how)
                 how = replace(AS_STORED, **how.given(Arrangement))
             lines = _of_files(path, quick, picture, how) | kept
     width = max(map(len, lines)) + 2
     return "\n".join(f"{name:<{width}}{shown(value)}" for name, value in lines.items())
+
+
+def _keep(path: Path, how: Reading) -> str:
+    """Keep the cameras in the folder: in which file, and what of it nobody has said."""
+    assumed = _with(how, read_geometry(path, sparse=True, **how.given(Arrangement))).unknown
+    file = keep_geometry(path, **how.given(ViewCameras), **how.given(Arrangement))
+    if not assumed:
+        return f"{file}"
+    names = ", ".join(name.replace("_", " ") for name in assumed)
+    return f"{file}; assumed, since nobody said it: {names}. It will not be said again: correct it there"
 
 
 def _of_files(path: Path, quick: bool, picture: Path | None, how: Reading) -> dict[str, str]:
