@@ -70,6 +70,7 @@ def test_expose_writes_a_picture_too(folder):
 def test_a_camera_without_electronics_is_refused_before_the_light_field_is_read():
     said = refused("expose", "camera.toml", "no such folder", "-o", "raw.tif")
     assert "sensor.electronics" in said
+    assert "vcc.Electronics" not in said  # there is no Python on the command line
 
 
 @pytest.mark.usefixtures("folder", "electronics")

@@ -5,12 +5,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
 from vcc.cli.camera_verbs import exposed
 from vcc.cli.console import check_output, show
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time, Whole
 from vcc.files.pictures import RAW_ENDINGS, WRITE_ENDINGS
-from vcc.run.expose import electronics_of
 
 
 def expose(
@@ -39,7 +39,11 @@ def expose(
     if picture is not None:
         picture = check_output(picture, WRITE_ENDINGS)
     optics = load_camera(camera)
-    electronics_of(optics.sensor)  # refused before the light field is read
+    if optics.sensor.electronics is None:  # refused before the light field is read
+        raise InputError(
+            f"{camera} does not say how its sensor records: add a table [sensor.electronics], which may be "
+            "empty for an ordinary one. Irradiance can be had without (vcc capture)"
+        )
     field = reading.light_field(light_field)
     recording = exposed(optics, field, exposure, how, seed=seed, radiance=radiance)
     show(recording.save(output).description)
