@@ -192,6 +192,16 @@ def test_positions_say_where_the_first_view_is(
     np.testing.assert_array_equal(as_is.values, views[::down, ::right])
 
 
+def test_what_is_given_and_far_from_what_files_state_is_said(views: Views, folder_of: Write) -> None:
+    folder = folder_of(views, camera_name(1, 1))
+    stated = read_geometry(folder)
+    with pytest.warns(ResultWarning, match=r": spacing is .* m by the files and 1e-05 m as given: "):
+        field = open_light_field(folder, transfer="linear", spacing=1e-5)
+    assert field.frame.linear[0, 0] == pytest.approx(1e-5)
+    measured_again = 1.1 * stated.spacing[1]
+    open_light_field(folder, transfer="linear", spacing=measured_again)  # without a word
+
+
 def test_cameras_that_are_not_alike(views: Views, folder_of: Write) -> None:
     folder = folder_of(views, camera_name(1, 1))
     (folder / camera_name(1, 1)(2, 3)).rename(folder / camera_name(1, 1, "35")(2, 3))

@@ -95,3 +95,10 @@ def test_what_it_records_decodes_to_views_of_the_scene():
 def test_what_cannot_be_designed_is_refused(changed, message):
     with pytest.raises(vcc.InputError, match=message):
         camera(**changed)
+
+
+def test_millimetres_given_as_metres_are_asked_about():
+    with pytest.raises(vcc.InputError, match=r"within the focal length of 50 m.* did you mean 50 \* mm\?"):
+        vcc.Camera.plenoptic(
+            50, lenslet_pitch=2e-4, f_number=6, pixels_per_lenslet=9, lenslets=(4, 4), focus_distance=1.3
+        )

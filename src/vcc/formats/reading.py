@@ -29,7 +29,7 @@ from vcc.formats.grid import Decoded, Geometry, ViewGrid
 from vcc.formats.orders import Order
 from vcc.formats.orientation import OrientationChoice, look, looked_at, rearranged
 from vcc.formats.reading_views import read_views
-from vcc.formats.remarks import assumed_remark, vergence_remark
+from vcc.formats.remarks import assumed_remark, overruled_remark, vergence_remark
 from vcc.formats.sparse import SparseViews
 from vcc.light_field import LightField
 
@@ -184,7 +184,8 @@ def open_sparse_views(
         )
     assumed = [name for name in info.unknown if name not in given.names]
     dark = dark_remark(dict(zip(grid.present, pictures, strict=True)))
-    for remark in filter(None, (assumed_remark(info, path, grid.geometry, assumed), dark)):
+    said = (assumed_remark(info, path, grid.geometry, assumed), overruled_remark(info, given), dark)
+    for remark in filter(None, said):
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
     frame = cameras.frame((*grid.shape, *info.picture_shape))
     return SparseViews(pictures, tuple(grid.present), grid.shape, frame, info.disparity_range, info.sample)
@@ -342,7 +343,8 @@ def _put_in_order(
         return light_field, remarks
     assumed = [name for name in info.unknown if name not in given.names]
     vergence = vergence_remark(_shown(light_field, seen)) if cameras.are_parallel else ""
-    return light_field, (*remarks, assumed_remark(info, path, opened.stated, assumed), vergence)
+    said = (assumed_remark(info, path, opened.stated, assumed), overruled_remark(info, given))
+    return light_field, (*remarks, *said, vergence)
 
 
 def _shown(light_field: LightField, seen: _Seen) -> tuple[float, float] | None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from vcc.base.units import short
-from vcc.formats.folder_info import FolderInfo
+from vcc.formats.folder_info import FolderInfo, Given
 from vcc.formats.grid import Geometry
 from vcc.formats.orientation import VISIBLE_DISPARITY
 
@@ -35,6 +38,30 @@ def assumed_remark(info: FolderInfo, path: Path, stated: Geometry, assumed: Sequ
         f"pass {', '.join(f'{name}=…' for name in assumed)} (lengths in metres) if you know better"
         f"{_how_to_keep(info, path)}"
     )
+
+
+FAR_FROM_STATED = 0.2
+"""Share by which what is given may differ from what files state without a word: measured again, it does."""
+
+
+def overruled_remark(info: FolderInfo, given: Given) -> str:
+    """What is given and far from what the files state, a slip of units most often; empty for nothing.
+
+    Args:
+        info: what the folder or file holds.
+        given: what the user says of the cameras.
+    """
+    parts = []
+    for name in given.names:
+        wanted, stated = (max(np.atleast_1d(getattr(each, name))) for each in (given, info))
+        if name in info.unknown or math.isinf(wanted) or math.isinf(stated):  # pictures may be shifted on purpose
+            continue
+        if not math.isclose(wanted, stated, rel_tol=FAR_FROM_STATED):
+            unit = "" if name == "slope_per_pixel" else " m"
+            parts.append(f"{name} is {stated:.4g}{unit} by the files and {wanted:.4g}{unit} as given")
+    if not parts:
+        return ""
+    return f"{'; '.join(parts)}: taken is what is given. Leave it out to take what the files state"
 
 
 def _how_to_keep(info: FolderInfo, path: Path) -> str:

@@ -35,7 +35,12 @@ class Plenoptic:
         if self.focus_distance <= self.focal_length:
             raise InputError(
                 f"focus_distance is {short(self.focus_distance)}, within the focal length of "
-                f"{short(self.focal_length)}: the main lens forms no image of it. Take one farther away"
+                f"{short(self.focal_length)}: the main lens forms no image of it. "
+                + (
+                    "Take one farther away"
+                    if self.focal_length < 1
+                    else f"Lengths are metres: did you mean {self.focal_length:g} * mm?"
+                )
             )
 
     @property
