@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 import scipy.io
 
+from vcc.base.errors import InputError
+from vcc.base.reading import reading
 from vcc.formats import matlab_v5
 
 
@@ -36,3 +38,12 @@ def test_what_is_packed_has_an_end(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         path.write_bytes(packed(body))
         with pytest.raises(ValueError, match="truncated, or unpacks to more than 1,000 bytes"):
             matlab_v5.read_matlab(path)
+
+
+def test_a_version_that_the_library_does_not_read_is_refused_in_words(tmp_path: Path) -> None:
+    out = io.BytesIO()
+    scipy.io.savemat(out, {"a": np.zeros(3)})
+    path = tmp_path / "a.mat"
+    path.write_bytes(out.getvalue()[:124] + b"\x00\x02" + out.getvalue()[126:])  # 7.3, which is HDF5
+    with pytest.raises(InputError, match=r"a\.mat cannot be read as a list: .*HDF"), reading(path, "a list"):
+        matlab_v5.read_matlab(path)

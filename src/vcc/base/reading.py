@@ -26,7 +26,7 @@ MOST_UNPACKED = 2**26
 MOST_TIMES_PACKED = 100
 """How many times its packed size it may have if it is larger; text and pictures pack 2 to 20 times smaller."""
 
-_FAULTS_OF_PROGRAMS = (AssertionError, ImportError, NameError, NotImplementedError)
+_FAULTS_OF_PROGRAMS = (AssertionError, ImportError, NameError)
 
 _SPECIAL = {
     stat.S_IFIFO: "a named pipe",
