@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from vcc.showcase.scene import Town
 from vcc.sources import CameraArray
+from vcc.sources.mitsuba.scenes import looking
 from vcc.sources.textures import Painting
 from vcc.units import deg, mm
 
@@ -63,7 +64,7 @@ def scene(folder: Path) -> Plugin:
     return {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 10},
-        "sensor": {"type": "perspective", "to_world": _looking(EYE, TARGET), "sampler": {"type": "multijitter"}},
+        "sensor": {"type": "perspective", "to_world": looking(EYE, TARGET), "sampler": {"type": "multijitter"}},
         **_table(workshop),
         **_middle(workshop),
         **_behind(workshop),
@@ -522,7 +523,7 @@ def _lamp(place: Colour, target: Colour, half: tuple[float, float], radiance: Co
     """A rectangle that shines on a target."""
     return {
         "type": "rectangle",
-        "to_world": _looking(place, target) @ np.diag([*half, 1.0, 1.0]),
+        "to_world": looking(place, target) @ np.diag([*half, 1.0, 1.0]),
         "emitter": {"type": "area", "radiance": _rgb(radiance), "sampling_weight": weight},
     }
 
@@ -545,15 +546,4 @@ def _rolled(angle: float) -> Array:
     a = math.radians(angle)
     matrix = np.eye(4)
     matrix[:2, :2] = [[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]]
-    return matrix
-
-
-def _looking(eye: Sequence[float], target: Sequence[float]) -> Array:
-    """Mitsuba's pose of a camera at a place that looks at another: z ahead, y up, x to the left."""
-    ahead = np.subtract(target, eye)
-    ahead = ahead / np.linalg.norm(ahead)
-    left = np.cross((0.0, 1.0, 0.0), ahead)
-    left /= np.linalg.norm(left)
-    matrix = np.eye(4)
-    matrix[:3, :4] = np.stack([left, np.cross(ahead, left), ahead, np.asarray(eye, dtype=float)], axis=1)
     return matrix

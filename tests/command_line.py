@@ -13,6 +13,18 @@ from numpy.typing import NDArray
 
 from vcc.cli import app
 
+CAMERA = """
+[[elements]]
+kind = "lens"
+z = "0 mm"
+focal_length = "50 mm"
+diameter = "4 mm"
+[sensor]
+z = "52 mm"
+shape = [12, 16]
+pitch = "1 mm"
+"""
+"""A camera file: a lens, and a sensor of few pixels."""
 KNOWN = ["--spacing", "1 mm", "--slope-per-pixel", "0.02", "--focus-distance", "1.3 m"]
 """What the folder of views does not state."""
 

@@ -19,7 +19,7 @@ import scipy.io
 import tifffile
 
 import vcc
-from command_line import run
+from command_line import CAMERA, run
 from vcc.camera_file import ELEMENT_KINDS
 from vcc.cli.synth.rendering import ViewsAndPixels
 from vcc.gallery.entry import Entry, Result
@@ -86,17 +86,6 @@ LENS = """# a doublet with a stop: radius, thickness, index, diameter in mm
 0 10 1 12
 60 4 1.5168 16
 -90 40 1 16
-"""
-CAMERA = """
-[[elements]]
-kind = "lens"
-z = "0 mm"
-focal_length = "50 mm"
-diameter = "4 mm"
-[sensor]
-z = "52 mm"
-shape = [12, 16]
-pitch = "1 mm"
 """
 PIXELS = (72, 96)
 

@@ -12,22 +12,10 @@ import numpy as np
 import pytest
 
 import vcc
-from command_line import KNOWN, refused, run, write_views
+from command_line import CAMERA, KNOWN, refused, run, write_views
 from vcc.cli.app import COMMANDS, RENDERERS
 from vcc.cli.console import _Foretold, as_options
 from vcc.plan.how import How
-
-CAMERA = """
-[[elements]]
-kind = "lens"
-z = "0 mm"
-focal_length = "50 mm"
-diameter = "4 mm"
-[sensor]
-z = "52 mm"
-shape = [12, 16]
-pitch = "1 mm"
-"""
 
 
 @pytest.fixture

@@ -59,10 +59,7 @@ def group(parent: Any, name: str, path: Path) -> Any:
     Raises:
         InputError: there is something else; or as `found`.
     """
-    at = found(parent, name, path)
-    if at is not None and not isinstance(at, hdf5.library().Group):
-        raise InputError(f"{path}: {name} is no group")
-    return at
+    return _of_kind(hdf5.library().Group, "no group", parent, name, path)
 
 
 def dataset(parent: Any, name: str, path: Path) -> Any:
@@ -71,9 +68,14 @@ def dataset(parent: Any, name: str, path: Path) -> Any:
     Raises:
         InputError: there is something else; or as `found`.
     """
+    return _of_kind(hdf5.library().Dataset, "a group, not a data set", parent, name, path)
+
+
+def _of_kind(kind: type, otherwise: str, parent: Any, name: str, path: Path) -> Any:
+    """What stands under a name, of this kind or ``otherwise`` refused; None if there is nothing."""
     at = found(parent, name, path)
-    if at is not None and not isinstance(at, hdf5.library().Dataset):
-        raise InputError(f"{path}: {name} is a group, not a data set")
+    if at is not None and not isinstance(at, kind):
+        raise InputError(f"{path}: {name} is {otherwise}")
     return at
 
 

@@ -182,7 +182,7 @@ def _scene(things: dict[str, Plugin], eye: Place, target: Place) -> Plugin:
     return {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 9},
-        "sensor": {"type": "perspective", "to_world": _looking(eye, target), "sampler": {"type": "multijitter"}},
+        "sensor": {"type": "perspective", "to_world": looking(eye, target), "sampler": {"type": "multijitter"}},
         **things,
     }
 
@@ -237,7 +237,7 @@ def _lamp(place: Place, target: Place, size: tuple[float, float], colour: Colour
     scale = np.diag([*size, 1.0, 1.0])
     return {
         "type": "rectangle",
-        "to_world": _looking(place, target) @ scale,
+        "to_world": looking(place, target) @ scale,
         "emitter": {"type": "area", "radiance": _rgb(colour)},
     }
 
@@ -272,7 +272,7 @@ def _at(place: Place, size: Place, *, turn: float = 0.0, tip: float = 0.0) -> ND
     return matrix
 
 
-def _looking(eye: Place, target: Place) -> NDArray[np.float64]:
+def looking(eye: Place, target: Place) -> NDArray[np.float64]:
     """Mitsuba's pose of a camera at a place that looks at another: z ahead, y up, x to the left."""
     ahead = np.subtract(target, eye)
     ahead = ahead / np.linalg.norm(ahead)
