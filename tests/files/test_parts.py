@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from lock_holder import LOCKS
 from vcc.errors import InputError
 from vcc.files import parts
 from vcc.files.atomic import atomic_path
@@ -117,16 +118,6 @@ def test_a_kill_while_a_folder_is_replaced_leaves_the_old_or_the_new(tmp_path, h
     assert [file.name for file in target.glob("*")] == [there or "old"]
     parts.clear_leftovers(target)
     assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
-
-
-LOCKS = """
-import sys
-from pathlib import Path
-from vcc.files.writer_lock import WriterLock
-lock = WriterLock(Path(sys.argv[1]))
-print("held", flush=True)
-sys.stdin.read()
-"""
 
 
 def test_a_lock_holds_until_its_process_ends_however_that_happens(tmp_path):

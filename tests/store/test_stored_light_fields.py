@@ -19,6 +19,7 @@ import pytest
 import zarr
 
 import vcc
+from lock_holder import LOCKS
 from vcc.base.affine import Affine
 from vcc.files import parts
 from vcc.files.transfer import decode
@@ -596,16 +597,6 @@ def test_a_store_has_one_writer_and_the_earlier_one_is_told(tmp_path):
     assert open_store(tmp_path / "a.zarr").view(0, 0).values.all()  # readers are not hindered
     second.__exit__(None, None, None)
     assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
-
-
-LOCKS = """
-import sys
-from pathlib import Path
-from vcc.files.writer_lock import WriterLock
-lock = WriterLock(Path(sys.argv[1]))
-print("held", flush=True)
-sys.stdin.read()
-"""
 
 
 def test_another_process_is_told_who_writes_a_store(tmp_path):
