@@ -7,10 +7,12 @@ Every step is linear in the samples, so the picture is the sum of the pictures o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
@@ -18,8 +20,12 @@ from vcc.base.values import Value
 from vcc.fields.grid import Block, Grid
 from vcc.optics.train import Train
 from vcc.plan.depth_rule import ViewsBetween
+from vcc.plan.numbers import numbers, with_numbers
 from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews
 from vcc.plan.protocol import Core
+
+NUMBERED = ("core", "before", "after")
+"""What of a plan holds the numbers that make its picture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +116,24 @@ class Plan(Value):
             kind, one = operator.kept_as(kind)
             factor *= one
         return (np.dtype(np.float32) if kind == np.float16 else kind), factor  # compiled code takes no half
+
+    def numbers(self) -> dict[str, NDArray[np.float64]]:
+        """The numbers of the core and of what is done before and after it: ``"core.x"``, ``"after[0].down"``."""
+        return {
+            name + rest if rest.startswith("[") else f"{name}.{rest}": value
+            for name in NUMBERED
+            for rest, value in numbers(getattr(self, name)).items()
+        }
+
+    def with_numbers(self, changed: Mapping[str, Any]) -> Plan:
+        """The same with some numbers changed, by the names of `numbers`; the others stay."""
+        parts: dict[str, dict[str, Any]] = {name: {} for name in NUMBERED}
+        for full, value in changed.items():
+            name = next(name for name in NUMBERED if full.startswith((f"{name}.", f"{name}[")))
+            parts[name][full.removeprefix(name).lstrip(".")] = value
+        return replace(
+            self, **{name: with_numbers(getattr(self, name), part) for name, part in parts.items() if part}
+        )
 
     def check_fits(self, train: Train, grid: Grid) -> None:
         """Refuse a plan that was made for something else.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -59,6 +59,71 @@ class Partial:
         return self.lacking / self.asked if self.asked > 0 else 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """What a raster's weights say of all that it was made from: sums that add up, like `Partial`.
+
+    With weights G of the raster I, every change obeys
+    ⟨G, dI⟩ = ⟨samples, d(samples)⟩ + Σ ⟨numbers[name], d(number of this name)⟩.
+
+    Args:
+        samples: like the samples that the core took, (v, u, t, s[, channels]); None where nobody asked.
+        numbers: by their names (`vcc.plan.numbers`), float64, each of its number's shape.
+    """
+
+    samples: Any = None
+    numbers: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+    def __add__(self, other: Gradient) -> Gradient:
+        """What two rasters, or two parts of one, say of the same samples and numbers."""
+        names = dict.fromkeys([*self.numbers, *other.numbers])
+        none = self.samples is None or other.samples is None
+        return Gradient(
+            (self.samples if other.samples is None else other.samples) if none else self.samples + other.samples,
+            {
+                name: sum(each.numbers[name] for each in (self, other) if name in each.numbers)  # type: ignore[misc]
+                for name in names
+            },
+        )
+
+
+class BackRunner(Protocol):
+    """How an engine goes through a core backwards."""
+
+    def __call__(
+        self,
+        core: Any,
+        values: Any,
+        raster: NDArray[np.floating],
+        *,
+        samples: bool = True,
+        wanted: Collection[str] = (),
+        beside: int = 0,
+        threads: int,
+        progress: Progress | None = None,
+    ) -> Gradient:
+        """The derivative of ⟨raster, what `Runner` makes of the same⟩.
+
+        The same bytes from run to run, whatever the number of threads.
+
+        Args:
+            core: what is computed.
+            values: the samples, (v, u, t, s[, channels]). A core is linear in them: of an array without content
+                (``np.broadcast_to(np.float32(0), shape)``) only the shape is looked at where no number is wanted.
+            raster: weights of the raster's values, (rows, columns, channels).
+            samples: whether the derivative to the samples is wanted: an array of their shape, float32 (float64 by
+                ``reference``).
+            wanted: names of the core's numbers to which it is wanted (`vcc.plan.numbers.numbers` of the core).
+            beside: see `Runner`.
+            threads: how many work at once.
+            progress: called with (done, total).
+
+        Raises:
+            InputError: a number to which there is no derivative, named.
+        """
+        ...
+
+
 class Runner(Protocol):
     """How an engine runs a core."""
 
@@ -82,6 +147,8 @@ class Engine(Protocol):
 
     footprints: Runner
     rays: Runner
+    footprints_back: BackRunner
+    rays_back: BackRunner
     copies: bool
     """Whether all samples that it is given are converted first, which takes memory."""
 
@@ -123,6 +190,10 @@ class Core(Protocol):
 
     def by(self, engine: Engine) -> Runner:
         """The engine's way to run it."""
+        ...
+
+    def back_by(self, engine: Engine) -> BackRunner:
+        """The engine's way to go through it backwards."""
         ...
 
     def part(self, block: Block) -> Any:

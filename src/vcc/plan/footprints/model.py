@@ -19,7 +19,7 @@ from vcc.base.lookup import bilinear
 from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.plan.footprints.shares import Division
-from vcc.plan.protocol import Engine, Runner
+from vcc.plan.protocol import BackRunner, Engine, Runner
 
 Array = NDArray[np.float64]
 
@@ -112,6 +112,10 @@ class Footprints(Value):
     def by(self, engine: Engine) -> Runner:
         """The engine's way to run it."""
         return engine.footprints
+
+    def back_by(self, engine: Engine) -> BackRunner:
+        """The engine's way to go through it backwards."""
+        return engine.footprints_back
 
     def division(self, samples: int) -> Division:
         """How ``samples`` samples along an axis are divided into ``refine`` finer ones each."""

@@ -1,0 +1,100 @@
+"""The numbers of a plan, by name: what derivatives are taken of, and what changes while a camera learns.
+
+A plan is decisions (which core, how many taps, which footprint) and numbers (places, steps, weights, textures).
+The numbers of a value are all its floating-point leaves, named as they are reached: of a core
+``"masks[0].texture"``, of operators ``"[1].kernel"``; an affine map is its matrix, a tuple of numbers one array.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+
+Array = NDArray[np.float64]
+Thing = TypeVar("Thing")
+
+
+def numbers(thing: Any) -> dict[str, Array]:
+    """All floating-point leaves of a dataclass, tuple, array or number, by name, as float64.
+
+    Args:
+        thing: a core, an operator, or a tuple of them; dataclasses and tuples are gone through, whole numbers,
+            texts and whatever else is no floating-point number are passed over.
+    """
+    return dict(_leaves(thing, ""))
+
+
+def with_numbers(thing: Thing, changed: Mapping[str, Any]) -> Thing:
+    """The same with some of its numbers changed; those that are not named stay what they are.
+
+    Args:
+        thing: as for `numbers`.
+        changed: by the names that `numbers` gives; each of its number's own shape. Arrays keep their type.
+    """
+    made, unknown = _changed(thing, "", dict(changed))
+    if unknown:
+        raise KeyError(f"no numbers are named {', '.join(unknown)}")
+    return made  # type: ignore[no-any-return]
+
+
+def _parts(thing: Any) -> Iterator[tuple[str, Any]]:
+    """What a dataclass or a tuple is made of, with what is put behind its name."""
+    if isinstance(thing, tuple):
+        yield from ((f"[{n}]", part) for n, part in enumerate(thing))
+    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        yield from ((f".{field.name}", getattr(thing, field.name)) for field in dataclasses.fields(thing))
+
+
+def _leaf(thing: Any) -> Array | None:
+    """A thing as an array of numbers; None where it is none."""
+    if isinstance(thing, Affine):
+        return thing.matrix
+    if isinstance(thing, np.ndarray):
+        return thing.astype(np.float64) if thing.dtype.kind == "f" else None
+    pair = isinstance(thing, tuple) and thing and all(isinstance(part, float) for part in thing)
+    return np.array(thing, dtype=np.float64) if pair or isinstance(thing, float) else None
+
+
+def _leaves(thing: Any, name: str) -> Iterator[tuple[str, Array]]:
+    leaf = _leaf(thing)
+    if leaf is not None:
+        yield name.lstrip("."), leaf
+        return
+    for more, part in _parts(thing):
+        yield from _leaves(part, name + more)
+
+
+def _changed(thing: Any, name: str, changed: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """The thing with what is named changed, and what of that was not found in it."""
+    if _leaf(thing) is not None:
+        own = name.lstrip(".")
+        if own not in changed:
+            return thing, changed
+        return _like(thing, changed[own]), {other: value for other, value in changed.items() if other != own}
+    parts = {}
+    for more, part in _parts(thing):
+        made, changed = _changed(part, name + more, changed)
+        if made is not part:
+            parts[more] = made
+    if not parts:
+        return thing, changed
+    if isinstance(thing, tuple):
+        return tuple(parts.get(f"[{n}]", part) for n, part in enumerate(thing)), changed
+    return dataclasses.replace(thing, **{more[1:]: made for more, made in parts.items()}), changed
+
+
+def _like(thing: Any, value: Any) -> Any:
+    """Numbers as the kind of leaf that a thing is."""
+    if isinstance(thing, Affine):
+        return Affine(np.asarray(value, dtype=np.float64))
+    if isinstance(thing, np.ndarray):
+        return np.asarray(value, dtype=thing.dtype).reshape(thing.shape)
+    if isinstance(thing, tuple):
+        return tuple(float(part) for part in np.reshape(value, -1))
+    return float(value)
