@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,10 +22,11 @@ from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import rays_compiled, sharpening_kernels
+from vcc.engines.footprint_samples import FineGrid, MaskColumns, textures
 from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import REACH, Division, taps
+from vcc.plan.footprints.shares import REACH, taps
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
 
@@ -35,8 +36,6 @@ BAND_BYTES = 3 * 2**17
 """Their sums stay in the second-level cache."""
 SMALL = 2**17
 """Numbers of a picture below which filtering it takes less time than starting threads for it."""
-MASK_LINES = 64
-"""Lines of a mask that a thread samples at once."""
 
 
 copies = False
@@ -131,42 +130,6 @@ def _band(line: int) -> int:
     return int(np.clip(BAND_BYTES // line, EIGHT, BAND)) // EIGHT * EIGHT
 
 
-class _FineGrid:
-    """The samples of a view after division: how many, the index of the first, and how they are made."""
-
-    def __init__(self, core: Footprints) -> None:
-        self.samples = core.samples
-        self.rows, self.columns = core.samples
-        self.first_row = self.first_column = 0.0
-        self.divided_as: tuple[Division, Division] | None = None
-        if core.refine > 1:
-            down, across = (core.division(n) for n in core.samples)
-            self.rows, self.columns = len(down.first), len(across.first)
-            self.first_row, self.first_column = down.start, across.start
-            self.divided_as = down, across
-
-    def tables(self, pitch: int) -> tables.FineSamples:
-        """How kernels divide samples, into rows of so many values."""
-        assert self.divided_as is not None
-        down, across = self.divided_as
-        shares = down.shares.astype(np.float32), across.shares.astype(np.float32)
-        return tables.FineSamples(down.first, shares[0], across.first, shares[1], pitch)
-
-    @cached_property
-    def matrices(self) -> tuple[NDArray[np.float64], ...]:
-        """The division of rows and of columns as matrices, made once for all views."""
-        assert self.divided_as is not None
-        return tuple(part.matrix(n) for part, n in zip(self.divided_as, self.samples, strict=True))
-
-    def divided(self, view: NDArray[Any]) -> NDArray[np.float32]:
-        """A view (t, s, channels) with its samples divided, for plans in which rows and columns do not part."""
-        if self.divided_as is None:
-            return np.ascontiguousarray(view, dtype=np.float32)
-        down, across = self.matrices
-        fine = np.einsum("at,bs,tsc->abc", down, across, view.astype(np.float32), optimize=True)
-        return np.ascontiguousarray(fine, dtype=np.float32)
-
-
 def _blocks(
     core: Footprints, values: NDArray[Any], by_column: bool
 ) -> Iterator[tuple[tables.Samples, tuple[int, int]]]:
@@ -202,7 +165,7 @@ class _ByColumns:
 
     def __init__(self, core: Footprints, channels: int, pool: Workers) -> None:
         self.core, self.channels, self.pool = core, channels, pool
-        self.fine = fine = _FineGrid(core)
+        self.fine = fine = FineGrid(core)
         rows, columns = core.raster_shape
         start_y = core.y[:, 0] + core.row_step * fine.first_row
         start_x = core.x[0] + core.column_step * fine.first_column
@@ -223,10 +186,8 @@ class _ByColumns:
         )
         # A mask's weight counts for all channels of a sample: for three of them as it is looked up, for other
         # numbers by being repeated.
-        self.shared, self.repeated = (3, 1) if channels == 3 else (1, channels)
-        self.mask_rows = np.array([len(mask.texture) for mask in core.masks], dtype=np.int64)
-        self.mask_row_step = np.array([mask.step[1, 1] / core.refine for mask in core.masks], dtype=np.float64)
-        self.lines = np.zeros((0, 0), dtype=np.float32)
+        shared, repeated = (3, 1) if channels == 3 else (1, channels)
+        self.masks = MaskColumns(core, fine, repeated, shared, pool)
 
     def raster(self, values: NDArray[Any], progress: Progress | None) -> NDArray[np.float32]:
         """The sum over all samples: the raster (rows, columns × channels)."""
@@ -241,7 +202,7 @@ class _ByColumns:
             used = int(np.count_nonzero(weights[:, slice(*taken)]))
             if used == 0:
                 continue
-            add = partial(self.add, samples, taken, divided, self.mask_columns(taken[0], pitch), tiles)
+            add = partial(self.add, samples, taken, divided, self.masks.at(taken[0], pitch), tiles)
             list(self.pool.map(add, _bands(rows, _band(4 * pitch))))
             if progress is not None:
                 done += used
@@ -271,56 +232,13 @@ class _ByColumns:
         for a in range(*columns):
             kernels.add_divided_column(samples, a, self.footprints, divided, masks, band, tiles)
 
-    def mask_columns(self, a: int, pitch: int) -> tables.MaskLines | None:
-        """The masks' lines that taps of column ``a`` look up, at the columns of their samples; see the kernels.
-
-        Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: each group of taps
-        that agree gets the lines that it needs.
-        """
-        core, fine = self.core, self.fine
-        if not core.masks:
-            return None
-        used = np.flatnonzero(self.footprints.weights[:, a])
-        begin = np.zeros((len(core.masks), len(core.view_rows)), dtype=np.int64)
-        row = np.zeros(begin.shape)
-        total = 0
-        pieces: list[tuple[NDArray[np.float32], NDArray[np.float64], int]] = []
-        for number, mask in enumerate(core.masks):
-            step = self.mask_row_step[number]
-            row[number] = mask.row[:, a] + mask.step[1, 1] * fine.first_row
-            ends = np.sort([row[number], row[number] + step * (fine.rows - 1)], axis=0)
-            places, group = np.unique(np.round(mask.column[used, a], 7), return_inverse=True)
-            for one, place in enumerate(places):
-                taps = used[group == one]
-                low = max(math.floor(ends[0, taps].min()), 0)
-                high = min(math.floor(ends[1, taps].max()) + 2, len(mask.texture))
-                if low >= high:  # all of it lies beyond the mask's border, where it is dark
-                    continue
-                begin[number, taps] = total - low
-                columns = place + mask.step[0, 0] * (fine.first_column + np.arange(fine.columns) / core.refine)
-                pieces += [
-                    (mask.texture[n : min(n + MASK_LINES, high)], columns, total + n - low)
-                    for n in range(low, high, MASK_LINES)
-                ]
-                total += high - low
-        line = pitch // self.shared
-        if self.lines.shape[0] < total:
-            self.lines = np.zeros((total, line), dtype=np.float32)  # and zero beyond the samples' last column
-
-        def sample(piece: tuple[NDArray[np.float32], NDArray[np.float64], int]) -> None:
-            texture, columns, to = piece
-            kernels.sample_mask_columns(texture, columns, self.repeated, self.lines[to : to + len(texture)])
-
-        list(self.pool.map(sample, pieces))
-        return tables.MaskLines(self.lines, begin, self.mask_rows, row, self.mask_row_step, self.shared)
-
 
 def _sheared(
     core: Footprints, values: NDArray[Any], channels: int, pool: Workers, progress: Progress | None
 ) -> NDArray[np.float32]:
     """The raster (rows, columns × channels) where rows and columns do not part."""
     raster = np.zeros((*core.raster_shape, channels), dtype=np.float32)
-    fine = _FineGrid(core)
+    fine = FineGrid(core)
     grid = tables.Grid(
         core.step,
         core.shear,
@@ -331,7 +249,7 @@ def _sheared(
         fine.first_row,
     )
     footprint = tables.Footprint(list(REACH).index(core.interpolation), REACH[core.interpolation], core.opening)
-    masks = _textures(core)
+    masks = textures(core)
     for done, (b, a) in enumerate(zip(*np.nonzero(core.weights), strict=True)):
         tell(progress, done, core.taps_used)
         place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
@@ -341,12 +259,3 @@ def _sheared(
         list(pool.map(lambda band, add=add: add(band, raster), _bands(len(raster))))
     tell(progress, core.taps_used, core.taps_used)
     return raster.reshape(len(raster), -1)
-
-
-def _textures(core: Footprints) -> tables.Textures:
-    """The masks' textures in one array."""
-    size = np.array([mask.texture.shape for mask in core.masks], dtype=np.int64).reshape(-1, 2)
-    textures = np.zeros((len(core.masks), *size.max(axis=0, initial=1)), dtype=np.float32)
-    for texture, mask in zip(textures, core.masks, strict=True):
-        texture[: mask.texture.shape[0], : mask.texture.shape[1]] = mask.texture
-    return tables.Textures(textures, size, np.array([mask.step for mask in core.masks]).reshape(-1, 2, 2))
