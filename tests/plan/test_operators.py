@@ -14,7 +14,8 @@ import pytest
 import torch
 
 from vcc.fields.grid import Block
-from vcc.plan import operators
+from vcc.plan import correlation, operators
+from vcc.plan.numbers import numbers, with_numbers
 from vcc.plan.operators import (
     LONG,
     AlongAxes,
@@ -143,6 +144,54 @@ def test_operators_are_linear():
         summed, apart = operator.apply(2 * x + y), 2.0 * operator.apply(x) + operator.apply(y)
         # Three numbers are rounded, each by itself.
         np.testing.assert_allclose(summed, apart, atol=3 * ROUNDING[summed.dtype] * np.abs(apart).max())
+
+
+# --- derivatives to an operator's own numbers ---
+
+
+def assert_pulls_what_changes(operator, x: np.ndarray, rng: np.random.Generator) -> None:
+    """An operator is linear in each of its numbers: ⟨w, A(n + d) x − A(n) x⟩ = ⟨pull(x, w), d⟩, whatever d is."""
+    own = numbers(operator)
+    weights = signed(rng, *np.shape(operator.apply(x)))
+    pulled = operator.pull(x, weights, own)
+    assert set(pulled) == set(own)
+    for name, number in own.items():
+        assert pulled[name].dtype == np.float64
+        assert pulled[name].shape == number.shape
+        np.testing.assert_array_equal(operator.pull(x, weights, (name,))[name], pulled[name])
+        step = signed(rng, *number.shape)
+        changed = with_numbers(operator, {name: number + step}).apply(x)
+        expected = float((weights * (changed - operator.apply(x))).sum())
+        # Two outputs are computed in double precision, each a sum like that of the dot test.
+        bound = ROUNDING[np.dtype(np.float64)] * np.linalg.norm(weights) * np.linalg.norm(changed)
+        assert float((pulled[name] * step).sum()) == pytest.approx(expected, abs=4 * bound)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("name", [*BEFORE, *AFTER])
+def test_derivatives_of_operators_to_their_own_numbers(name, seed):
+    rng = np.random.default_rng(seed)
+    operator = (BEFORE | AFTER)[name](rng)
+    assert_pulls_what_changes(operator, drawn_samples(rng) if name in BEFORE else drawn_raster(rng), rng)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("kind", list(ON_SENSOR))
+def test_derivatives_to_what_lies_against_the_sensor(kind, seed):
+    rng = np.random.default_rng(seed)
+    assert_pulls_what_changes(*on_sensor(rng, kind), rng)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_lags_are_the_same_one_by_one_and_by_transforms(seed):
+    """Any range of lags of arrays of any two sizes, beyond where they touch, too."""
+    rng = np.random.default_rng(seed)
+    channels = int(rng.integers(1, 4))
+    one, other = (signed(rng, *map(int, rng.integers(1, 15, 2)), channels) for _ in range(2))
+    lags = [range(int(first), int(first + count)) for first, count in rng.integers((-20, 1), (20, 20), (2, 2))]
+    found = correlation._by_transforms(one, other, *lags)
+    bound = ROUNDING[np.dtype(np.float64)] * np.linalg.norm(one) * np.linalg.norm(other)
+    np.testing.assert_allclose(found, correlation._one_by_one(one, other, *lags), atol=bound)
 
 
 # --- the arrays of other libraries ---

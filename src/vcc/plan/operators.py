@@ -2,13 +2,14 @@
 
 Operators before the core act on samples (v, u, t, s[, channels]) of some views, those after it on the raster
 (rows, columns, channels). All are linear, and ``transpose`` is the adjoint of ``apply``:
-⟨apply(a), b⟩ = ⟨a, transpose(b)⟩. They take arrays of NumPy and of other array libraries.
+⟨apply(a), b⟩ = ⟨a, transpose(b)⟩. They take arrays of NumPy and of other array libraries. ``pull`` is the
+derivative of ⟨apply(a), b⟩ to the operator's own numbers.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -20,6 +21,7 @@ from vcc.base.describe import Brief
 from vcc.base.values import Value
 from vcc.fields.grid import Block, Sample
 from vcc.fields.sampled import to_dtype
+from vcc.plan.correlation import correlated
 from vcc.plan.sharpening import MEAN, TENT, along_axis
 
 Array = NDArray[np.float64]
@@ -50,6 +52,10 @@ class Before(Protocol):
         """The adjoint of `apply`."""
         ...
 
+    def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """The derivative of ⟨weights, apply(values)⟩ to the operator's own numbers that are wanted, by name."""
+        ...
+
     def block(self, block: Block) -> Block:
         """Which of the samples that the core takes come from a block of those that there are."""
         ...
@@ -74,6 +80,10 @@ class After(Protocol):
         """The adjoint of `apply`."""
         ...
 
+    def pull(self, raster: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """The derivative of ⟨weights, apply(raster)⟩ to the operator's own numbers that are wanted, by name."""
+        ...
+
 
 # --- before ---
 
@@ -92,6 +102,10 @@ class SwapPixelAxes(Value):
         return array_namespace(values).permute_dims(values, (0, 1, 3, 2, *range(4, values.ndim)))
 
     transpose = apply
+
+    def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """There are no numbers."""
+        return {}
 
     def block(self, block: Block) -> Block:
         """The same samples, their axes in the other order."""
@@ -120,12 +134,12 @@ class BlurViews(Brief, Value):
     copies = True
 
     def apply(self, values: Any) -> Any:
-        """Samples (v, u, t, s[, channels]) convolved, in float32 (float64 stays in other libraries than NumPy)."""
+        """Samples (v, u, t, s[, channels]) convolved, in float32; float64 stays."""
         if not isinstance(values, np.ndarray):
             return self._in_library(values)
         from scipy.signal import oaconvolve
 
-        result = np.empty(self.shape(values.shape), dtype=np.float32)
+        result = np.empty(self.shape(values.shape), dtype=self.kept_as(values.dtype)[0])
         weights = self.kernel if values.ndim == 4 else self.kernel[:, :, None]
         for view in np.ndindex(values.shape[:2]):
             # In double precision: what Fourier transforms round to in the dark would else add up.
@@ -157,9 +171,20 @@ class BlurViews(Brief, Value):
         rows, columns = self.kernel.shape
         return (*shape[:2], shape[2] + rows - 1, shape[3] + columns - 1, *shape[4:])
 
+    def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """The derivative to the kernel: how samples (v, u, t, s[, channels]) agree with weights of grown views."""
+        if "kernel" not in wanted:
+            return {}
+        rows, columns = self.kernel.shape
+        total = np.zeros(self.kernel.shape)
+        for view in np.ndindex(values.shape[:2]):
+            grown, own = (np.asarray(array[view]).reshape(*array.shape[2:4], -1) for array in (weights, values))
+            total += correlated(grown, own, range(rows), range(columns))
+        return {"kernel": total}
+
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
-        """In single precision."""
-        return np.dtype(np.float32), 1.0
+        """In single precision; double where it was."""
+        return (kind if kind == np.float64 else np.dtype(np.float32)), 1.0
 
     def _in_library(self, values: Any) -> Any:
         xp = array_namespace(values)
@@ -232,6 +257,10 @@ class SharpenViews(Value):
             values = np.moveaxis(np.tensordot(matrix.T, values, axes=(1, axis)), 0, axis)
         return values
 
+    def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """Weights are whole numbers, which are decided and not learned."""
+        return {}
+
     def block(self, block: Block) -> Block:
         """The same samples: those read beside them are cut off again."""
         return block
@@ -299,6 +328,19 @@ class AlongAxes(Brief, Value):
         """Filtered by the weights in the other order."""
         return self._filtered(raster, self.down[::-1], self.across[::-1])
 
+    def pull(self, raster: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """The derivative to the weights along either axis; half widths are told, and nothing follows from them."""
+        pulled = {}
+        if "down" in wanted:
+            back = _along(np.asarray(weights, np.float64), self.across[::-1], 1)
+            pulled["down"] = correlated(back, raster, _lags(len(self.down)), range(1))[:, 0]
+        if "across" in wanted:
+            ahead = _along(np.asarray(raster, np.float64), self.down, 0)
+            pulled["across"] = correlated(weights, ahead, range(1), _lags(len(self.across)))[0]
+        if "half_widths" in wanted:
+            pulled["half_widths"] = np.zeros(2)
+        return pulled
+
     def _filtered(self, raster: Any, down: Array, across: Array) -> Any:
         if isinstance(raster, np.ndarray):
             return _along(_along(raster, down, 0), across, 1)
@@ -331,6 +373,12 @@ class Blur(Brief, Value):
     def transpose(self, raster: Any) -> Any:
         """Convolved with the kernel turned by 180°."""
         return self._convolved(raster, self.kernel[::-1, ::-1])
+
+    def pull(self, raster: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """The derivative to the kernel."""
+        if "kernel" not in wanted:
+            return {}
+        return {"kernel": correlated(weights, raster, *(_lags(length) for length in self.kernel.shape))}
 
     def _convolved(self, raster: Any, kernel: Array) -> Any:
         if not isinstance(raster, np.ndarray):
@@ -377,6 +425,21 @@ class OnSensor(Brief, Value):
         for down, across, share in shares:
             self._part(wide, down, across)[:] += share[..., None] * raster
         return wide
+
+    def pull(self, raster: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """The derivative to the transmission, and to what its variation within pixels adds."""
+        pulled = {}
+        if "transmission" in wanted:
+            pulled["transmission"] = self._agreeing(raster, weights, 0, 0)
+        if "detail" in wanted:
+            parts = [self._agreeing(raster, weights, dy - 1, dx - 1) for dy, dx in np.ndindex(3, 3)]
+            pulled["detail"] = np.reshape(parts, (3, 3, *parts[0].shape))
+        return pulled
+
+    def _agreeing(self, raster: Any, weights: Any, down: int, across: int) -> Array:
+        """The weights times the light of the pixels so far away, summed over the channels."""
+        part = self._part(raster, down, across)
+        return np.asarray(np.einsum("rck,rck->rc", np.asarray(weights, np.float64), part))
 
     def _part(self, raster: Any, down: int, across: int) -> Any:
         """The sensor's part of the raster, or what lies so many pixels further."""
@@ -439,6 +502,11 @@ def separable_terms(kernel: Array) -> list[tuple[Array, Array]]:
 def without_rounding(wide: Array) -> Array:
     """What Fourier transforms leave of no light, set to none."""
     return np.where(np.abs(wide) < ROUNDING * np.abs(wide).max(initial=0), 0.0, wide)
+
+
+def _lags(weights: int) -> range:
+    """How far each of an odd number of weights moves what it weighs."""
+    return range(-(weights // 2), weights // 2 + 1)
 
 
 def _along(raster: NDArray[Any], weights: Array, axis: int) -> NDArray[Any]:
