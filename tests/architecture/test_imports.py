@@ -35,6 +35,7 @@ ROOMS = [
     "camera",
     "camera_file",
     "light_field",
+    "learn",
     "store",
     "formats",
     "sources",

@@ -1,0 +1,1 @@
+"""Cameras that learn: parameters by name, and plans that follow them."""
