@@ -101,7 +101,7 @@ def mean_by_raster(
     """
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     across, down = (
-        _raster(centre, length, bound, fewest)
+        raster(centre, length, bound, fewest)
         for centre, length, bound in ((x, width, size[0]), (y, height, size[1]))
     )
     if across is None or down is None or across.places.size * down.places.size > RASTER_LIMIT**2:
@@ -127,7 +127,7 @@ class Raster(NamedTuple):
         return self.length / self.places.size
 
 
-def _raster(centre: Array, length: float, bound: float, fewest: int) -> Raster | None:
+def raster(centre: Array, length: float, bound: float, fewest: int) -> Raster | None:
     """The points of `mean_by_raster` along an axis; None where even the fewest are too many."""
     low = max(float(centre.min()) - length / 2, -bound / 2)
     high = max(min(float(centre.max()) + length / 2, bound / 2), low)

@@ -209,13 +209,15 @@ class Product(Pattern):
             return factors[0].mean(x, y, width, height)
 
         def values(px: Array, py: Array, point: tuple[float, float]) -> Array:
-            return np.clip(_product(factors, px, py, *point), 0.0, 1.0)
+            return np.clip(product_of_means(factors, px, py, *point), 0.0, 1.0)
 
         found = mean_by_raster(values, self.size, x, y, width, height, FEWEST_PER_CELL)
         if found is None:  # few small rectangles far apart: look inside each
             steps = (np.arange(FEWEST_PER_CELL) + 0.5) / FEWEST_PER_CELL - 0.5
             part = width / FEWEST_PER_CELL, height / FEWEST_PER_CELL
-            inside = [_product(factors, x + a * width, y + b * height, *part) for a in steps for b in steps]
+            inside = [
+                product_of_means(factors, x + a * width, y + b * height, *part) for a in steps for b in steps
+            ]
             return np.asarray(np.mean(np.broadcast_arrays(*inside), axis=0))
         return found
 
@@ -258,7 +260,7 @@ def _parts(patterns: Iterable[Pattern], middle: tuple[float, float]) -> Iterable
             yield Shifted(pattern, middle) if x or y else pattern
 
 
-def _product(factors: tuple[Pattern, ...], x: Array, y: Array, width: float, height: float) -> Array:
+def product_of_means(factors: tuple[Pattern, ...], x: Array, y: Array, width: float, height: float) -> Array:
     """The product of means over small rectangles; functions, whose means are rasters again, at a point."""
     total: Array = np.ones(1)
     for factor in factors:
