@@ -27,6 +27,7 @@ from vcc.plan.rays.steps import Bundle, Move, Packer, Step
 from vcc.plan.rays.windows import Aim, CellWindows
 
 Array = NDArray[np.float64]
+Cell = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,14 +149,29 @@ class Rays(Value):
             units of slope squared, (pixels, cells, samples); their sum over a pixel is its irradiance under
             radiance 1. The first half of the samples is as good a set as the second.
         """
+        rays, _ = self.aimed(pixel, block)
+        for step in self.steps:
+            step(rays)
+        index = self.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
+        return index, rays.share
+
+    def aimed(self, pixel: NDArray[np.int64], block: NDArray[np.int64]) -> tuple[Bundle, Cell | None]:
+        """The rays of pixels at the sensor, and (row, column) of the cells aimed through, (pixels, cells, 1) each.
+
+        Args:
+            pixel: as for `looked_up`.
+            block: likewise.
+        """
         number = block[:, None] * self.samples + np.arange(self.samples)
         points = self.points[number][:, None]  # (pixels, 1, samples, columns)
         row, column = np.divmod(pixel, self.raster_shape[1])
         middle_x = self.first_pixel[0] + column * self.pitch[0]
         middle_y = self.first_pixel[1] + row * self.pitch[1]
         shape = (-1, 1, 1)
+        cells = None
         if isinstance(self.aim, CellWindows):
             cell_row, cell_column = self.aim.around(middle_x, middle_y)
+            cells = cell_row[..., None], cell_column[..., None]
             # What is drawn for a pixel differs from cell to cell.
             cell = hashed(cell_row * 65537 + cell_column, self.seed).astype(np.int64)
             points = self._moved(points, pixel[:, None] ^ cell)
@@ -164,16 +180,12 @@ class Rays(Value):
         x = middle_x.reshape(shape) + points[..., 0] * self.sensitive[0]
         y = middle_y.reshape(shape) + points[..., 1] * self.sensitive[1]
         if isinstance(self.aim, CellWindows):
-            cells = cell_row[..., None], cell_column[..., None]
+            assert cells is not None
             s, t, weight = self.aim.rays_through(x, y, *cells, points[..., 2:4])
         else:
             s, t, weight = self.aim.slopes(x, y, points)
         points = np.broadcast_to(points, (*s.shape, points.shape[-1]))
-        rays = Bundle(x, y, s, t, weight / self.samples, points)
-        for step in self.steps:
-            step(rays)
-        index = self.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
-        return index, rays.share
+        return Bundle(x, y, s, t, weight / self.samples, points), cells
 
     def held(self, index: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which rays, by indices (…, 4) of the light field, fall into the grid of views, and into pictures too."""

@@ -149,12 +149,15 @@ class CellsUnbend(Brief):
 
     def __call__(self, rays: Bundle) -> None:
         """Undo the deflection of the cells that hold the rays."""
-        x, y = rays.x - self.decentre[0], rays.y - self.decentre[1]
-        row, column = self.lattice.cell_of(x, y)
+        row, column = self.cell_of(rays.x, rays.y)
         centre_x, centre_y = self.lattice.centre_of(row, column)
         kind = row % self.powers.shape[0], column % self.powers.shape[1]
-        rays.s = rays.s + self.powers[kind] * (x - centre_x) - self.slopes[(*kind, 0)]
-        rays.t = rays.t + self.powers[kind] * (y - centre_y) - self.slopes[(*kind, 1)]
+        rays.s = rays.s + self.powers[kind] * (rays.x - self.decentre[0] - centre_x) - self.slopes[(*kind, 0)]
+        rays.t = rays.t + self.powers[kind] * (rays.y - self.decentre[1] - centre_y) - self.slopes[(*kind, 1)]
+
+    def cell_of(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(row, column) of the cell that holds each place."""
+        return self.lattice.cell_of(x - self.decentre[0], y - self.decentre[1])
 
     def packed(self, packer: Packer) -> None:
         """The lattice, and a table of (power, δs, δt) for each kind of cell."""
@@ -226,10 +229,15 @@ class FacetsUnbend(Brief):
 
     def __call__(self, rays: Bundle) -> None:
         """Undo the deflection of the facet that each ray meets."""
-        x, y = rays.x - self.decentre[0], rays.y - self.decentre[1]
-        facet = np.argmax(x[..., None] * self.directions[:, 0] + y[..., None] * self.directions[:, 1], axis=-1)
+        facet = self.facet_of(rays.x, rays.y)
         rays.s = rays.s - self.slopes[facet, 0]
         rays.t = rays.t - self.slopes[facet, 1]
+
+    def facet_of(self, x: Array, y: Array) -> NDArray[np.int64]:
+        """The number of the facet that holds each place."""
+        x, y = x - self.decentre[0], y - self.decentre[1]
+        outward = x[..., None] * self.directions[:, 0] + y[..., None] * self.directions[:, 1]
+        return np.asarray(np.argmax(outward, axis=-1))
 
     def packed(self, packer: Packer) -> None:
         """A table of (direction, slopes) for each facet."""

@@ -1,0 +1,165 @@
+"""Hard edges in the path of rays: where what a ray meets jumps, and which of them the rays of a picture run into.
+
+Rays are drawn at fixed points, so that a picture is a fixed function of a plan's numbers. Where a ray passes an
+edge or not, this function is constant but for jumps: its derivative passes by the edge, and says nothing of the
+light that the edge would let through next. It is the picture's own only where no edge moves against rays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vcc.base.errors import InputError
+from vcc.plan.rays import steps
+from vcc.plan.rays.model import Cell, Rays
+from vcc.plan.rays.steps import Bundle, Step
+from vcc.plan.rays.windows import Window
+
+EDGES: dict[type, tuple[str, ...]] = {
+    steps.Disc: ("middle", "radius"),
+    steps.Rectangle: ("middle", "half"),
+    steps.CellGaps: ("lattice", "decentre", "half"),
+    steps.BlockOfCells: ("lattice", "decentre"),
+    steps.CellShares: ("corner", "size"),
+    steps.FacetsUnbend: ("directions", "decentre"),
+    steps.Unscatter: ("cumulative",),
+}
+"""Numbers of steps that move nothing but an edge: there is no derivative to them."""
+BORDERS: dict[type, tuple[str, ...]] = {**EDGES, steps.CellsUnbend: ("lattice", "decentre")}
+"""Numbers of steps that move an edge, whatever else they do."""
+MOVING = (steps.Move, steps.CellsUnbend, steps.FacetsUnbend, steps.TextureUnbend, steps.Unscatter)
+"""Steps that move rays; others weigh them."""
+PIXELS = 16
+"""Pixels a side of the sensor whose rays tell."""
+RAYS = 32
+"""Rays of each of them."""
+
+
+@dataclass(frozen=True)
+class _Edge:
+    """An edge that rays run into, by the number of its step; that of the views comes after all steps."""
+
+    number: int
+    words: str
+
+
+def edges_that_cut(core: Rays, changed: Collection[str] | None = None, pixels: int = PIXELS) -> tuple[str, ...]:
+    """What stands with a hard edge in the way of rays that were aimed, in words.
+
+    Rays of pixels all over the sensor are traced: an edge cuts where some of them pass it and others do not, or
+    where they meet different cells or facets. Cells of an array that are aimed at one by one have no such border.
+
+    Args:
+        core: what is traced.
+        changed: names of numbers (`vcc.plan.numbers.numbers` of the core) that change: of the edges those count
+            against which rays then move. None: all edges that cut.
+        pixels: how many a side of the sensor are traced.
+    """
+    found = dict.fromkeys(
+        edge.words
+        for edge in _edges(core, pixels)
+        if changed is None or any(_moves(core, edge, name) for name in changed)
+    )
+    return tuple(found)
+
+
+def check_no_edge(core: Rays, wanted: Collection[str]) -> None:
+    """Refuse numbers that move nothing but a hard edge that cuts rays.
+
+    Args:
+        core: what is traced.
+        wanted: names of numbers to which a derivative is wanted.
+
+    Raises:
+        InputError: one of them moves such an edge, named.
+    """
+    of_edges = [(name, n) for name in wanted for n, step in enumerate(core.steps) if _names(name, n, step, EDGES)]
+    cutting = {edge.number: edge.words for edge in _edges(core, PIXELS)} if of_edges else {}
+    for name, n in of_edges:
+        if n in cutting:
+            raise InputError(
+                f"there is no derivative to {name}: {cutting[n]} is a hard edge inside the path of rays, which "
+                "each ray passes or not. Keep what moves it as it is, or put a pattern that falls off smoothly "
+                "in its place"
+            )
+
+
+def _names(name: str, number: int, step: Step, table: dict[type, tuple[str, ...]]) -> bool:
+    """Whether a name is that of one of the numbers that a table lists of a step."""
+    start = f"steps[{number}]."
+    rest = name.removeprefix(start).split(".")[0]
+    return name.startswith(start) and rest in table.get(type(step), ())
+
+
+def _moves(core: Rays, edge: _Edge, name: str) -> bool:
+    """Whether a change of a number moves an edge against the rays, or the rays against it."""
+    n = edge.number
+    return _moved_from(core, name) <= n or (n < len(core.steps) and _names(name, n, core.steps[n], BORDERS))
+
+
+def _moved_from(core: Rays, name: str) -> int:
+    """The first step that rays meet elsewhere when a number changes; beyond all where they do not."""
+    never = len(core.steps) + 1
+    if name in ("scale", "motion"):
+        return never
+    if name == "index_from_ray":
+        return len(core.steps)
+    if name == "points":
+        scatters = [n + 1 for n, step in enumerate(core.steps) if isinstance(step, steps.Unscatter)]
+        made_up_for = isinstance(core.aim, Window) and core.aim.slope_from_scatter
+        return 0 if made_up_for else min(scatters, default=never)
+    if name.startswith("steps["):
+        number = int(name.removeprefix("steps[").split("]")[0])
+        return number + 1 if isinstance(core.steps[number], MOVING) else never
+    return 0
+
+
+def _edges(core: Rays, pixels: int) -> list[_Edge]:
+    """The edges that cut, in the order in which rays meet them."""
+    core = core.more(min(core.samples, RAYS))
+    rows, columns = (np.unique(np.linspace(0, n - 1, pixels).round().astype(np.int64)) for n in core.raster_shape)
+    pixel = (rows[:, None] * core.raster_shape[1] + columns).reshape(-1)
+    rays, cells = core.aimed(pixel, core.block(pixel))
+    found = []
+    for n, step in enumerate(core.steps):
+        before = replace(rays)
+        step(rays)
+        words = _cut(step, before, rays, cells)
+        if words:
+            found.append(_Edge(n, words))
+    index = core.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
+    lit = rays.share > 0
+    inside = core.held(index)[0]
+    if (lit & ~inside).any():
+        found.append(_Edge(len(core.steps), "the border of the views"))
+    view = np.floor(index[lit & inside][:, :2] + 0.5)
+    if not core.between_views and len(view) and np.ptp(view, axis=0).any():
+        found.append(_Edge(len(core.steps), "the borders between the views"))
+    return found
+
+
+def _cut(step: Step, before: Bundle, behind: Bundle, cells: Cell | None) -> str:
+    """The edge of a step that cuts the light that arrives there, in words; empty where none does."""
+    lit = before.share > 0
+    match step:
+        case steps.Disc() | steps.Rectangle() | steps.CellGaps() | steps.BlockOfCells():
+            return step.words if (behind.share[lit] == 0).any() else ""
+        case steps.CellShares():
+            shares = behind.share[lit] / before.share[lit]
+            return f"a border between cells of {step.words}" if shares.size and np.ptp(shares) > 1e-9 else ""
+        case steps.FacetsUnbend():
+            facet = step.facet_of(before.x, before.y)[lit]
+            return f"a border between facets of {step.words}" if facet.size and np.ptp(facet) else ""
+        case steps.CellsUnbend():
+            met = step.cell_of(before.x, before.y)
+            alike = all(not each[lit].size or not np.ptp(each[lit]) for each in met)
+            aimed = cells is not None and all((m == c)[lit].all() for m, c in zip(met, cells, strict=True))
+            return "" if alike or aimed else f"a border between cells of {step.words}"
+        case steps.Unscatter(cumulative=steps.Texture(values)):
+            varies = np.ptp(values[..., :-1], axis=(0, 1)).any()
+            return f"which kernel of {step.words} is picked" if varies else ""
+        case _:
+            return ""

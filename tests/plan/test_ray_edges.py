@@ -1,0 +1,89 @@
+"""Which hard edges rays run into, and against which of them a change of numbers moves rays."""
+
+import numpy as np
+import pytest
+
+import vcc
+from vcc.base.errors import InputError
+from vcc.base.units import mm
+from vcc.plan.rays.edges import check_no_edge, edges_that_cut
+from vcc.shapes import kernels, patterns
+
+LENS = vcc.Lens(focal_length=50 * mm, diameter=3 * mm, name="main")
+SENSOR = vcc.Sensor(52 * mm, (6, 8), 0.1 * mm)
+FIELD = vcc.LightField.from_views(np.ones((9, 9, 24, 24), np.float32), 1 * mm, 2e-3)
+
+
+def core(*elements, lens=LENS, samples=16, **options):
+    return vcc.Camera([lens, *elements], SENSOR).compile(FIELD, method="rays", samples=samples, **options).core
+
+
+def test_a_stop_that_is_aimed_at_cuts_nothing():
+    assert edges_that_cut(core()) == ()
+
+
+@pytest.mark.parametrize(
+    ("pattern", "cuts"),
+    [
+        (patterns.Circle(1.95 * mm), True),
+        (patterns.Circle(30 * mm), False),
+        (patterns.Cells(np.eye(5), 3 * mm), True),
+        (patterns.Cells(np.ones((1, 2)), 30 * mm), False),
+        (patterns.CosineSum(1 * mm), False),
+    ],
+)
+def test_masks_cut_where_rays_meet_their_edges(pattern, cuts):
+    found = edges_that_cut(core(vcc.Mask(pattern, z=20 * mm, name="mask")))
+    assert bool(found) == cuts
+    assert all("mask" in words for words in found)
+
+
+def test_views_cut_where_they_end_within_the_aim():
+    assert edges_that_cut(core(lens=vcc.Lens(50 * mm, 12 * mm))) == ("the border of the views",)
+    assert edges_that_cut(core(between_views="none")) == ("the borders between the views",)
+
+
+def test_cells_that_are_aimed_at_one_by_one_have_no_border():
+    camera = vcc.Camera.plenoptic(
+        50 * mm, lenslet_pitch=0.1 * mm, f_number=5, pixels_per_lenslet=5, lenslets=(6, 6)
+    )
+    field = vcc.LightField.from_views(np.ones((11, 11, 20, 20), np.float32), 1 * mm, 1e-3)
+    assert edges_that_cut(camera.compile(field, samples=64).core) == ()
+    array = vcc.LensArray(pitch=1 * mm, focal_length=400 * mm, z=1 * mm, name="array")
+    assert edges_that_cut(core(array, samples=2)) == ('a border between cells of lens array "array"',)
+
+
+def test_only_what_is_met_later_is_moved_against_an_edge():
+    """From the sensor on: the diffuser, the mask with an edge, the biprism with another, the lens's rim."""
+    met = core(
+        vcc.Diffuser(kernels.Gaussian(0.002), z=30 * mm),
+        vcc.Mask(patterns.Circle(2.0 * mm), z=20 * mm, name="mask"),
+        vcc.Biprism(0.01, z=10 * mm, name="prism"),
+    )
+    names = [type(step).__name__ for step in met.steps]
+    assert names[:6] == ["Move", "Unscatter", "Move", "Disc", "Move", "FacetsUnbend"]
+    all_three = ('mask "mask"', 'a border between facets of biprism "prism"', 'lens "main"')
+    assert edges_that_cut(met) == all_three
+    for changed, expected in {
+        "first_pixel": all_three,
+        "aim.offset": all_three,
+        "steps[0].before_from_behind": all_three,
+        "steps[2].before_from_behind": all_three,
+        "steps[3].radius": all_three[:1],
+        "steps[4].before_from_behind": all_three[1:],
+        "steps[5].decentre": all_three[1:],
+        "steps[5].slopes": all_three[2:],
+        "steps[7].radius": all_three[2:],
+        "index_from_ray": (),
+        "scale": (),
+    }.items():
+        assert edges_that_cut(met, [changed]) == expected, changed
+    assert edges_that_cut(met, ["scale", "steps[4].before_from_behind"]) == all_three[1:]
+
+
+def test_numbers_of_edges_that_cut_are_refused():
+    met = core(vcc.Mask(patterns.Circle(1.95 * mm), z=20 * mm, name="mask"))
+    with pytest.raises(InputError, match=r"steps\[1\].radius: mask .* is a hard edge inside the path of"):
+        check_no_edge(met, ["scale", "steps[1].radius"])
+    check_no_edge(met, ["scale", "steps[0].before_from_behind"])
+    check_no_edge(core(vcc.Mask(patterns.Circle(30 * mm), z=20 * mm)), ["steps[1].radius"])
