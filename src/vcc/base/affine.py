@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 
 
@@ -36,6 +37,7 @@ class Affine:
     matrix: NDArray[np.float64]
 
     def __post_init__(self) -> None:
+        checks.plain("an affine map", self.matrix)
         matrix = np.array(self.matrix, dtype=np.float64)
         if matrix.shape not in ((5, 5), (3, 3)):
             raise InputError(f"an affine map is a 5×5 or 3×3 matrix, not {'×'.join(map(str, matrix.shape))}")
@@ -49,6 +51,7 @@ class Affine:
     @classmethod
     def from_parts(cls, linear: ArrayLike, offset: ArrayLike) -> Affine:
         """The map x ↦ linear · x + offset, of n×n numbers and n numbers."""
+        checks.plain("an affine map", (linear, offset))
         linear, offset = np.asarray(linear, dtype=np.float64), np.asarray(offset, dtype=np.float64)
         matrix = np.eye(len(offset) + 1)
         matrix[:-1, :-1] = linear
@@ -72,6 +75,7 @@ class Affine:
             ⎢0 0 0 1 0⎥     u' = u − d·s. The maps agree once s is negated.
             ⎣0 0 0 0 1⎦
         """
+        checks.plain("distance of a propagation", distance)
         matrix = np.eye(5)
         matrix[0, 2] = matrix[1, 3] = distance
         return cls(matrix)
@@ -91,6 +95,7 @@ class Affine:
         Raises:
             InputError: a focal length of zero.
         """
+        checks.plain("focal length of a lens", focal_length)
         if focal_length == 0:
             raise InputError("a lens needs a focal length other than 0 m")
         matrix = np.eye(5)
@@ -109,6 +114,7 @@ class Affine:
             ⎢0 0 0 1 δt⎥
             ⎣0 0 0 0 1 ⎦
         """
+        checks.plain("deflection of a prism", deflection)
         matrix = np.eye(5)
         matrix[2:4, 4] = deflection
         return cls(matrix)
@@ -131,6 +137,7 @@ class Affine:
         Raises:
             InputError: not 2×2 numbers.
         """
+        checks.plain("a ray transfer matrix", matrix)
         given = np.asarray(matrix, dtype=np.float64)
         if given.shape != (2, 2):
             raise InputError(f"a ray transfer matrix is 2×2, not {'×'.join(map(str, given.shape)) or 'a number'}")
@@ -144,6 +151,7 @@ class Affine:
     @classmethod
     def scaling(cls, *factors: float) -> Affine:
         """x ↦ factors · x, axis by axis; four factors make a map of rays, two a map of points."""
+        checks.plain("an affine map", factors)
         return cls.from_parts(np.diag(factors), np.zeros(len(factors)))
 
     @property

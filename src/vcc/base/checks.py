@@ -166,7 +166,7 @@ def above_zero(
     Raises:
         InputError: anything else, NaN included.
     """
-    number = _number(value)
+    number = _number(name, value)
     if number > 0 and number <= most and (infinite or math.isfinite(number)):
         return number
     limit = "" if math.isinf(most) else f" and at most {_with(most, unit)}"
@@ -181,7 +181,7 @@ def zero_or_more(name: str, value: object, *, unit: str = "", most: float = math
     Raises:
         InputError: anything else, NaN included.
     """
-    number = _number(value)
+    number = _number(name, value)
     if 0 <= number <= most and math.isfinite(number):
         return number
     wanted = f"{_with(0, unit)} or more" if math.isinf(most) else f"from 0 to {_with(most, unit)}"
@@ -199,7 +199,7 @@ def finite(name: str, value: object, of: str = "") -> float:
     Raises:
         InputError: anything else.
     """
-    number = _number(value)
+    number = _number(name, value)
     if not math.isfinite(number):
         wanted = f"a finite number{f' of {of}' if of else ''}"
         raise InputError(f"{name} must be {wanted}, not {_told(value)}{_and(instead(value))}")
@@ -218,7 +218,7 @@ def not_zero(name: str, value: object, *, unit: str = "m", way_out: str = "") ->
     Raises:
         InputError: 0, NaN or no number.
     """
-    number = _number(value)
+    number = _number(name, value)
     if math.isnan(number) and not isinstance(value, float | np.floating):
         of = "metres" if unit == "m" else unit
         raise InputError(f"{name} is a number of {of}, not {_told(value)}{_and(instead(value), way_out)}")
@@ -238,14 +238,47 @@ def pair(name: str, value: Any, what: str) -> tuple[float, float]:
     Raises:
         InputError: anything else.
     """
+    plain(name, value)
     try:
-        one, other = map(_number, value)
+        one, other = (_number(name, each) for each in value)
     except (TypeError, ValueError):
         one = other = math.nan
     if not (math.isfinite(one) and math.isfinite(other)):
         parts = value if isinstance(value, tuple | list) else [value]
         raise InputError(f"{name} is {what}, not {_told(value)}{_and(*map(instead, parts))}")
     return one, other
+
+
+# --- what learns ---
+
+
+def plain(name: str, value: object) -> None:
+    """Refuse arrays of other libraries that carry a gradient, which elements would lose without a word.
+
+    A tensor of PyTorch that requires a gradient, or what stands for an array while JAX traces a function; alone or
+    in tuples and lists. They are known without these libraries being there.
+
+    Args:
+        name: what to call it in an error.
+        value: of any kind.
+
+    Raises:
+        InputError: it is one, or holds one.
+    """
+    if isinstance(value, tuple | list):
+        for part in value:
+            plain(name, part)
+        return
+    if getattr(value, "requires_grad", False) is True:
+        what = "a tensor that requires a gradient, and would lose it here: give the number, without it, and learn"
+    elif any(kind.__name__ == "Tracer" for kind in type(value).__mro__):
+        what = "traced by JAX, and elements are made of numbers that are known: give the number, and learn"
+    else:
+        return
+    raise InputError(
+        f"{name} is {what} the parameter by its name, vcc.torch.CameraModule(camera, light_field, "
+        'learn=["element.parameter"])'
+    )
 
 
 # --- sizes of things ---
@@ -302,6 +335,7 @@ def array(name: str, given: object, what: str, *shape: int | None, least: int = 
     Raises:
         InputError: no array of numbers, another shape, or numbers that are not finite.
     """
+    plain(name, given)
     try:
         values = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
@@ -414,8 +448,9 @@ def instead(value: object) -> str:
     return "give its number in SI units: quantity.si.value" if hasattr(value, "si") else ""
 
 
-def _number(value: Any) -> float:
-    """A number as a float; NaN for truth values, text and whatever else is none."""
+def _number(name: str, value: Any) -> float:
+    """A number as a float; NaN for truth values, text and whatever else is none; what learns is refused."""
+    plain(name, value)
     if isinstance(value, bool | np.bool_ | str | bytes):
         return math.nan
     try:

@@ -172,6 +172,7 @@ def checked_slopes(
         InputError: not two arrays, of another shape, or with numbers that are not finite.
     """
     shape = np.broadcast_shapes(x.shape, y.shape)
+    checks.plain("what the deflection returned", returned)
     try:
         s, t = returned
     except (TypeError, ValueError):

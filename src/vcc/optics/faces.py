@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -122,6 +122,8 @@ class Element(abc.ABC):
 
     def __post_init__(self) -> None:
         named = f' "{self.name}"' if self.name else ""
+        for parameter in fields(self):
+            checks.plain(f"{parameter.name} of {self.kind}{named}", getattr(self, parameter.name))
         checks.finite(f"z of {self.kind}{named}", self.z, "metres")  # which its label states
         middle = checks.pair(f"decentre of {self.label}", self.decentre, "(x, y) in metres")
         object.__setattr__(self, "decentre", middle)

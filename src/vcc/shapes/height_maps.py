@@ -336,6 +336,7 @@ def _table(what: str, given: Any) -> Array:
 
 
 def _check_glass(what: str, refractive_index: Any) -> None:
+    checks.plain(f"refractive_index of {what}", refractive_index)
     if not (isinstance(refractive_index, Real) and 1 < refractive_index < math.inf):  # type: ignore[operator]
         raise InputError(
             f"refractive_index of {what} is {refractive_index}: a surface with no glass bends "

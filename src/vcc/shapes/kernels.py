@@ -130,6 +130,7 @@ class Gaussian(Kernel):
     sigma: float | tuple[float, float]
 
     def __post_init__(self) -> None:
+        checks.plain("sigma of a Gaussian", self.sigma)
         for sigma in self.sigma if isinstance(self.sigma, tuple | list) else (self.sigma,):
             if way := checks.instead(sigma):
                 raise InputError(f"sigma of a Gaussian is a slope, a number without a unit, not {sigma!r}; {way}")
@@ -274,6 +275,8 @@ class Radial(Brief, Kernel):
     normalise: bool = False
 
     def __post_init__(self) -> None:
+        for name in ("radii", "profile"):
+            checks.plain(f"{name} of a radial kernel", getattr(self, name))
         radii, profile = (np.asarray(given, dtype=np.float64) for given in (self.radii, self.profile))
         if radii.ndim != 1 or radii.shape != profile.shape or radii.size < 2:
             raise InputError(

@@ -252,6 +252,7 @@ class Polygon(Pattern):
         checks.whole_number_between(
             "sides of polygon", self.sides, 3, 1000, way_out="more are a vcc.patterns.Circle"
         )
+        checks.finite("rotation of polygon", self.rotation, "radians")
 
     @property
     def size(self) -> tuple[float, float]:
@@ -289,6 +290,7 @@ class Cells(Value, Pattern):
     middle: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
 
     def __post_init__(self) -> None:
+        checks.plain("a transmission array", self.values)
         try:
             values = np.asarray(self.values, dtype=np.float64)
         except (TypeError, ValueError):
@@ -310,6 +312,7 @@ class Cells(Value, Pattern):
         if self.height is None:
             object.__setattr__(self, "height", self.width * values.shape[0] / values.shape[1])
         checks.above_zero("height of cells", self.height, unit="m")
+        object.__setattr__(self, "middle", checks.pair("middle of cells", self.middle, "(x, y) in metres"))
 
     @property
     def size(self) -> tuple[float, float]:
@@ -409,6 +412,7 @@ class CosineSum(Pattern):
         for period in self.period if isinstance(self.period, tuple | list) else (self.period,):
             checks.above_zero("period of cosine sum", period, unit="m", infinite=True)
         checks.whole_number_between("harmonics of cosine sum", self.harmonics, 1, 1000)
+        checks.finite("phase of cosine sum", self.phase, "radians")
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The product of the two axes' sums."""
@@ -456,7 +460,9 @@ class FunctionPattern(Pattern):
         shape = x.shape
         name = f"pattern {getattr(self.function, '__name__', repr(self.function))}"
         name = f"{self.owner}: {name}" if self.owner else name
-        values = np.asarray(self.function(x, y), dtype=np.float64)
+        returned = self.function(x, y)
+        checks.plain(f"what {name} returned", returned)
+        values = np.asarray(returned, dtype=np.float64)
         if values.shape not in (shape, ()):
             raise InputError(f"{name} returned shape {values.shape} for positions of shape {shape}")
         if not np.isfinite(values).all():
