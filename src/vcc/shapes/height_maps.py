@@ -95,6 +95,30 @@ class Sheet(Surface):
         values[inside] = spline(y[inside], x[inside], grid=False)
         return values
 
+    def paths_back(self, x: ArrayLike, y: ArrayLike, weights: tuple[ArrayLike, ArrayLike]) -> Array:
+        """What each optical path that is known adds to Σ weights[0]·Δs + Σ weights[1]·Δt over places of a grid.
+
+        The transpose of `slopes`, which is linear in the paths. A plate's heights are learned by it.
+
+        Args:
+            x: columns, (1, n), metres.
+            y: rows, (m, 1).
+            weights: two arrays (m, n).
+
+        Returns:
+            Of the shape in which paths are known, (rows, columns).
+        """
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        known_y, known_x, _ = self._samples()
+        knots_y, knots_x, _ = self._spline.tck
+        on_sheet = (np.abs(x) <= self.size[0] * 0.500001) & (np.abs(y) <= self.size[1] * 0.500001)
+        along_x, along_y = (np.where(on_sheet, each, 0.0) for each in weights)
+        total = _basis(knots_y, y, 0).T @ along_x @ _basis(knots_x, x, 1)
+        total += _basis(knots_y, y, 1).T @ along_y @ _basis(knots_x, x, 0)
+        # The coefficients are what makes the spline pass through the points that are known.
+        down = np.linalg.solve(_basis(knots_y, known_y, 0).T, total)
+        return np.asarray(np.linalg.solve(_basis(knots_x, known_x, 0).T, down.T).T)
+
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
         """The largest coefficients of the slopes' splines in the rectangle, which no spline can exceed.
 
@@ -104,6 +128,14 @@ class Sheet(Surface):
         return _coefficient_bound(along_x, half_width, half_height), _coefficient_bound(
             along_y, half_width, half_height
         )
+
+
+def _basis(knots: Array, places: Array, derivative: int) -> Array:
+    """The cubic B-splines on knots, or their derivative, at places: (places, splines)."""
+    from scipy.interpolate import BSpline
+
+    splines = BSpline(knots, np.eye(len(knots) - 4), 3)
+    return np.asarray(splines(places.reshape(-1), nu=derivative))
 
 
 def _coefficient_bound(spline: Any, half_width: float, half_height: float) -> float:
@@ -124,7 +156,7 @@ class _Table(Sheet):
         """What is known of each cell, (rows, columns)."""
 
     @property
-    def _factor(self) -> float:
+    def factor(self) -> float:
         """The optical path for 1 of what is known."""
         return 1.0
 
@@ -139,11 +171,11 @@ class _Table(Sheet):
             ((np.arange(cells) + 0.5) / cells - 0.5) * length
             for cells, length in zip(self._cells.shape, self.size[::-1], strict=True)
         )
-        return y, x, self._factor * self._cells
+        return y, x, self.factor * self._cells
 
     def compared(self) -> tuple[Any, ...]:
         """What equal tables have in common: the size, since a height that is left out makes the cells square."""
-        return self._cells, self.size, self._factor
+        return self._cells, self.size, self.factor
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, type(self)) and (
@@ -151,7 +183,7 @@ class _Table(Sheet):
         )
 
     def __hash__(self) -> int:
-        return hash((self._cells.tobytes(), self.size, self._factor))
+        return hash((self._cells.tobytes(), self.size, self.factor))
 
     @property
     def _in_words(self) -> str:
@@ -200,7 +232,8 @@ class HeightMap(_Table):
         return self.heights
 
     @property
-    def _factor(self) -> float:
+    def factor(self) -> float:
+        """The optical path for 1 metre of glass: n − 1."""
         return self.refractive_index - 1
 
     def described(self) -> str:
