@@ -344,12 +344,16 @@ class CellShares(Brief):
 
     def __call__(self, rays: Bundle) -> None:
         """Weigh rays by the cell that they meet."""
+        row, column, inside = self.cell_of(rays.x, rays.y)
+        rays.share = rays.share * np.where(inside, self.values[row, column], 0.0)
+
+    def cell_of(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """(row, column) of the cell that holds each place, or of one at the border, and whether one does."""
         rows, columns = self.values.shape
-        column = np.floor((rays.x - self.corner[0]) / self.size[0]).astype(np.int64)
-        row = np.floor((rays.y - self.corner[1]) / self.size[1]).astype(np.int64)
+        column = np.floor((x - self.corner[0]) / self.size[0]).astype(np.int64)
+        row = np.floor((y - self.corner[1]) / self.size[1]).astype(np.int64)
         inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-        value = self.values[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
-        rays.share = rays.share * np.where(inside, value, 0.0)
+        return np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1), inside
 
     def packed(self, packer: Packer) -> None:
         """The cells, where the first begins and how large they are."""
@@ -431,14 +435,17 @@ class Unscatter:
 
     def __call__(self, rays: Bundle) -> None:
         """Take from each ray's slopes what the diffuser added to it."""
-        kernel = np.zeros(rays.x.shape, dtype=np.int64)
-        if self.cumulative is not None:
-            picked = rays.points[..., self.pick, None] >= self.cumulative(rays.x, rays.y)[..., :-1]
-            kernel = picked.sum(axis=-1)
-        place = self.column + 2 * kernel
+        place = self.column + 2 * self.kernel_of(rays)
         stretch = 1.0 if self.width is None else self.width(rays.x, rays.y)[..., 0]
         rays.s = rays.s - stretch * np.take_along_axis(rays.points, place[..., None], -1)[..., 0]
         rays.t = rays.t - stretch * np.take_along_axis(rays.points, place[..., None] + 1, -1)[..., 0]
+
+    def kernel_of(self, rays: Bundle) -> NDArray[np.int64]:
+        """The number of the kernel that is picked for each ray."""
+        if self.cumulative is None:
+            return np.zeros(rays.x.shape, dtype=np.int64)
+        picked = rays.points[..., self.pick, None] >= self.cumulative(rays.x, rays.y)[..., :-1]
+        return np.asarray(picked.sum(axis=-1))
 
     def packed(self, packer: Packer) -> None:
         """Columns of the table, and the two textures, of no points where there is none."""

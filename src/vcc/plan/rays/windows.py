@@ -201,7 +201,7 @@ class CellWindows:
         kind = row % self.cells.powers.shape[0], column % self.cells.powers.shape[1]
         centres = self.cells.lattice.centre_of(row, column)
         (middle, half), (middle_y, half_y) = (
-            self._image(n, place, centre, kind)
+            self.image(n, place, centre, kind)
             for n, (place, centre) in enumerate(zip((x, y), centres, strict=True))
         )
         low = np.maximum(middle - half, centres[0] - self.opening.half[0])
@@ -215,7 +215,7 @@ class CellWindows:
         tall = np.maximum(np.minimum(middle_y + chord, centres[1] + highest) - low, 0.0)
         return a, low + tall * (0.5 + 0.5 * points[..., 1]), wide * tall
 
-    def _image(
+    def image(
         self, n: int, place: Array, centre: Array, kind: tuple[NDArray[np.int64], NDArray[np.int64]]
     ) -> tuple[Array, Array]:
         """Middle and half size along axis n of the stop's image in cells, seen from places on the sensor."""

@@ -1,0 +1,209 @@
+"""What a raster by rays says of the plan's numbers, plainly, in float64. It defines the derivative.
+
+    I(x, y) = scale · Σ_rays w · Π T · L(i, j, k, l),
+
+each ray at fixed points of the table. Weights G of the raster give each ray the cotangents scale · Σ_c G_c · L_c
+of its share and share · scale · Σ_c G_c · ∂L_c/∂(i, j, k, l) of its place in the light field; what these say of
+the rays' way is told step by step backwards (`vcc.plan.rays.backwards`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+from vcc.base.progress import Progress, tell
+from vcc.plan.numbers import numbers
+from vcc.plan.rays import edges
+from vcc.plan.rays.aim_backwards import aim_back
+from vcc.plan.rays.backwards import Numbers, back, moved_back
+from vcc.plan.rays.model import Rays
+from vcc.plan.rays.steps import Bundle
+from vcc.plan.rays.windows import CellWindows
+
+Array = NDArray[np.float64]
+
+RAYS_AT_ONCE = 2**15
+"""Rays whose whole way is kept at once: some tens of MiB."""
+
+
+def ray_numbers_back(
+    core: Rays,
+    values: NDArray[Any],
+    raster: NDArray[np.floating],
+    wanted: Collection[str],
+    beside: int = 0,
+    threads: int = 1,
+    progress: Progress | None = None,
+) -> Numbers:
+    """The derivative of ⟨raster, what rays make of the samples⟩ to numbers of the core.
+
+    Args:
+        core: what is traced.
+        values: samples (v, u, t, s[, channels]).
+        raster: weights of the picture's values, (rows, columns, channels).
+        wanted: names of numbers (`vcc.plan.numbers.numbers` of the core).
+        beside: 0, or 1 for the blocks of points beside those of the first round.
+        threads: not used.
+        progress: called with (done, total) in pixels.
+
+    Returns:
+        For each name an array of its number's shape.
+
+    Raises:
+        InputError: a number that moves nothing but a hard edge which rays run into.
+    """
+    edges.check_no_edge(core, wanted)
+    channels = values.shape[4] if values.ndim == 5 else 1
+    samples = values.reshape(-1, channels).astype(np.float64)
+    found = {name: np.zeros_like(number) for name, number in numbers(core).items() if name in set(wanted)}
+    weights = raster.reshape(-1, channels).astype(np.float64)
+    for pixel in _pieces(core):
+        for name, number in _of_pixels(core, samples, weights[pixel], pixel, core.block(pixel) ^ beside):
+            if name in found:
+                found[name] = found[name] + number
+        tell(progress, int(pixel[-1]) + 1, len(weights))
+    return {name: found[name] for name in wanted}
+
+
+def _pieces(core: Rays) -> Iterator[NDArray[np.int64]]:
+    """Numbers of pixels, some at a time."""
+    cells = np.prod([2 * reach + 1 for reach in core.aim.reach]) if isinstance(core.aim, CellWindows) else 1
+    at_once = max(RAYS_AT_ONCE // (core.samples * int(cells)), 1)
+    total = core.raster_shape[0] * core.raster_shape[1]
+    for first in range(0, total, at_once):
+        yield np.arange(first, min(first + at_once, total))
+
+
+def _of_pixels(
+    core: Rays, samples: Array, weights: Array, pixel: NDArray[np.int64], block: NDArray[np.int64]
+) -> Iterator[tuple[str, Array]]:
+    """What some pixels' weights (pixels, channels) say of the numbers, by name."""
+    rays, cells = core.aimed(pixel, block)
+    way = [replace(rays)]
+    for step in core.steps:
+        step(rays)
+        way.append(replace(rays))
+    behind, own = _looked_up_back(core, samples, weights, rays)
+    yield from own.items()
+    for n in reversed(range(len(core.steps))):
+        behind, own = back(core.steps[n], way[n], behind)
+        yield from ((f"steps[{n}].{name}", number) for name, number in own.items())
+    each = replace(behind, share=behind.share / core.samples)  # a pixel is the mean over its rays
+    behind, own = aim_back(core.aim, replace(way[0], share=way[0].share * core.samples), cells, each)
+    yield from ((f"aim.{name}", number) for name, number in own.items())
+    yield from _sensor_back(core, way[0], behind, pixel).items()
+    points = np.zeros(core.points.shape)
+    number = block[:, None, None] * core.samples + np.arange(core.samples)
+    np.add.at(points, np.broadcast_to(number, rays.x.shape), behind.points)
+    yield "points", points
+
+
+def _sensor_back(core: Rays, rays: Bundle, behind: Bundle, pixel: NDArray[np.int64]) -> Numbers:
+    """x = first pixel + column · pitch + place in the pixel · sensitive size, likewise y."""
+    row, column = (each[:, None, None] for each in np.divmod(pixel, core.raster_shape[1]))
+    both = ((behind.x, column, rays.points[..., 0]), (behind.y, row, rays.points[..., 1]))
+    return {
+        "first_pixel": np.array([g.sum() for g, _, _ in both]),
+        "pitch": np.array([(g * number).sum() for g, number, _ in both]),
+        "sensitive": np.array([(g * place).sum() for g, _, place in both]),
+    }
+
+
+@dataclass(repr=False)
+class _Found(Brief):
+    """What rays find in the light field, times their pixels' weights: value, and its derivatives.
+
+    Args:
+        value: (…).
+        to_index: to (i, j, k, l), (…, 4).
+        to_motion: 2×2, times ``carried``, summed over all rays.
+    """
+
+    value: Array
+    to_index: Array
+    to_motion: Array
+
+
+def _looked_up_back(core: Rays, samples: Array, weights: Array, rays: Bundle) -> tuple[Bundle, Numbers]:
+    """What the light field says of rays at the end of their way, and of the numbers by which it is looked up."""
+    index = core.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
+    inside = core.held(index)[0]
+    found = _found(core, samples, weights[:, None, None], index, rays.share * inside * core.scale)
+    carried = (rays.share * inside * core.scale)[..., None] * found.to_index
+    behind, index_from_ray = moved_back(core.index_from_ray.matrix, rays, carried)
+    share = inside * core.scale * found.value
+    numbers = {
+        "index_from_ray": index_from_ray,
+        "motion": found.to_motion,
+        "scale": np.asarray(np.sum(rays.share * inside * found.value)),
+    }
+    return replace(behind, share=share, points=np.zeros(rays.points.shape)), numbers
+
+
+def _found(core: Rays, samples: Array, weights: Array, index: Array, carried: Array) -> _Found:
+    """What rays find, interpolated in all four dimensions; see `vcc.engines.rays`.
+
+    Args:
+        core: what is traced.
+        samples: (samples, channels).
+        weights: of the channels, (pixels, 1, 1, channels).
+        index: (…, 4), places in the light field.
+        carried: what each ray carries.
+    """
+    nv, nu = core.views[:2]
+    i, j, k, l = np.moveaxis(index, -1, 0)
+    value, to_index, to_motion = np.zeros_like(i), np.zeros_like(index), np.zeros((2, 2))
+    along_u, along_v = _views(i, nu, core.between_views), _views(j, nv, core.between_views)
+    for view_i, near_i, steep_i in along_u:
+        for view_j, near_j, steep_j in along_v:
+            away = np.stack([i - view_i, j - view_j])
+            moved = np.tensordot(core.motion, away, axes=1) if core.between_views else np.zeros_like(away)
+            place = np.clip(np.stack([k, l]) + moved, -1e9, 1e9)
+            here, to_k, to_l = _in_view(core, samples, weights, view_j * nu + view_i, place)
+            value += near_i * near_j * here
+            of_view = near_i * near_j * np.stack([to_k, to_l])
+            to_index[..., 0] += steep_i * near_j * here
+            to_index[..., 1] += near_i * steep_j * here
+            to_index[..., 2] += of_view[0]
+            to_index[..., 3] += of_view[1]
+            if core.between_views:
+                to_index[..., :2] += np.moveaxis(np.tensordot(core.motion.T, of_view, axes=1), 0, -1)
+                to_motion += (carried * of_view).reshape(2, -1) @ away.reshape(2, -1).T
+    return _Found(value, to_index, to_motion)
+
+
+def _views(at: Array, number: int, between: bool) -> list[tuple[NDArray[np.int64], Array, Array]]:
+    """The views that rays lie between along one axis: (which, weight, derivative of the weight)."""
+    held = np.clip(at, 0, number - 1)
+    if not between or number == 1:
+        return [((held + 0.5).astype(np.int64), np.ones_like(at), np.zeros_like(at))]
+    first = np.minimum(held.astype(np.int64), number - 2)
+    inside = np.where((at >= 0) & (at <= number - 1), 1.0, 0.0)
+    return [(first, 1 - (held - first), -inside), (first + 1, held - first, inside)]
+
+
+def _in_view(
+    core: Rays, samples: Array, weights: Array, view: NDArray[np.int64], place: Array
+) -> tuple[Array, Array, Array]:
+    """What a view holds at places (k, l), dark outside, times weights, and its derivatives to both."""
+    _, _, nt, ns = core.views
+    first = np.floor(place).astype(np.int64)
+    part = place - first
+    value, to_k, to_l = (np.zeros(view.shape) for _ in range(3))
+    for dk in range(2):
+        for dl in range(2):
+            c, r = first[0] + dk, first[1] + dl
+            inside = (c >= 0) & (c < ns) & (r >= 0) & (r < nt)
+            at = (view * nt + np.clip(r, 0, nt - 1)) * ns + np.clip(c, 0, ns - 1)
+            sample = np.sum(weights * samples[at], axis=-1) * inside
+            across, down = np.abs(1 - dk - part[0]), np.abs(1 - dl - part[1])
+            value += across * down * sample
+            to_k += (2 * dk - 1) * down * sample
+            to_l += (2 * dl - 1) * across * sample
+    return value, to_k, to_l
