@@ -25,6 +25,8 @@ from vcc.plan.rays.model import Rays
 
 copies = True
 """Samples are converted as a whole; see `vcc.plan.protocol.Engine`."""
+double = False
+"""See there."""
 
 
 def footprints(

@@ -40,6 +40,8 @@ SMALL = 2**17
 
 copies = False
 """Samples are read as they are; see `vcc.plan.protocol.Engine`."""
+double = False
+"""See there."""
 
 
 def footprints(

@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 copies = True
 """Samples are converted as a whole; see `vcc.plan.protocol.Engine`."""
+double = True
+"""See there."""
 
 
 def footprints(
@@ -57,16 +59,17 @@ def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Pr
 
 
 def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:
-    """Samples as a core takes them, sharpened in double precision."""
+    """Samples as a core takes them, filtered in double precision; bytes are sharpened exactly."""
     for operator in before:
-        wide = isinstance(operator, operators.SharpenViews) and values.dtype != np.uint8
-        values = operator.apply(values.astype(np.float64) if wide else values)
+        exact = isinstance(operator, operators.SharpenViews) and values.dtype == np.uint8
+        moved = isinstance(operator, operators.SwapPixelAxes)
+        values = operator.apply(values if exact or moved else values.astype(np.float64))
     return values
 
 
-def finished(after: Sequence[operators.After], raster: Array, threads: int) -> NDArray[np.float32]:
-    """The picture (rows, columns, channels), float32, of a raster."""
-    return np.asarray(operators.finished(after, raster), dtype=np.float32)
+def finished(after: Sequence[operators.After], raster: Array, threads: int) -> Array:
+    """The picture (rows, columns, channels), float64, of a raster."""
+    return np.asarray(operators.finished(after, raster), dtype=np.float64)
 
 
 def memory(core: Footprints | Rays, channels: int, threads: int) -> int:

@@ -151,13 +151,15 @@ class Engine(Protocol):
     rays_back: BackRunner
     copies: bool
     """Whether all samples that it is given are converted first, which takes memory."""
+    double: bool
+    """Whether it computes floating-point samples in double precision, and gives pictures in it."""
 
     def prepared(self, before: Sequence[Any], values: Any, threads: int) -> Any:
         """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it."""
         ...
 
     def finished(self, after: Sequence[Any], raster: Any, threads: int) -> Any:
-        """The picture (rows, columns, channels), float32, of a raster after all operators."""
+        """The picture (rows, columns, channels) of a raster after all operators, in the engine's precision."""
         ...
 
     def memory(self, core: Any, channels: int, threads: int) -> int:
@@ -198,6 +200,16 @@ class Core(Protocol):
 
     def part(self, block: Block) -> Any:
         """What runs on a block of samples; the parts' rasters add up."""
+        ...
+
+    def needed(self, wanted: Collection[str]) -> Collection[str]:
+        """The numbers of a part to which derivatives make up those to some of the core's numbers."""
+        ...
+
+    def whole_numbers(
+        self, block: Block, numbers: Mapping[str, NDArray[np.float64]]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Derivatives to the numbers of a `part`, by name, as those to the core's own; the parts' add up."""
         ...
 
     def scaled(self, factor: float) -> Any:

@@ -95,6 +95,8 @@ class Drive:
         threads: how many work at once.
         limit: bytes within which blocks are cut.
         kind: of the samples as the core takes them.
+        unit: what one of their numbers stands for in those given.
+        radiance: what it stands for.
         core: the plan's, for samples of these numbers.
         runner: the engine's way to run it.
 
@@ -114,9 +116,37 @@ class Drive:
         if plan.views_between is not None:
             self._look_between(plan.views_between)
         kind = to_dtype(samples.whole()) if self.in_memory else self.samples.grid.kind
-        self.kind, factor = plan.kept_as(kind)
-        self.core = plan.core.scaled(factor / self.samples.grid.full_scale)
+        if self.engine.double and kind.kind == "f":
+            kind = np.dtype(np.float64)
+        self.kind, self.unit = plan.kept_as(kind)
+        self.radiance = self.unit / self.samples.grid.full_scale
+        self.core = plan.core.scaled(self.radiance)
         self.runner = plan.core.by(self.engine)
+
+    @classmethod
+    def of_linear(cls, plan: Plan, samples: Samples, how: How) -> Drive:
+        """The same for a plan that is to be gone through backwards, too.
+
+        Raises:
+            InputError: rays until a tolerance is met, views in between by depth, or arrays of another library:
+                what these do is not one linear map of the samples that is known here.
+        """
+        if how.tolerance is not None:
+            raise InputError(
+                "tolerance takes more rays until one picture is good enough, and backwards each picture takes the "
+                "same rays: leave it out, and pass samples= to camera.compile or camera.operator"
+            )
+        if plan.views_between is not None:
+            raise InputError(
+                "between_views='depth' makes views by what hides what, which cannot be gone through backwards: "
+                "pass between_views='auto'"
+            )
+        if chosen(how.engine, samples.whole()) == "array_api":
+            raise InputError(
+                "engine 'array_api' goes backwards by the gradients of its arrays' own library: take those of "
+                "camera.capture, or pass NumPy arrays and engine='numba' or 'reference'"
+            )
+        return cls(plan, samples, how)
 
     @property
     def in_memory(self) -> bool:
@@ -158,18 +188,23 @@ class Drive:
                 f"memory ran out within memory_limit={math.ceil(self.limit)} bytes: there is less than that. Pass "
                 "a smaller one"
             ) from None
-        picture = self.engine.finished(self.plan.after, found.values, self.threads)
+        picture = self.picture(found)
         if self.plan.views_between is not None:
             _warn_of_unseen(self.samples)
         missing = found.missing if self.plan.missing_rays is None else self.plan.missing_rays
         return Recorded(
-            picture if self.samples.grid.channels is not None else picture[..., 0],
+            picture.astype(np.float32, copy=False) if isinstance(picture, np.ndarray) else picture,
             missing,
             self.plan.missing_reason,
             sampling_error(found),
             found.rays,
             found.samples,
         )
+
+    def picture(self, found: Partial) -> Any:
+        """The picture (rows, columns[, channels]) of a raster, in the engine's precision."""
+        picture = self.engine.finished(self.plan.after, found.values, self.threads)
+        return picture if self.samples.grid.channels is not None else picture[..., 0]
 
     def rounds(self, progress: Progress | None = None) -> Partial:
         """The raster by as many rays as a tolerance asks for; each round takes as many again as there are."""
@@ -199,7 +234,7 @@ class Drive:
         run = partial(self.runner, beside=int(beside > 0), threads=self.threads)
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
-            return run(core, self._prepared, progress=progress)
+            return run(core, self.prepared, progress=progress)
         total = self._over_blocks(core, run, listed, progress)
         if not self.plan.by_rays or self.in_memory:
             return total
@@ -208,45 +243,61 @@ class Drive:
         return replace(total, asked=whole.asked, lacking=whole.lacking, rays=whole.rays)
 
     @cached_property
-    def _prepared(self) -> Any:
+    def prepared(self) -> Any:
         """All samples in memory as the core takes them, the same for each round of rays."""
         return self.engine.prepared(self.plan.before, self.samples.whole(), self.threads)
+
+    @cached_property
+    def used(self) -> NDArray[np.bool_]:
+        """Which views are looked at, (v, u)."""
+        return self.plan.core.used_views(self.samples.grid.shape)
+
+    def used_in(self, block: Block) -> int:
+        """How many views of a block are looked at."""
+        return int(self.used[slice(*block.rows), slice(*block.columns)].sum())
 
     def _over_blocks(
         self, core: Core, run: Callable[..., Partial], blocks: list[Block], progress: Progress | None
     ) -> Partial:
         """The sum of what blocks give, in double precision; those of which no view is looked at are not read."""
-        used = self.plan.core.used_views(self.samples.grid.shape)
-        looked_at = {block: int(used[slice(*block.rows), slice(*block.columns)].sum()) for block in blocks}
-        counted = _Counted(progress, sum(looked_at.values()))
+        counted = Counted(progress, sum(map(self.used_in, blocks)))
         total: Partial | None = None
-        for block in [block for block in blocks if looked_at[block]]:
-            values, around = self._values(block, used, counted)
-            part = _in_double(run(core.part(self.plan.block(around)), values))
+        for block in filter(self.used_in, blocks):
+            values = self.values(block, counted)
+            part = _in_double(run(core.part(self.plan.block(self.around(block))), values))
             del values  # before the next block is read
             total = part if total is None else total + part
         assert total is not None
         return total
 
-    def _values(self, block: Block, used: NDArray[np.bool_], counted: _Counted) -> tuple[Any, Block]:
+    def around(self, block: Block) -> Block:
+        """What runs with a block: of those that are read, a border of views where it has neighbours, too."""
+        border = 0 if self.in_memory else self.plan.core.border
+        return _with_border(block, border, self.samples.grid.shape)
+
+    def values(self, block: Block, counted: Counted) -> Any:
         """A block's samples as the core takes them, with a border of dark views towards its neighbours."""
         if self.in_memory:
-            counted.add(int(used[slice(*block.rows), slice(*block.columns)].sum()))
-            return self.engine.prepared(self.plan.before, self.samples.read(block), self.threads), block
-        around = _with_border(block, self.plan.core.border, self.samples.grid.shape)
+            counted.add(self.used_in(block))
+            return self.engine.prepared(self.plan.before, self.samples.read(block), self.threads)
+        around = self.around(block)
         room = np.zeros(self.plan.shape((*around.shape, *self.samples.grid.shape[4:])), dtype=self.kind)
         (a, b), (c, d) = block.rows, block.columns
-        for j, i in zip(*np.nonzero(used[a:b, c:d]), strict=True):
+        for j, i in zip(*np.nonzero(self.used[a:b, c:d]), strict=True):
             row, column = a + int(j), c + int(i)
             room[row - around.rows[0], column - around.columns[0]] = self._view(row, column, block)
             counted.add(1)
-        return room, around
+        return room
+
+    def with_reach(self, block: Block) -> tuple[Block, tuple[int, int]]:
+        """A block with the rows of pixels that operators before look at beside it; how many above and below."""
+        first, stop = block.pixel_rows
+        above, below = min(self.plan.reach, first), min(self.plan.reach, self.samples.grid.shape[2] - stop)
+        return replace(block, pixel_rows=(first - above, stop + below)), (above, below)
 
     def _view(self, row: int, column: int, block: Block) -> Any:
         """The samples of one view of a block, read with as many more rows of pixels as operators before reach."""
-        first, stop = block.pixel_rows
-        above, below = min(self.plan.reach, first), min(self.plan.reach, self.samples.grid.shape[2] - stop)
-        one = Block((row, row + 1), (column, column + 1), (first - above, stop + below), block.pixel_columns)
+        one, (above, below) = self.with_reach(replace(block, rows=(row, row + 1), columns=(column, column + 1)))
         view = self.engine.prepared(self.plan.before, self.samples.read(one), self.threads)[0, 0]
         return view[above : view.shape[0] - below] if above or below else view
 
@@ -286,13 +337,14 @@ def _in_double(part: Partial) -> Partial:
     return replace(part, values=part.values.astype(np.float64), difference=difference)
 
 
-class _Counted:
+class Counted:
     """Views counted as they are read."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = progress, total, 0
 
     def add(self, views: int) -> None:
+        """So many more are done."""
         self._done += views
         if self._progress is not None:
             self._progress(self._done, self._total)

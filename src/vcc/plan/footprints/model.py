@@ -9,6 +9,7 @@ in which every place is an affine function of the sample's index. The engine kno
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -123,21 +124,53 @@ class Footprints(Value):
 
     def part(self, block: Block) -> Footprints:
         """What adds a block's samples: the rasters of all blocks of a light field sum to the raster of it."""
-        (a, b), (c, d) = block.rows, block.columns
         (l, _), (k, _) = block.pixel_rows, block.pixel_columns
-        rows = np.flatnonzero((self.view_rows >= a) & (self.view_rows < b))
-        columns = np.flatnonzero((self.view_columns >= c) & (self.view_columns < d))
-        taps = np.ix_(rows, columns)
+        rows, columns, taps = self._taps(block)
         return replace(
             self,
-            view_rows=self.view_rows[rows] - a,
-            view_columns=self.view_columns[columns] - c,
+            view_rows=self.view_rows[rows] - block.rows[0],
+            view_columns=self.view_columns[columns] - block.columns[0],
             weights=self.weights[taps],
             x=self.x[taps] + self.step[0] @ (k, l),
             y=self.y[taps] + self.step[1] @ (k, l),
             masks=tuple(mask.of_taps(taps).moved(k, l) for mask in self.masks),
             samples=block.shape[2:],
         )
+
+    def needed(self, wanted: Collection[str]) -> set[str]:
+        """The numbers of a part to which derivatives make up those to some of this core's numbers."""
+        stepped = [where for where in self._stepped if where[2] in wanted]
+        return {*wanted, *(name for where in stepped for name in where)}
+
+    def whole_numbers(self, block: Block, numbers: Mapping[str, Array]) -> dict[str, Array]:
+        """Derivatives to the numbers of `part` as those to this core's own.
+
+        A part begins at its first sample, so that steps move all of its places.
+        """
+        whole = dict(numbers)
+        first = np.array([block.pixel_columns[0], block.pixel_rows[0]])
+        for along_columns, along_rows, step in self._stepped:
+            if step in whole:
+                moved = [numbers[place].sum() * first for place in (along_columns, along_rows)]
+                whole[step] = numbers[step] + moved
+        _, _, taps = self._taps(block)
+        for name in {"weights", *(place for where in self._stepped for place in where[:2])} & set(whole):
+            whole[name] = np.zeros(self.weights.shape)
+            whole[name][taps] = numbers[name]
+        return whole
+
+    @property
+    def _stepped(self) -> list[tuple[str, str, str]]:
+        """Names of places along columns and along rows, and of the steps between them: pixels' and masks'."""
+        masks = (f"masks[{n}]." for n in range(len(self.masks)))
+        return [("x", "y", "step"), *((f"{mask}column", f"{mask}row", f"{mask}step") for mask in masks)]
+
+    def _taps(self, block: Block) -> tuple[NDArray[np.intp], NDArray[np.intp], tuple[NDArray[np.intp], ...]]:
+        """The rows and the columns of view taps that read a block, and both as an open mesh."""
+        (a, b), (c, d) = block.rows, block.columns
+        rows = np.flatnonzero((self.view_rows >= a) & (self.view_rows < b))
+        columns = np.flatnonzero((self.view_columns >= c) & (self.view_columns < d))
+        return rows, columns, np.ix_(rows, columns)
 
     def of_columns(self, columns: NDArray[np.intp]) -> Footprints:
         """With some of its columns of view taps only."""

@@ -12,6 +12,7 @@ come through (the aim) and over what diffusers do. The engine knows nothing of o
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -86,6 +87,14 @@ class Rays(Value):
         (row, _), (column, _), (l, _), (k, _) = block.ranges
         place = Affine.translation(-column, -row, -k, -l)
         return replace(self, index_from_ray=place @ self.index_from_ray, views=block.shape)
+
+    def needed(self, wanted: Collection[str]) -> set[str]:
+        """The numbers of a part to which derivatives make up those to some of this core's numbers: the same."""
+        return set(wanted)
+
+    def whole_numbers(self, block: Block, numbers: Mapping[str, Array]) -> dict[str, Array]:
+        """Derivatives to the numbers of `part` as those to this core's own: it only looks from elsewhere."""
+        return dict(numbers)
 
     def scaled(self, factor: float) -> Rays:
         """For samples whose numbers stand for ``factor`` times as much."""

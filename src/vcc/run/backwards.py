@@ -1,0 +1,292 @@
+"""The driver backwards: from weights of a picture to the samples and the numbers that made it.
+
+A picture is after ∘ core ∘ before of the samples. For weights G of it, this gives the derivative of ⟨G, picture⟩
+to the samples (the adjoint of the plan, applied to G) and to any of `Plan.numbers`, through the same blocks by
+which `vcc.run.drive` makes the picture. A block that runs with a border of dark views keeps its own.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
+from functools import cached_property
+from itertools import chain, groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.base.errors import InputError
+from vcc.base.progress import Progress
+from vcc.fields.grid import Block
+from vcc.fields.samples import Samples
+from vcc.plan.how import How
+from vcc.plan.model import Plan
+from vcc.plan.protocol import Gradient, Partial
+from vcc.run.blocks import Blocks, cut
+from vcc.run.drive import Counted, Drive
+
+Array = NDArray[np.float64]
+
+
+def back(
+    plan: Plan,
+    samples: Samples,
+    picture_weights: ArrayLike,
+    how: How | None = None,
+    *,
+    samples_wanted: bool = True,
+    wanted: Collection[str] = (),
+    found: Partial | None = None,
+    progress: Progress | None = None,
+) -> Gradient:
+    """The derivative of ⟨weights, picture⟩ to the samples and to numbers of the plan.
+
+    Args:
+        plan: made for the samples' grid.
+        samples: of which the picture is made. They are looked at only where numbers are wanted.
+        picture_weights: one for each value of the picture, (rows, columns[, channels]).
+        how: engine, threads and memory.
+        samples_wanted: whether the derivative to the samples is wanted.
+        wanted: names of `Plan.numbers`.
+        found: the raster that `Drive.rounds` gave for these samples, where it is at hand: derivatives to numbers
+            of what is done after the core need it, and it is made where it is not given.
+        progress: called with (done, total).
+
+    Returns:
+        The derivative to the samples, of their shape, for each of their numbers as they are given (of integers a
+        step of one), float32 (float64 by ``reference``); and those to the numbers, float64.
+
+    Raises:
+        InputError: weights of another shape or not finite; a name that the plan does not have; what cannot be gone
+            through backwards (`Backwards`); a derivative to stored samples that is larger than the memory limit.
+    """
+    return Backwards(Drive.of_linear(plan, samples, how or How()), wanted).gradient(
+        picture_weights, samples_wanted=samples_wanted, found=found, progress=progress
+    )
+
+
+class Backwards:
+    """A plan on its way back through an engine.
+
+    Args:
+        drive: the plan on its way ahead, of a fixed number of rays (`Drive.of_linear`).
+        wanted: names of `Plan.numbers`.
+
+    Raises:
+        InputError: a name that the plan does not have.
+    """
+
+    def __init__(self, drive: Drive, wanted: Collection[str] = ()) -> None:
+        self.drive, self.plan = drive, drive.plan
+        if wanted and (unknown := sorted(set(wanted) - set(self.plan.numbers()))):
+            raise InputError(f"the plan has no number {unknown[0]!r}: plan.numbers() names those that there are")
+        parted = [_parted(name) for name in wanted]
+        self.of_core = {rest for part, _, rest in parted if part == "core"}
+        self.of_before, self.of_after = (
+            {
+                n: {rest for part, m, rest in parted if (part, m) == (which, n)}
+                for part, n, _ in parted
+                if part == which
+            }
+            for which in ("before", "after")
+        )
+
+    def gradient(
+        self,
+        picture_weights: ArrayLike,
+        *,
+        samples_wanted: bool = True,
+        found: Partial | None = None,
+        progress: Progress | None = None,
+    ) -> Gradient:
+        """The derivative as a whole; see `back`."""
+        into = self._room() if samples_wanted else None
+        raster, numbers = self._after(picture_weights, found)
+        total = Gradient(None, numbers)
+        if not (samples_wanted or self._reads):
+            return total
+        for block, part in self._parts(raster, samples_wanted, progress):
+            if into is None:
+                total = total + part
+                continue
+            total = total + replace(part, samples=None)
+            into[block.slices] += part.samples
+        return total if into is None else replace(total, samples=into)
+
+    def pieces(
+        self, picture_weights: ArrayLike, progress: Progress | None = None
+    ) -> Iterator[tuple[Block, NDArray[Any]]]:
+        """The derivative to the samples in pieces that need not be in memory together.
+
+        Args:
+            picture_weights: see `back`.
+            progress: called with (done, total).
+
+        Yields:
+            Blocks of whole views and the derivative to their samples. Views that are in none of them are not
+            looked at: it is 0 there.
+        """
+        raster, _ = self._after(picture_weights, None)
+        parts = self._parts(raster, True, progress)
+        for _, of_views in groupby(parts, key=lambda piece: (piece[0].rows, piece[0].columns)):
+            yield self._gathered(of_views)
+
+    # --- what is done after the core ---
+
+    def _after(self, picture_weights: ArrayLike, found: Partial | None) -> tuple[Array, dict[str, Array]]:
+        """Weights of the raster, and derivatives to numbers of what is done to it."""
+        weights = self._checked(picture_weights)
+        rasters: list[Any] = []
+        numbers: dict[str, Array] = {}
+        if self.of_after:
+            raster = (self.drive.rounds() if found is None else found).values
+            for operator in self.plan.after[: max(self.of_after) + 1]:
+                rasters.append(raster)
+                raster = operator.apply(raster)
+        for n, operator in reversed(list(enumerate(self.plan.after))):
+            if n in self.of_after:
+                numbers |= _named(f"after[{n}].", operator.pull(rasters[n], weights, self.of_after[n]))
+            weights = operator.transpose(weights)
+        return weights, numbers
+
+    def _checked(self, picture_weights: ArrayLike) -> Array:
+        """Weights (rows, columns, channels) of a picture, in double precision."""
+        weights = np.asarray(picture_weights, dtype=np.float64)
+        channels = self.drive.samples.grid.shape[4:]
+        if weights.shape != (shape := (*self.plan.sensor_shape, *channels)):
+            raise InputError(f"weights of the shape {weights.shape} are not for a picture of the shape {shape}")
+        if not np.isfinite(weights).all():
+            place = tuple(int(n) for n in np.argwhere(~np.isfinite(weights))[0])
+            raise InputError(f"weights of a picture are finite numbers; at {place} there is {weights[place]}")
+        return weights if channels else weights[..., None]
+
+    # --- blocks ---
+
+    @property
+    def _reads(self) -> bool:
+        """Whether samples have to be looked at: the picture is linear in them, but not in the numbers."""
+        return bool(self.of_core or self.of_before)
+
+    @property
+    def _kind(self) -> np.dtype[Any]:
+        """Of derivatives to samples."""
+        return np.dtype(np.float64 if self.drive.engine.double else np.float32)
+
+    @cached_property
+    def _blocks(self) -> list[Block]:
+        """The blocks of which any view is looked at."""
+        blocks = self.drive.blocks if self.drive.in_memory else self._cut()
+        return [block for block in blocks if self.drive.used_in(block)]
+
+    def _cut(self) -> Blocks:
+        """Blocks of stored samples: with each, the derivative to it is in memory, and to what is made of it."""
+        drive = self.drive
+        need, each = drive.need, self._kind.itemsize / drive.kind.itemsize
+        times = (need.times if self._reads else 0.0) + each * (3 if self.plan.before else 1)
+        fixed = need.fixed + 8 * math.prod(self.plan.core.raster_shape) * drive.channels
+        return cut(self.plan, drive.samples.grid, replace(need, fixed=fixed, times=times), drive.limit)
+
+    def _room(self) -> NDArray[Any] | None:
+        """Where the derivative to samples is gathered; None where it comes as a whole."""
+        shape = self.drive.samples.grid.shape
+        if self.drive.in_memory and len(self._blocks) == 1:
+            return None
+        needed = math.prod(shape) * self._kind.itemsize
+        if not self.drive.in_memory and needed > self.drive.limit:
+            raise InputError(
+                f"what a picture says of all samples takes {math.ceil(needed / 1e6)} MB, and memory_limit is "
+                f"{math.ceil(self.drive.limit / 1e6)} MB: pass a larger one, or an array on disk to an operator's "
+                "adjoint, op.T(picture, out=numpy.lib.format.open_memmap('back.npy', 'w+', op.dtype, "
+                "op.samples_shape))"
+            )
+        return np.zeros(shape, self._kind)
+
+    def _parts(self, raster: Array, samples: bool, progress: Progress | None) -> Iterator[tuple[Block, Gradient]]:
+        """What each block says; those of a view's rows of pixels overlap by what is looked at beside them."""
+        drive, blocks = self.drive, self._blocks
+        if drive.in_memory and len(blocks) == 1:
+            values = drive.prepared if self.of_core else None
+            yield self._part(blocks[0], values, raster, samples, progress)
+            return
+        counted = Counted(progress, sum(map(drive.used_in, blocks)))
+        for block in blocks:
+            values = drive.values(block, counted) if self.of_core else None
+            yield self._part(block, values, raster, samples)
+            if values is None:
+                counted.add(drive.used_in(block))
+
+    def _gathered(self, parts: Iterator[tuple[Block, Gradient]]) -> tuple[Block, NDArray[Any]]:
+        """The parts of some views as one."""
+        block, part = next(parts)
+        rows = self.drive.samples.grid.shape[2]
+        if block.pixel_rows == (0, rows):
+            return block, part.samples
+        whole = np.zeros((*part.samples.shape[:2], rows, *part.samples.shape[3:]), self._kind)
+        for piece, each in chain([(block, part)], parts):
+            whole[:, :, slice(*piece.pixel_rows)] += each.samples
+        return replace(block, pixel_rows=(0, rows)), whole
+
+    # --- the core and what is done before it ---
+
+    def _part(
+        self, block: Block, values: Any, raster: Array, samples: bool, progress: Progress | None = None
+    ) -> tuple[Block, Gradient]:
+        """What a block says, and of which samples."""
+        drive, around = self.drive, self.drive.around(block)
+        channels = drive.samples.grid.shape[4:]
+        if values is None:
+            values = np.broadcast_to(np.float32(0), self.plan.shape((*around.shape, *channels)))
+        ahead = self.plan.block(around)
+        core = drive.core.part(ahead)
+        found = core.back_by(drive.engine)(
+            core,
+            values,
+            raster,
+            samples=samples or bool(self.of_before),
+            wanted=core.needed(self.of_core),
+            threads=drive.threads,
+            progress=progress,
+        )
+        numbers = drive.core.whole_numbers(ahead, found.numbers)
+        if "scale" in numbers:
+            numbers["scale"] = numbers["scale"] * drive.radiance
+        numbers = _named("core.", {name: numbers[name] for name in self.of_core})
+        if found.samples is None:
+            return block, Gradient(None, numbers)
+        row, column = block.rows[0] - around.rows[0], block.columns[0] - around.columns[0]
+        inner = found.samples[row : row + block.shape[0], column : column + block.shape[1]]
+        block, part = self._before(block, inner, samples)
+        return block, replace(part, numbers={**numbers, **part.numbers})
+
+    def _before(self, block: Block, weights: NDArray[Any], samples: bool) -> tuple[Block, Gradient]:
+        """What weights of a block's samples as the core takes them say of those that they are made of."""
+        if self.drive.unit != 1:
+            weights = weights / self.drive.unit
+        grown, beside = self.drive.with_reach(block)
+        if any(beside):
+            weights = np.pad(weights, [(0, 0), (0, 0), beside, *[(0, 0)] * (weights.ndim - 3)])
+        before, given = self.plan.before, []
+        numbers: dict[str, Array] = {}
+        if self.of_before:
+            given.append(self.drive.samples.read(grown))
+            for operator in before[: max(self.of_before)]:
+                given.append(operator.apply(given[-1]))
+        for n, operator in reversed(list(enumerate(before))):
+            if n in self.of_before:
+                numbers |= _named(f"before[{n}].", operator.pull(given[n], weights, self.of_before[n]))
+            if n or samples:
+                weights = operator.transpose(weights)
+        return grown, Gradient(weights.astype(self._kind, copy=False) if samples else None, numbers)
+
+
+def _parted(name: str) -> tuple[str, int, str]:
+    """Of ``"after[0].down"``: what of the plan it belongs to, which of these, and its name there."""
+    part, number, rest = re.fullmatch(r"(\w+)(?:\[(\d+)\])?\.(.+)", name).groups()  # type: ignore[union-attr]
+    return part, int(number or 0), rest
+
+
+def _named(prefix: str, numbers: Mapping[str, Array]) -> dict[str, Array]:
+    return {prefix + name: value for name, value in numbers.items()}
