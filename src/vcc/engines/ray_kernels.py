@@ -544,6 +544,42 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
         share[p] = weight * wide * tall
 
 
+@_inlined
+def room():  # type: ignore[no-untyped-def]
+    """Where rays are traced: (rays, near, images, flipped); see `cells_at` and `turn_to`."""
+    rays = Packet(np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET))
+    return rays, np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
+
+
+@_inlined
+def middle_of(sensor, row, column):  # type: ignore[no-untyped-def]
+    """The place (x, y) of the middle of a pixel."""
+    return sensor.first[0] + column * sensor.pitch[0], sensor.first[1] + row * sensor.pitch[1]
+
+
+@_inlined
+def cells_at(by_cell, cells, middle, sensitive, near):  # type: ignore[no-untyped-def]
+    """Fill ``near`` with the cells that a pixel is traced through; returns how many, 1 where there is a window."""
+    seen = 1
+    if by_cell:
+        seen = cells_seen(cells, middle[0], middle[1], sensitive, near)
+    return seen
+
+
+@_inlined
+def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ignore[no-untyped-def]
+    """Set what is drawn for a pixel, and for its cell ``q`` of those that `cells_at` found, where that is."""
+    number = np.int64(pixel)
+    if by_cell:
+        number ^= np.int64(hashed(near[q, 0] * 65537 + near[q, 1], seed))
+        centre_x, centre_y = centre_of(cells.layout, cells.turn, near[q, 0], near[q, 1])
+        power, slope_x, slope_y = kind_of(cells.kinds, near[q, 0], near[q, 1])
+        set_image(images[0], cells, 0, centre_x, power, slope_x)
+        set_image(images[1], cells, 1, centre_y, power, slope_y)
+    for n in range(4):
+        flipped[n] = hashed(number, seed + 1 + n) >> np.uint32(32 - DIGITS)
+
+
 @_compiled
 def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type: ignore[no-untyped-def]
     """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
@@ -555,37 +591,23 @@ def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type:
         (3,): weights of all rays, of missing rays, how many rays.
     """
     table, samples, beside, seed = points
-    channels, cells = field.samples.channels, aim.cells
+    cells = aim.cells
+    blocks = table.shape[1] // samples
+    channels = field.samples.channels
     tally = np.zeros(3)
-    rays = Packet(np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET))
+    rays, near, images, flipped = room()
     share = rays.share
     sums = np.zeros((2, max(channels, LANES)), dtype=np.float32)
     totals = np.zeros(sums.shape)
-    blocks = table.shape[1] // samples
-    near = np.empty((256, 2), dtype=np.int64)
-    images, flipped = np.empty((2, 5)), np.empty(4, dtype=np.int64)
     for row in range(tile.first_row, min(tile.end_row, sensor.rows)):
         for column in range(tile.first_column, min(tile.end_column, sensor.columns)):
             if ended[0]:
                 return tally
-            middle = sensor.first[0] + column * sensor.pitch[0], sensor.first[1] + row * sensor.pitch[1]
-            block = (np.int64(hashed(row * sensor.columns + column, seed)) * blocks) >> 32
-            first = (block ^ beside) * samples
+            pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
+            first = ((np.int64(hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
             totals[:] = 0
-            cells_near = 1
-            if aim.by_cell:
-                cells_near = cells_seen(cells, middle[0], middle[1], sensor.sensitive, near)
-            for q in range(cells_near):
-                number = np.int64(row * sensor.columns + column)
-                if aim.by_cell:
-                    number ^= np.int64(hashed(near[q, 0] * 65537 + near[q, 1], seed))
-                for n in range(4):
-                    flipped[n] = hashed(number, seed + 1 + n) >> np.uint32(32 - DIGITS)
-                if aim.by_cell:
-                    centre_x, centre_y = centre_of(cells.layout, cells.turn, near[q, 0], near[q, 1])
-                    power, slope_x, slope_y = kind_of(cells.kinds, near[q, 0], near[q, 1])
-                    set_image(images[0], cells, 0, centre_x, power, slope_x)
-                    set_image(images[1], cells, 1, centre_y, power, slope_y)
+            for q in range(cells_at(aim.by_cell, cells, middle, sensor.sensitive, near)):
+                turn_to(aim.by_cell, cells, seed, pixel, near, q, images, flipped)
                 for done in range(0, samples, PACKET):
                     n = min(PACKET, samples - done)
                     drawn = Drawn(table, first + done, n, flipped)
@@ -594,12 +616,12 @@ def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type:
                         through_cell(drawn, images, cells, rays)
                     else:
                         through_window(drawn, aim.window, rays)
-                    traced = 0
+                    sent = 0
                     for p in range(n):
-                        traced += share[p] > 0.0
-                    if traced == 0:
+                        sent += share[p] > 0.0
+                    if sent == 0:
                         continue
-                    tally[2] += traced
+                    tally[2] += sent
                     take_steps(steps, drawn, rays)
                     add_rays(field, rays, n, samples // 2 - done, sums, tally)
                     for half in range(2):  # a packet in single precision, the packets in double
