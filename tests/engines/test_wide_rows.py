@@ -43,11 +43,17 @@ def camera(pixels, size, masks=0) -> vcc.Camera:
     return vcc.Camera(elements, vcc.Sensor(D, pixels, D * 1e-3 * size))
 
 
+def spline(distance: np.ndarray) -> np.ndarray:
+    """Three boxes of one point, one after the other, as truncated parabolas (Schoenberg 1946)."""
+    shifts = zip((1, -3, 3, -1), (1.5, 0.5, -0.5, -1.5), strict=True)
+    return sum(sign * np.clip(distance + shift, 0, None) ** 2 / 2 for sign, shift in shifts)
+
+
 def looked_up(mask: MaskLookup, b: int, a: int, k: np.ndarray, l: np.ndarray) -> np.ndarray:
-    """The mask at samples k, l: linear between its points, zero beyond them, as tents around the points."""
+    """The mask at samples k, l: quadratic B-splines around its points, zero beyond them."""
     rows, columns = (np.arange(n)[:, None] for n in mask.texture.shape)
-    down = np.clip(1 - np.abs(mask.row[b, a] + mask.step[1, 1] * l - rows), 0, None)
-    across = np.clip(1 - np.abs(mask.column[b, a] + mask.step[0, 0] * k - columns), 0, None)
+    down = spline(mask.row[b, a] + mask.step[1, 1] * l - rows)
+    across = spline(mask.column[b, a] + mask.step[0, 0] * k - columns)
     return np.einsum("rl,ck,rc->lk", down, across, mask.texture.astype(float), optimize=True)
 
 

@@ -2,38 +2,74 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
-def bilinear(
-    values: NDArray[Any], row: ArrayLike, column: ArrayLike, outside: Literal["edge", "zero"] = "edge"
-) -> NDArray[Any]:
+def bilinear(values: NDArray[Any], row: ArrayLike, column: ArrayLike) -> NDArray[Any]:
     """What stands between the points of a grid, linear along rows and along columns.
 
     Args:
         values: at whole numbers of rows and columns, shape (rows, columns, ...): one number or several at a point.
             Several are looked up fastest where each is a plane in memory (`numpy.moveaxis` of planes).
         row: places in numbers of rows, fractions between them; broadcast with ``column`` to a shape S.
-        column: likewise in numbers of columns.
-        outside: beyond the outermost points values stay as they are there (``"edge"``), or fall to 0 within one
-            row or column (``"zero"``).
+        column: likewise in numbers of columns. Beyond the outermost points values stay as they are there.
 
     Returns:
         Shape (*S, ...): float32 for values of float32 and small integers, else float64.
     """
     from scipy.ndimage import map_coordinates
 
-    mode, beyond = ("nearest", 0) if outside == "edge" else ("grid-constant", 1)
     rows, columns = values.shape[:2]
-    down, across = np.broadcast_arrays(
-        np.clip(row, -beyond, rows - 1 + beyond), np.clip(column, -beyond, columns - 1 + beyond)
-    )
+    down, across = np.broadcast_arrays(np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1))
     places = [down.ravel(), across.ravel()]
     maps = np.moveaxis(values.reshape(rows, columns, -1), 2, 0)
     found = np.empty((len(maps), down.size), np.result_type(values.dtype, np.float32))
     for each, out in zip(maps, found, strict=True):
-        map_coordinates(each, places, out, order=1, mode=mode)
+        map_coordinates(each, places, out, order=1, mode="nearest")
     return found.T.reshape((*down.shape, *values.shape[2:]))
+
+
+def three_around(
+    place: ArrayLike, points: int
+) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
+    """The three points of a line that a quadratic B-spline takes at a place, zeros beyond the line's ends.
+
+    With c the point nearest to a place p and f = p − c, the points c − 1, c, c + 1 count ½(½ − f)², ¾ − f²,
+    ½(½ + f)²: their sum is 1, and what is looked up has a continuous slope.
+
+    Args:
+        place: in numbers of points, shape S.
+        points: how many the line has.
+
+    Returns:
+        Which points, what each counts, and the derivative of that to the place, each of shape (3, ...S). A point
+        that is not there is one that is, and counts nothing.
+    """
+    held = np.clip(np.asarray(place, dtype=np.float64), -2.0, points + 1.0)  # further out is as dark
+    middle = np.floor(held + 0.5)
+    f = held - middle
+    point = middle.astype(np.intp) + np.arange(-1, 2).reshape(3, *(1,) * f.ndim)
+    there = (point >= 0) & (point < points)
+    counts = np.stack([(0.5 - f) ** 2 / 2, 0.75 - f * f, (0.5 + f) ** 2 / 2])
+    slopes = np.stack([f - 0.5, -2 * f, f + 0.5])
+    return np.clip(point, 0, points - 1), counts * there, slopes * there
+
+
+def smooth(values: NDArray[Any], row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
+    """What stands between the points of a grid by quadratic B-splines, zeros around it; see `three_around`.
+
+    Args:
+        values: (rows, columns). Splines do not pass through them: what they take is given back beforehand.
+        row: places in numbers of rows; broadcast with ``column`` to a shape S.
+        column: likewise in numbers of columns.
+
+    Returns:
+        Shape S.
+    """
+    down, across = (three_around(place, n) for place, n in zip((row, column), values.shape, strict=True))
+    return np.asarray(
+        sum(down[1][m] * across[1][n] * values[down[0][m], across[0][n]] for m in range(3) for n in range(3))
+    )

@@ -14,6 +14,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
+from vcc.base.lookup import three_around
 from vcc.base.progress import Progress, tell
 from vcc.engines.rays import memory_of_rays, traced
 from vcc.fields.sampled import to_dtype
@@ -121,18 +122,14 @@ class _Run:
         column = mask.column[b, a] + mask.step[0, 0] * k[None, :] + mask.step[0, 1] * l[:, None]
         row = mask.row[b, a] + mask.step[1, 0] * k[None, :] + mask.step[1, 1] * l[:, None]
         rows, columns = mask.texture.shape
-        padded = xp.reshape(self.constant(np.pad(mask.texture, (1, 2))), (-1,))
-        column, row = np.clip(column + 1, 0, columns + 1), np.clip(row + 1, 0, rows + 1)
-        c, r = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
-        fc, fr = self.constant(column - c), self.constant(row - r)
-
-        def at(r: NDArray[Any], c: NDArray[Any]) -> Any:
-            flat = xp.asarray((r * (columns + 3) + c).reshape(-1), device=self.device)
-            return xp.reshape(xp.take(padded, flat, axis=0), c.shape)
-
-        above = at(r, c) * (1 - fc) + at(r, c + 1) * fc
-        below = at(r + 1, c) * (1 - fc) + at(r + 1, c + 1) * fc
-        return above * (1 - fr) + below * fr
+        texture = xp.reshape(self.constant(mask.texture), (-1,))
+        (r, down, _), (c, across, _) = three_around(row, rows), three_around(column, columns)
+        total = 0
+        for m, n in np.ndindex(3, 3):
+            flat = xp.asarray((r[m] * columns + c[n]).reshape(-1), device=self.device)
+            values = xp.reshape(xp.take(texture, flat, axis=0), row.shape)
+            total = total + values * self.constant(down[m] * across[n])
+        return total
 
     def separable_column(self, a: int) -> Any:
         """All taps of one column: rows mixed tap by tap and summed, then columns mixed once."""

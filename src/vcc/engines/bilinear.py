@@ -24,18 +24,3 @@ def bilinear(above, above_next, below, below_next, right, down):  # type: ignore
     upper = above * (1 - right) + above_next * right
     lower = below * (1 - right) + below_next * right
     return upper * (1 - down) + lower * down
-
-
-@_inlined
-def _held(place, size):  # type: ignore[no-untyped-def]
-    """1 between the ends, falling to 0 one step beyond them."""
-    return max(min(place + 1.0, size - place, 1.0), 0.0)
-
-
-@_inlined
-def dark_outside(values, row, column):  # type: ignore[no-untyped-def]
-    """An array (rows, columns) at a place between its points, with zeros around it."""
-    r, r_next, down = around(row, values.shape[0])
-    c, c_next, right = around(column, values.shape[1])
-    value = bilinear(values[r, c], values[r, c_next], values[r_next, c], values[r_next, c_next], right, down)
-    return value * _held(row, values.shape[0]) * _held(column, values.shape[1])

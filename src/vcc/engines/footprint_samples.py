@@ -13,7 +13,7 @@ from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import Division
+from vcc.plan.footprints.shares import TIE, Division
 
 MASK_LINES = 64
 """Lines of a mask that a thread samples at once."""
@@ -98,17 +98,20 @@ class MaskColumns:
             step = self.row_step[number]
             row[number] = mask.row[:, a] + mask.step[1, 1] * fine.first_row
             ends = np.sort([row[number], row[number] + step * (fine.rows - 1)], axis=0)
+            texture = mask.texture.astype(np.float32, copy=False)
             places, group = np.unique(np.round(mask.column[used, a], 7), return_inverse=True)
-            for one, place in enumerate(places):
+            for one in range(len(places)):
                 taps = used[group == one]
-                low = max(math.floor(ends[0, taps].min()), 0)
-                high = min(math.floor(ends[1, taps].max()) + 2, len(mask.texture))
+                # With the three lines around each row of samples, wherever rounding puts it.
+                low = max(math.floor(ends[0, taps].min() - 0.5 - TIE), 0)
+                high = min(math.floor(ends[1, taps].max() + 0.5 + TIE) + 2, len(texture))
                 if low >= high:  # all of it lies beyond the mask's border, where it is dark
                     continue
                 begin[number, taps] = total - low
-                columns = place + mask.step[0, 0] * (fine.first_column + np.arange(fine.columns) / core.refine)
+                first = mask.column[taps[0], a]
+                columns = first + mask.step[0, 0] * (fine.first_column + np.arange(fine.columns) / core.refine)
                 pieces += [
-                    (mask.texture[n : min(n + MASK_LINES, high)], columns, total + n - low)
+                    (texture[n : min(n + MASK_LINES, high)], columns, total + n - low)
                     for n in range(low, high, MASK_LINES)
                 ]
                 total += high - low

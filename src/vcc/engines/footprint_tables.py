@@ -157,12 +157,12 @@ class Entries(NamedTuple):
 
 
 class EntryMasks(NamedTuple):
-    """The masks' weights of entries, between two lines each.
+    """The masks' weights of entries, by three lines each.
 
     Args:
         lines: see `MaskLines`.
-        places: (entries, masks, 2) int64, where in them the line above and the one below begin.
-        shares: (entries, masks, 2) float32, what each counts.
+        places: (entries, masks, 3) int64, where in them the line above, the nearest and the one below begin.
+        shares: (entries, masks, 3) float32, what each counts.
     """
 
     lines: NDArray[np.float32]

@@ -256,8 +256,12 @@ def _sheared(
         tell(progress, done, core.taps_used)
         place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
         samples = fine.divided(values[core.view_rows[b], core.view_columns[a]].reshape(*core.samples, -1))
+        if core.masks:
+            samples = samples.copy()  # to be weighed
         view = tables.View(samples, core.weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
-        add = partial(kernels.sheared_view, view, grid, footprint, masks)
+        if core.masks:
+            list(pool.map(partial(kernels.weigh_samples, view, grid, masks), _bands(len(samples))))
+        add = partial(kernels.sheared_view, view, grid, footprint)
         list(pool.map(lambda band, add=add: add(band, raster), _bands(len(raster))))
     tell(progress, core.taps_used, core.taps_used)
     return raster.reshape(len(raster), -1)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcc.engines.bilinear import dark_outside
 from vcc.engines.compiled import compiled
 from vcc.engines.footprint_tables import Entries, EntryMasks, Lines
+from vcc.engines.splines import dark_outside, three_around
 from vcc.engines.vector_sums import (
     EIGHT,
     ROWS,
@@ -52,7 +52,7 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
     if masks is not None:  # told apart when compiled: without masks there is less to compile
         repeat, count = masks.repeat, masks.row_step.size
         weighed = EntryMasks(
-            masks.lines, np.empty((room, count, 2), np.int64), np.empty((room, count, 2), np.float32)
+            masks.lines, np.empty((room, count, 3), np.int64), np.empty((room, count, 3), np.float32)
         )
     order, places, ranges = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
     share = np.empty((room, ROWS), np.float32)
@@ -132,7 +132,7 @@ def _rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # ty
 
 @_inlined
 def _masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
-    """Look up the masks' lines above and below row l of the samples of tap b; False if it is dark there.
+    """Look up the masks' three lines around row l of the samples of tap b; False if it is dark there.
 
     masks: `MaskLines`. weighed: `EntryMasks`, which is filled for the entry.
     """
@@ -141,15 +141,17 @@ def _masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
     line = lines.shape[1]
     for mask in range(row_step.size):
         place = row[mask, b] + row_step[mask] * l
-        if not (place > -1 and place < rows[mask]):
+        if not (place > -1.5 and place < rows[mask] + 0.5):
             return False
-        r = int(np.floor(place))
-        after = np.float32(place - r)
+        r, above, here, below = three_around(place)
+        last = rows[mask] - 1
         # Outside the texture there is no light: a weight of zero on any row that exists.
-        shares[entry, mask, 0] = 0 if r < 0 else np.float32(1) - after
-        shares[entry, mask, 1] = 0 if r + 1 >= rows[mask] else after
-        places[entry, mask, 0] = (begin[mask, b] + max(r, 0)) * line
-        places[entry, mask, 1] = (begin[mask, b] + min(r + 1, rows[mask] - 1)) * line
+        shares[entry, mask, 0] = above if r > 0 else 0
+        shares[entry, mask, 1] = here if 0 <= r <= last else 0
+        shares[entry, mask, 2] = below if r < last else 0
+        places[entry, mask, 0] = (begin[mask, b] + max(r - 1, 0)) * line
+        places[entry, mask, 1] = (begin[mask, b] + min(max(r, 0), last)) * line
+        places[entry, mask, 2] = (begin[mask, b] + min(r + 1, last)) * line
     return True
 
 
@@ -271,25 +273,34 @@ def _divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untype
 
 @_compiled
 def sample_mask_columns(texture, column, repeat, out):  # type: ignore[no-untyped-def]
-    """out[r, k · repeat + c] = texture[r] at column[k], linearly, zero outside."""
+    """out[r, k · repeat + c] = texture[r] at column[k], by quadratic B-splines, zero outside."""
     rows, columns = texture.shape
-    left, right = np.empty(column.size, np.uint64), np.empty(column.size, np.uint64)
-    before, after = np.zeros(column.size, np.float32), np.zeros(column.size, np.float32)
+    left, here, right = (
+        np.empty(column.size, np.uint64),
+        np.empty(column.size, np.uint64),
+        np.empty(column.size, np.uint64),
+    )
+    before, at, after = (
+        np.zeros(column.size, np.float32),
+        np.zeros(column.size, np.float32),
+        np.zeros(column.size, np.float32),
+    )
+    last = columns - 1
     for k in range(column.size):
-        # A border of dark columns around the texture, by weights of zero on columns that exist.
-        place = min(max(column[k], -1.0), float(columns))
-        c = int(np.floor(place))
-        left[k], right[k] = min(max(c, 0), columns - 1), min(max(c + 1, 0), columns - 1)
-        before[k] = 1 - (place - c) if 0 <= c < columns else 0
-        after[k] = place - c if 0 <= c + 1 < columns else 0
+        # Dark columns around the texture, by weights of zero on columns that exist.
+        c, first, second, third = three_around(min(max(column[k], -2.0), columns + 1.0))
+        left[k], here[k], right[k] = min(max(c - 1, 0), last), min(max(c, 0), last), min(max(c + 1, 0), last)
+        before[k] = first if 0 <= c - 1 <= last else 0
+        at[k] = second if 0 <= c <= last else 0
+        after[k] = third if 0 <= c + 1 <= last else 0
     for r in range(rows):
         line, to = texture[r], out[r]
         if repeat == 1:
             for k in range(column.size):
-                to[k] = before[k] * line[left[k]] + after[k] * line[right[k]]
+                to[k] = before[k] * line[left[k]] + at[k] * line[here[k]] + after[k] * line[right[k]]
         else:
             for k in range(column.size):
-                value = before[k] * line[left[k]] + after[k] * line[right[k]]
+                value = before[k] * line[left[k]] + at[k] * line[here[k]] + after[k] * line[right[k]]
                 for n in range(repeat):
                     to[k * repeat + n] = value
 
@@ -398,13 +409,33 @@ def _farthest(footprint, size):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def sheared_view(view, grid, footprint, masks, band, raster):  # type: ignore[no-untyped-def]
+def weigh_samples(view, grid, masks, band):  # type: ignore[no-untyped-def]
+    """Multiply a band of rows of a view's samples by what masks let pass, in place, where rows and columns shear.
+
+    view: `View`. grid: `Grid`. masks: `Textures`.
+    """
+    textures, size, mask_step = masks
+    samples, place = view.samples, view.masks
+    for m in range(band.start, band.stop):
+        l = grid.first_l + m / grid.refine
+        for n in range(samples.shape[1]):
+            k = grid.first_k + n / grid.refine
+            weight = np.float32(1)
+            for mask in range(place.shape[0]):
+                column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
+                row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
+                weight *= dark_outside(textures[mask, : size[mask, 0], : size[mask, 1]], row, column)
+            for c in range(samples.shape[2]):
+                samples[m, n, c] *= weight
+
+
+@_compiled
+def sheared_view(view, grid, footprint, band, raster):  # type: ignore[no-untyped-def]
     """Add one view to a band's raster rows, (rows, columns, channels), where rows and columns of samples shear.
 
-    view: `View`. grid: `Grid`. footprint: `Footprint`. masks: `Textures`.
+    view: `View`. grid: `Grid`. footprint: `Footprint`.
     """
-    samples, weight, x0, y0, place = view
-    textures, size, mask_step = masks
+    samples, weight, x0, y0, _ = view
     step, shear, coarse_row_step, coarse_column_step, refine, first_k, first_l = grid
     nt, ns, channels = samples.shape
     row_step, column_step = coarse_row_step / refine, coarse_column_step / refine
@@ -422,12 +453,6 @@ def sheared_view(view, grid, footprint, masks, band, raster):  # type: ignore[no
             high = min(int(np.floor(middle + reach_y / height)), nt - 1)
             for m in range(low, high + 1):
                 share = weight * _share(footprint, y - y_start - row_step * m, height)
-                l = first_l + m / refine
-                for mask in range(place.shape[0]):
-                    column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
-                    row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
-                    texture = textures[mask, : size[mask, 0], : size[mask, 1]]
-                    share *= dark_outside(texture, row, column)
                 if share != 0:
                     lit = True
                     for c in range(channels):

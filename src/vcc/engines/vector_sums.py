@@ -78,7 +78,7 @@ def _plus(builder: Any, total: Any, weight: Any, values: Any) -> Any:
 class _Masks:
     """The weights of masks along a row of samples: their product, vector by vector.
 
-    A mask's weight is interpolated between two lines of it that were sampled at the columns of the samples.
+    A mask's weight is a spline of three lines of it that were sampled at the columns of the samples.
     """
 
     def __init__(self, context: Any, builder: Any, kinds: Any, masks: Any, repeat: int) -> None:
@@ -98,16 +98,19 @@ class _Masks:
             builder.store(ir.Constant(_WIDE, [1.0] * LANES), weight)
         first = builder.mul(entry, self.count)
         with cgutils.for_range(builder, self.count, intp=_PLACE) as loop:
-            at = builder.mul(builder.add(first, loop.index), _constant(2))
+            at = builder.mul(builder.add(first, loop.index), _constant(3))
             shares, lines = [], []
-            for n in range(2):
+            for n in range(3):
                 here = builder.add(at, _constant(n))
                 shares.append(_everywhere(builder, builder.load(builder.gep(self.shares, [here]))))
                 begin = builder.load(builder.gep(self.places, [here]))
                 lines.append(builder.gep(self.lines, [builder.add(begin, x)]))
             for k, weight in enumerate(self.weights):
-                upper, lower = (_floats(builder, builder.gep(line, [_constant(k * LANES)])) for line in lines)
-                mean = _plus(builder, builder.fmul(shares[0], upper, flags=_FLAGS), shares[1], lower)
+                above, level, below = (
+                    _floats(builder, builder.gep(line, [_constant(k * LANES)])) for line in lines
+                )
+                mean = builder.fmul(shares[0], above, flags=_FLAGS)
+                mean = _plus(builder, _plus(builder, mean, shares[1], level), shares[2], below)
                 builder.store(builder.fmul(builder.load(weight), mean, flags=_FLAGS), weight)
         weights = [builder.load(weight) for weight in self.weights]
         if self.repeat == 3:  # one weight for the three channels of a pixel

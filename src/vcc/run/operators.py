@@ -123,7 +123,7 @@ def _weights(
         return lambda j, i: shares[j, i]
     lookup = mask_lookup(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
     k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
-    # A texture that makes up for being looked up linearly may pass 0 beside an edge; light does not.
+    # A texture that makes up for being looked up by splines may pass 0 beside an edge; light does not.
     return lambda j, i: np.maximum(lookup.weights(j, i, k, l), 0.0)
 
 

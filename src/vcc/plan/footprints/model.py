@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.lookup import bilinear
+from vcc.base.lookup import smooth
 from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.plan.footprints.shares import Division
@@ -30,17 +30,19 @@ class MaskLookup(Value):
     """A mask in mid-path, averaged over the cell of a sample: each sample looks its weight up here.
 
     Texture coordinates of sample (k, l) in view tap (b, a): (column, row) = (column[b, a], row[b, a])
-    + step · (k, l). Weights are interpolated linearly between texture points and zero outside.
+    + step · (k, l). Weights are quadratic B-splines of the texture's points (`vcc.base.lookup.three_around`) with
+    zeros around them: they follow places with a continuous slope.
 
     Args:
-        texture: mean transmission over a sample's footprint, at regular points, (rows, columns) float32.
+        texture: what splines make the mean transmission over a sample's footprint of, at regular points, (rows,
+            columns), float32 or float64.
         column: texture column of sample (0, 0) in each view tap, (rows of taps, columns of taps).
         row: texture row, likewise.
         step: 2×2, texture points per index step: [[column/k, column/l], [row/k, row/l]].
         label: which element this is.
     """
 
-    texture: NDArray[np.float32]
+    texture: NDArray[np.floating]
     column: Array
     row: Array
     step: Array
@@ -50,7 +52,7 @@ class MaskLookup(Value):
         """T at the samples with column indices k and row indices l of view tap (b, a): shape (l, k)."""
         column = self.column[b, a] + self.step[0, 0] * k[None, :] + self.step[0, 1] * l[:, None]
         row = self.row[b, a] + self.step[1, 0] * k[None, :] + self.step[1, 1] * l[:, None]
-        return bilinear(self.texture.astype(np.float64), row, column, outside="zero")
+        return smooth(self.texture, row, column)
 
     def moved(self, k: int, l: int) -> MaskLookup:
         """Looked up by samples that begin at sample (k, l) of those that it was made for."""
