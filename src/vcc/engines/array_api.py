@@ -1,28 +1,33 @@
 """The array-API engine: the plan as products of matrices, on arrays of any library that follows the standard.
 
 Gradients and GPUs come from the library. The shares along rows and columns form two banded matrices for
-each view; where the frame shears the pixel grid they are gathered tap by tap instead. The sum is linear in
-the samples, so its transpose is its adjoint.
+each column of views (`vcc.engines.bands`); where the frame shears the pixel grid they are gathered tap by tap
+instead. The sum is linear in the samples, so its transpose is its adjoint.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from array_api_compat import array_namespace, device
+from array_api_compat import array_namespace, device, is_torch_array
 from numpy.typing import NDArray
 
 from vcc.base.lookup import three_around
 from vcc.base.progress import Progress, tell
+from vcc.engines.bands import Bands
 from vcc.engines.rays import memory_of_rays, traced
 from vcc.fields.sampled import to_dtype
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints, MaskLookup
-from vcc.plan.footprints.shares import reach_in_pixels, shares
+from vcc.plan.footprints.shares import Division, Taps, reach_in_pixels, shares, taps
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
+
+Array = NDArray[np.float64]
 
 copies = True
 """Samples are converted as a whole; see `vcc.plan.protocol.Engine`."""
@@ -65,6 +70,45 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
     return shares + 12 * channels * (rows * columns * core.refine**2 + columns * core.refine * high)
 
 
+@dataclass(frozen=True)
+class _FineAxis:
+    """The samples along an axis as they are spread: divided where the plan says so.
+
+    Args:
+        count: how many.
+        start: index, in samples, of the first.
+        refine: finer ones for each sample.
+        division: how they are made, or None.
+    """
+
+    count: int
+    start: float
+    refine: int
+    division: Division | None
+
+    @classmethod
+    def of(cls, core: Footprints, samples: int) -> _FineAxis:
+        """Those of a core's samples along an axis."""
+        if core.refine == 1:
+            return cls(samples, 0.0, 1, None)
+        division = core.division(samples)
+        return cls(len(division.first), division.start, core.refine, division)
+
+    @property
+    def index(self) -> Array:
+        """Of each, in samples."""
+        return self.start + np.arange(self.count) / self.refine
+
+
+def _separable_weights(mask: MaskLookup, b: int, a: int, l: Array, k: Array) -> Array:
+    """A mask at samples of a tap whose rows and columns meet it along its own: (rows, columns)."""
+    rows, columns = mask.texture.shape
+    down, across, _ = three_around(mask.row[b, a] + mask.step[1, 1] * l, rows)
+    lines = Bands(down.T, across.T).of(mask.texture)
+    down, across, _ = three_around(mask.column[b, a] + mask.step[0, 0] * k, columns)
+    return np.asarray(Bands(down.T, across.T).of(np.ascontiguousarray(lines.T)).T)
+
+
 class _Run:
     """One run of a plan: the arrays' namespace, device and working type, and the steps."""
 
@@ -92,30 +136,14 @@ class _Run:
         assert raster is not None  # a plan has at least one column of taps
         return raster * core.scale
 
-    def rows_mixed(self, matrix: Any, block: Any) -> Any:
-        """matrix (n, m) times the rows of block (m, columns, channels)."""
-        _, columns, channels = block.shape
-        return self.xp.reshape(matrix @ self.xp.reshape(block, (-1, columns * channels)), (-1, columns, channels))
-
-    def weighted_view(self, b: int, a: int) -> tuple[Any, NDArray[Any], NDArray[Any]]:
+    def weighted_view(self, b: int, a: int) -> tuple[Any, Array, Array]:
         """A tap's samples times all weights, (rows, columns, channels), with their indices k and l."""
-        core, xp = self.core, self.xp
-        view = self.values[int(core.view_rows[b]), int(core.view_columns[a]), ...]
-        view = xp.reshape(xp.astype(view, self.float), (*core.samples, self.channels))
-        l, k = (np.arange(n, dtype=np.float64) for n in core.samples)
-        if core.refine > 1:
-            rows, columns = core.samples
-            down = core.division(rows)
-            across = core.division(columns)
-            view = self.rows_mixed(self.constant(down.matrix(rows)), view)
-            view = self.rows_mixed(self.constant(across.matrix(columns)), xp.permute_dims(view, (1, 0, 2)))
-            view = xp.permute_dims(view, (1, 0, 2))
-            k = across.start + np.arange(len(across.first)) / core.refine
-            l = down.start + np.arange(len(down.first)) / core.refine
-        view = view * float(core.weights[b, a])
+        core = self.core
+        down, across = (_FineAxis.of(core, n) for n in core.samples)
+        view = self.divided(np.array([b]), a, down, across)[0, ...] * float(core.weights[b, a])
         for mask in core.masks:
-            view = view * self.mask_weights(mask, b, a, k, l)[:, :, None]
-        return view, k, l
+            view = view * self.mask_weights(mask, b, a, across.index, down.index)[:, :, None]
+        return view, across.index, down.index
 
     def mask_weights(self, mask: MaskLookup, b: int, a: int, k: Any, l: Any) -> Any:
         xp = self.xp
@@ -132,24 +160,63 @@ class _Run:
         return total
 
     def separable_column(self, a: int) -> Any:
-        """All taps of one column: rows mixed tap by tap and summed, then columns mixed once."""
+        """All taps of one column: rows of all of them mixed into the raster's, and then columns."""
         core, xp = self.core, self.xp
-        pixels = [np.arange(n, dtype=np.float64)[:, None] for n in core.raster_shape]
-        total, k = None, np.arange(core.samples[1], dtype=np.float64)
-        for b in range(len(core.view_rows)):
-            if core.weights[b, a] == 0:
-                continue
-            view, k, l = self.weighted_view(b, a)
-            y = core.y[b, a] + core.row_step * l
-            down = shares(core.interpolation, pixels[0], y[None, :], core.row_step / core.refine, core.opening)
-            part = self.rows_mixed(self.constant(down), view)
-            total = part if total is None else total + part
-        if total is None:
-            return xp.zeros((*core.raster_shape, self.channels), dtype=self.float, device=self.device)
-        x = core.x[0, a] + core.column_step * k
-        across = shares(core.interpolation, pixels[1], x[None, :], core.column_step / core.refine, core.opening)
-        mixed = self.rows_mixed(self.constant(across), xp.permute_dims(total, (1, 0, 2)))
-        return xp.permute_dims(mixed, (1, 0, 2))
+        rows, columns = core.raster_shape
+        used = np.flatnonzero(core.weights[:, a])
+        if used.size == 0:
+            return xp.zeros((rows, columns, self.channels), dtype=self.float, device=self.device)
+        down, across = (_FineAxis.of(core, n) for n in core.samples)
+        if core.masks or core.refine > 1:
+            block, begin = self.weighted_column(used, a, down, across), np.arange(used.size) * down.count
+        else:
+            block, begin = self.columns[int(core.view_columns[a])], core.view_rows[used] * down.count
+        mixed = self.spread(down, core.y[used, a], core.row_step, rows)
+        mixed = Bands.of_taps(mixed, down.count, core.weights[used, a], begin)
+        total = xp.reshape(mixed.of(xp.reshape(block, (-1, across.count * self.channels))), (rows, across.count, -1))
+        mixed = self.spread(across, core.x[:1, a], core.column_step, columns)
+        return self.along_columns(Bands.of_taps(mixed, across.count, np.ones(1), np.zeros(1, np.int64)), total)
+
+    @cached_property
+    def columns(self) -> list[Any]:
+        """The samples of each column of views, (rows of views, t, s, channels)."""
+        nv, nu, nt, ns = self.values.shape[:4]
+        whole = self.xp.reshape(self.xp.astype(self.values, self.float), (nv, nu, nt, ns, self.channels))
+        if is_torch_array(whole):  # one gradient for all columns, not an array of all samples for each
+            return list(whole.unbind(1))
+        return [whole[:, i, ...] for i in range(nu)]
+
+    def spread(self, axis: _FineAxis, origin: Array, step: float, pixels: int) -> Taps:
+        """The shares of samples along an axis that begin at ``origin``, before they are divided."""
+        core, first = self.core, origin + step * axis.start
+        apart = step / core.refine
+        return taps(core.interpolation, first, apart, axis.count, pixels, core.opening, np.float64)
+
+    def weighted_column(self, used: NDArray[np.intp], a: int, down: _FineAxis, across: _FineAxis) -> Any:
+        """The samples that taps of a column read, divided, times the masks: (taps, rows, columns, channels)."""
+        block = self.divided(used, a, down, across)
+        for mask in self.core.masks:
+            weights = np.stack([_separable_weights(mask, b, a, down.index, across.index) for b in used])
+            block = block * self.constant(weights[..., None])
+        return block
+
+    def divided(self, used: NDArray[np.intp], a: int, down: _FineAxis, across: _FineAxis) -> Any:
+        """The samples that taps of a column read, (taps, rows, columns, channels), divided if need be."""
+        core, xp = self.core, self.xp
+        where = xp.asarray(core.view_rows[used], device=self.device)
+        block = xp.take(self.columns[int(core.view_columns[a])], where, axis=0)
+        if down.division is None or across.division is None:
+            return block
+        rows = xp.reshape(xp.permute_dims(block, (1, 0, 2, 3)), (core.samples[0], -1))
+        rows = xp.reshape(Bands.of_division(down.division, core.samples[0]).of(rows), (-1, *block.shape[2:]))
+        fine = self.along_columns(Bands.of_division(across.division, core.samples[1]), rows)
+        return xp.permute_dims(xp.reshape(fine, (down.count, used.size, across.count, -1)), (1, 0, 2, 3))
+
+    def along_columns(self, bands: Bands, block: Any) -> Any:
+        """Columns of a block (rows, columns, channels) mixed."""
+        rows, columns, channels = block.shape
+        turned = self.xp.reshape(self.xp.permute_dims(block, (1, 0, 2)), (columns, -1))
+        return self.xp.permute_dims(self.xp.reshape(bands.of(turned), (-1, rows, channels)), (1, 0, 2))
 
     def sheared_column(self, a: int) -> Any:
         """All taps of one column where rows and columns do not part: each is gathered tap by tap."""

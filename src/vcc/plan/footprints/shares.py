@@ -128,7 +128,7 @@ class Taps(Brief):
     """
 
     first: NDArray[np.int64]
-    weights: NDArray[np.float32]
+    weights: NDArray[Any]
 
     def mirrored(self) -> Taps:
         """The table for pixels counted from the other end."""
@@ -138,7 +138,15 @@ class Taps(Brief):
         )
 
 
-def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: int, opening: float = 1.0) -> Taps:
+def taps(
+    interpolation: str,
+    origin: Array,
+    step: float,
+    samples: int,
+    pixels: int,
+    opening: float = 1.0,
+    kind: type[np.floating] = np.float32,
+) -> Taps:
     """The table of shares for rows of samples at ``origin + step · index``, in pixels.
 
     Args:
@@ -148,6 +156,7 @@ def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: i
         samples: how many samples there are.
         pixels: how many pixels there are.
         opening: the share of a pixel's width that is sensitive.
+        kind: of the shares.
     """
     size = abs(step)
     reach = reach_in_pixels(interpolation, size)
@@ -163,7 +172,7 @@ def taps(interpolation: str, origin: Array, step: float, samples: int, pixels: i
     table = shares(interpolation, pixel[:, None], position, step, opening)
     table = np.where(np.arange(width) < count[..., None], table, 0.0)
     first = np.minimum(first, samples - 1)
-    return Taps(first, np.ascontiguousarray(table, dtype=np.float32))
+    return Taps(first, np.ascontiguousarray(table, dtype=kind))
 
 
 @dataclass(frozen=True, repr=False)
