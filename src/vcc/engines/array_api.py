@@ -66,8 +66,10 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
     if isinstance(core, Rays):
         return memory_of_rays(core)
     (rows, columns), (high, wide) = core.samples, core.raster_shape
-    shares = 8 * core.refine * (rows * high + columns * wide)
-    return shares + 12 * channels * (rows * columns * core.refine**2 + columns * core.refine * high)
+    # Of a library without sums of bands: matrices for a column of views. Of all: its samples, twice where masked.
+    taps, fine = len(core.view_rows), core.refine**2
+    shares = 8 * core.refine * (taps * rows * high + columns * wide)
+    return shares + 12 * channels * (taps * rows * columns * fine + columns * core.refine * high)
 
 
 @dataclass(frozen=True)
@@ -171,11 +173,12 @@ class _Run:
             block, begin = self.weighted_column(used, a, down, across), np.arange(used.size) * down.count
         else:
             block, begin = self.columns[int(core.view_columns[a])], core.view_rows[used] * down.count
-        mixed = self.spread(down, core.y[used, a], core.row_step, rows)
-        mixed = Bands.of_taps(mixed, down.count, core.weights[used, a], begin)
-        total = xp.reshape(mixed.of(xp.reshape(block, (-1, across.count * self.channels))), (rows, across.count, -1))
-        mixed = self.spread(across, core.x[:1, a], core.column_step, columns)
-        return self.along_columns(Bands.of_taps(mixed, across.count, np.ones(1), np.zeros(1, np.int64)), total)
+        shares = self.spread(down, core.y[used, a], core.row_step, rows)
+        bands = Bands.of_taps(shares, down.count, core.weights[used, a], begin)
+        total = bands.of(xp.reshape(block, (-1, across.count * self.channels)))
+        total = xp.reshape(total, (rows, across.count, self.channels))
+        shares = self.spread(across, core.x[:1, a], core.column_step, columns)
+        return self.along_columns(Bands.of_taps(shares, across.count, np.ones(1), np.zeros(1, np.int64)), total)
 
     @cached_property
     def columns(self) -> list[Any]:

@@ -45,7 +45,8 @@ class Bands(Brief):
         width = taps.weights.shape[2]
         index = np.minimum(taps.first[..., None] + np.arange(width), samples - 1) + begin[:, None, None]
         shares = taps.weights * weights[:, None, None]
-        return cls(*(np.moveaxis(each, 0, 1).reshape(each.shape[1], -1) for each in (index, shares)))
+        pixels = taps.first.shape[1]
+        return cls(np.moveaxis(index, 0, 1).reshape(pixels, -1), np.moveaxis(shares, 0, 1).reshape(pixels, -1))
 
     @classmethod
     def of_division(cls, division: Division, samples: int) -> Bands:
