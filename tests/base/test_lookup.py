@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from vcc.base.lookup import bilinear, smooth, three_around
+from vcc.base.lookup import bilinear, smooth, smooth_back, three_around
 
 
 def test_a_plane_is_exact_between_points_and_held_beyond_the_edges():
@@ -43,3 +43,15 @@ def test_the_slopes_of_splines_are_those_between_places_nearby():
     (_, more, _), (_, less, _), (_, _, slopes) = (three_around(place + by, 6) for by in (1e-6, -1e-6, 0.0))
     same = np.floor(place + 0.5 + 1e-6) == np.floor(place + 0.5 - 1e-6)
     np.testing.assert_allclose(((more - less) / 2e-6)[:, same], slopes[:, same], atol=1e-9)
+
+
+def test_splines_backwards():
+    random = np.random.default_rng(6)
+    values, weights = random.random((5, 6)), random.normal(size=(30, 40))
+    row, column = random.uniform(-2, 6, (30, 1)), random.uniform(-2, 7, (1, 40))
+    of_values, of_row, of_column = smooth_back(values, row, column, weights)
+    other = random.random((5, 6))
+    np.testing.assert_allclose((of_values * other).sum(), (weights * smooth(other, row, column)).sum(), rtol=1e-13)
+    for found, by in ((of_row, (1e-6, 0)), (of_column, (0, 1e-6))):
+        over, under = (smooth(values, row + sign * by[0], column + sign * by[1]) for sign in (1, -1))
+        np.testing.assert_allclose(found, weights * (over - under) / 2e-6, atol=1e-5)

@@ -73,3 +73,31 @@ def smooth(values: NDArray[Any], row: ArrayLike, column: ArrayLike) -> NDArray[n
     return np.asarray(
         sum(down[1][m] * across[1][n] * values[down[0][m], across[0][n]] for m in range(3) for n in range(3))
     )
+
+
+def smooth_back(
+    values: NDArray[Any], row: ArrayLike, column: ArrayLike, weights: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """The derivative of Σ weights · `smooth` (values, row, column) to each value, row and column.
+
+    Args:
+        values: see `smooth`.
+        row: see `smooth`.
+        column: see `smooth`.
+        weights: shape S.
+
+    Returns:
+        (rows, columns); S; S.
+    """
+    at_row, at_column = np.broadcast_arrays(row, column)
+    (r, down, steep), (c, across, along) = (
+        three_around(place, n) for place, n in zip((at_row, at_column), values.shape, strict=True)
+    )
+    of_values = np.zeros(values.shape)
+    of_row, of_column = np.zeros(weights.shape), np.zeros(weights.shape)
+    for m, n in np.ndindex(3, 3):
+        here = values[r[m], c[n]]
+        np.add.at(of_values, (r[m], c[n]), weights * down[m] * across[n])
+        of_row += weights * steep[m] * across[n] * here
+        of_column += weights * down[m] * along[n] * here
+    return of_values, of_row, of_column

@@ -16,6 +16,7 @@ import numpy as np
 from array_api_compat import array_namespace, device, is_torch_array
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError
 from vcc.base.lookup import three_around
 from vcc.base.progress import Progress, tell
 from vcc.engines.bands import Bands
@@ -24,7 +25,7 @@ from vcc.fields.sampled import to_dtype
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints, MaskLookup
 from vcc.plan.footprints.shares import Division, Taps, reach_in_pixels, shares, taps
-from vcc.plan.protocol import Partial
+from vcc.plan.protocol import Gradient, Partial
 from vcc.plan.rays.model import Rays
 
 Array = NDArray[np.float64]
@@ -45,6 +46,21 @@ def footprints(
 def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None) -> Partial:
     """The raster of samples (v, u, t, s[, channels]) by the plan's own rays."""
     return traced(core, values, False, beside, progress)
+
+
+def footprints_back(core: Footprints, values: Any, raster: Any, **options: Any) -> Gradient:
+    """Nothing: arrays' own libraries take derivatives of what this engine does.
+
+    Raises:
+        InputError: always.
+    """
+    raise InputError(
+        "engine 'array_api' leaves the way back to its arrays' library (autograd, grad): use engine='numba' or "
+        "engine='reference', with NumPy arrays"
+    )
+
+
+rays_back = footprints_back
 
 
 def prepared(before: Sequence[operators.Before], values: Any, threads: int) -> Any:
@@ -149,8 +165,7 @@ class _Run:
 
     def mask_weights(self, mask: MaskLookup, b: int, a: int, k: Any, l: Any) -> Any:
         xp = self.xp
-        column = mask.column[b, a] + mask.step[0, 0] * k[None, :] + mask.step[0, 1] * l[:, None]
-        row = mask.row[b, a] + mask.step[1, 0] * k[None, :] + mask.step[1, 1] * l[:, None]
+        row, column = mask.places(b, a, k, l)
         rows, columns = mask.texture.shape
         texture = xp.reshape(self.constant(mask.texture), (-1,))
         (r, down, _), (c, across, _) = three_around(row, rows), three_around(column, columns)

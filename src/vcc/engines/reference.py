@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from vcc.base.progress import Progress, tell
 from vcc.engines.rays import memory_of_rays, traced
+from vcc.engines.reference_back import divided, indices
+from vcc.engines.reference_back import footprints_back as footprints_back  # of the engine
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import shares
@@ -38,14 +40,14 @@ def footprints(
     """The raster of samples (v, u, t, s[, channels]), float64; see `vcc.plan.protocol.Runner`."""
     channels = values.shape[4:] or (1,)
     raster = np.zeros((*core.raster_shape, *channels))
+    k, l = indices(core)
     total = core.weights.size
     for done, (b, a) in enumerate(np.ndindex(core.weights.shape)):
         tell(progress, done, total)
         if core.weights[b, a] == 0:
             continue
         view = values[core.view_rows[b], core.view_columns[a]].astype(np.float64)
-        flux, k, l = _samples_of(core, view.reshape(*view.shape[:2], *channels))
-        flux = flux * core.weights[b, a]
+        flux = divided(core, view.reshape(*view.shape[:2], *channels)) * core.weights[b, a]
         for mask in core.masks:
             flux = flux * mask.weights(b, a, k, l)[..., None]
         _spread(core, raster, flux, b, a, k, l)
@@ -78,19 +80,6 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
         return memory_of_rays(core)
     # A view in double precision, divided, and times its weights; shares of one row.
     return 24 * channels * core.samples[0] * core.samples[1] * core.refine**2 + 16 * math.prod(core.samples)
-
-
-def _samples_of(core: Footprints, view: Array) -> tuple[Array, Array, Array]:
-    """The samples of a view, divided where the plan says so, with their column and row indices k, l."""
-    if core.refine == 1:
-        return view, np.arange(view.shape[1], dtype=float), np.arange(view.shape[0], dtype=float)
-    rows, columns = view.shape[:2]
-    down = core.division(rows)
-    across = core.division(columns)
-    fine = np.einsum("al,bk,lkc->abc", down.matrix(rows), across.matrix(columns), view, optimize=True)
-    k = across.start + np.arange(fine.shape[1]) / core.refine
-    l = down.start + np.arange(fine.shape[0]) / core.refine
-    return fine, k, l
 
 
 def _spread(core: Footprints, raster: Array, flux: Array, b: int, a: int, k: Array, l: Array) -> None:

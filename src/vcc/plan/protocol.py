@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.progress import Progress
 from vcc.fields.grid import Block
 
@@ -59,8 +60,8 @@ class Partial:
         return self.lacking / self.asked if self.asked > 0 else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Gradient:
+@dataclass(frozen=True, eq=False, repr=False)
+class Gradient(Brief):
     """What a raster's weights say of all that it was made from: sums that add up, like `Partial`.
 
     With weights G of the raster I, every change obeys

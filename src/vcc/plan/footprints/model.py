@@ -16,10 +16,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError
 from vcc.base.lookup import smooth
 from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.plan.footprints.shares import Division
+from vcc.plan.numbers import numbers
 from vcc.plan.protocol import BackRunner, Engine, Runner
 
 Array = NDArray[np.float64]
@@ -50,9 +52,13 @@ class MaskLookup(Value):
 
     def weights(self, b: int, a: int, k: Array, l: Array) -> Array:
         """T at the samples with column indices k and row indices l of view tap (b, a): shape (l, k)."""
+        return smooth(self.texture, *self.places(b, a, k, l))
+
+    def places(self, b: int, a: int, k: Array, l: Array) -> tuple[Array, Array]:
+        """Texture rows and columns at which samples with these indices are looked up: shapes (l, k)."""
         column = self.column[b, a] + self.step[0, 0] * k[None, :] + self.step[0, 1] * l[:, None]
         row = self.row[b, a] + self.step[1, 0] * k[None, :] + self.step[1, 1] * l[:, None]
-        return smooth(self.texture, row, column)
+        return row, column
 
     def moved(self, k: int, l: int) -> MaskLookup:
         """Looked up by samples that begin at sample (k, l) of those that it was made for."""
@@ -119,6 +125,27 @@ class Footprints(Value):
     def back_by(self, engine: Engine) -> BackRunner:
         """The engine's way to go through it backwards."""
         return engine.footprints_back
+
+    def check_wanted(self, wanted: Collection[str]) -> None:
+        """Whether there is a derivative to each of some numbers.
+
+        Args:
+            wanted: names of the core's numbers (`vcc.plan.numbers.numbers`).
+
+        Raises:
+            InputError: a number to which there is none, with why.
+        """
+        known = numbers(self) if wanted else {}
+        for name in wanted:
+            if name == "sharpen_samples":
+                raise InputError("there is no derivative to sharpen_samples: the filter of samples is a decision")
+            if name not in known:
+                raise InputError(f"footprints have no number {name!r}: {', '.join(known)} are theirs")
+            if self.interpolation == "nearest" and name in ("x", "y", "step", "opening"):
+                raise InputError(
+                    f"there is no derivative to {name!r} where each sample falls on the nearest pixel: use "
+                    "interpolation='linear', 'cubic' or 'sharp'"
+                )
 
     def division(self, samples: int) -> Division:
         """How ``samples`` samples along an axis are divided into ``refine`` finer ones each."""

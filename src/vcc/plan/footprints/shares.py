@@ -107,6 +107,32 @@ def shares(interpolation: str, pixel: Any, position: Any, step: float, opening: 
     return (upper - cumulative(interpolation, (offset - opening / 2) / size, xp)) / opening
 
 
+def share_slopes(
+    interpolation: str, pixel: Any, position: Any, step: float, opening: float = 1.0
+) -> tuple[Array, Array, Array]:
+    """By how much F grows with a sample's pixel coordinate, with the size |step| and with the opening.
+
+    With a = (m + h − x)/|b| and c = (m − h − x)/|b|, h half the opening, F = (Φ(a) − Φ(c))/2h: to x it grows by
+    (φ(c) − φ(a))/2h|b|, to |b| by (c·φ(c) − a·φ(a))/2h|b|, to 2h by (φ(a) + φ(c))/4h|b| − F/2h.
+
+    Args:
+        interpolation: ``"linear"``, ``"cubic"`` or ``"spline"``: the borders of ``"nearest"`` have no slope.
+        pixel: see `shares`.
+        position: see `shares`.
+        step: see `shares`.
+        opening: see `shares`.
+    """
+    size = abs(step)
+    upper, lower = ((pixel - position + side * opening / 2) / size for side in (1, -1))
+    at_upper, at_lower = weight(interpolation, upper), weight(interpolation, lower)
+    share = (cumulative(interpolation, upper) - cumulative(interpolation, lower)) / opening
+    return (
+        (at_lower - at_upper) / (opening * size),
+        (lower * at_lower - upper * at_upper) / (opening * size),
+        (at_upper + at_lower) / (2 * opening * size) - share / opening,
+    )
+
+
 def reach_in_pixels(interpolation: str, size: float) -> float:
     """How far from a sample, in pixels, a pixel's middle can lie and still receive a share.
 

@@ -1,0 +1,215 @@
+"""The reference engine's way back through footprints, plainly, in float64. It defines the derivative.
+
+    I(x, y) = scale · Σ_q L(q) · w(view) · Π T(m(q)) · F(x; x(q)) · F(y; y(q))
+
+A sample meets weights G of the raster as H(q) = Σ G(x, y) · F(x; x(q)) · F(y; y(q)). Of all that I is linear in,
+⟨G, dI⟩ = Σ_q H(q) · d(scale · L(q) · w(view) · Π T(m(q))). Where samples move, dF takes the place of F, along one
+axis after the other. Where the frame shears the pixel grid, a sample's column is x(q) + shear · (y − y(q)).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+from vcc.base.lookup import smooth_back
+from vcc.base.progress import Progress, tell
+from vcc.plan.footprints.model import Footprints
+from vcc.plan.footprints.shares import share_slopes, shares
+from vcc.plan.numbers import numbers
+from vcc.plan.protocol import Gradient
+
+Array = NDArray[np.float64]
+
+MOVING = frozenset(("x", "y", "step", "opening"))
+"""Numbers that say where samples fall and over what."""
+
+
+def footprints_back(
+    core: Footprints,
+    values: NDArray[Any],
+    raster: NDArray[np.floating],
+    *,
+    samples: bool = True,
+    wanted: Collection[str] = (),
+    beside: int = 0,
+    threads: int,
+    progress: Progress | None = None,
+) -> Gradient:
+    """The derivative of ⟨raster, the raster of the samples⟩, float64; see `vcc.plan.protocol.BackRunner`.
+
+    Each number is taken by itself: ``x`` of each tap, ``weights`` also of taps that let no light through. All have
+    a derivative but ``sharpen_samples``, and where samples fall on the nearest pixel those that move them.
+
+    Raises:
+        InputError: a number to which there is no derivative.
+    """
+    core.check_wanted(wanted)
+    channels = values.shape[4] if values.ndim == 5 else 1
+    weights = np.asarray(raster, dtype=np.float64).reshape(*core.raster_shape, channels)
+    into = np.zeros(values.shape) if samples else None
+    found = {name: np.zeros(one.shape) for name, one in numbers(core).items() if name in wanted}
+    total = core.weights.size
+    for done, (b, a) in enumerate(np.ndindex(core.weights.shape)):
+        tell(progress, done, total)
+        if core.weights[b, a] == 0 and "weights" not in wanted:
+            continue
+        tap = _Tap(core, b, a, *indices(core))
+        here = core.view_rows[b], core.view_columns[a]
+        met = tap.gathered(weights)
+        if into is not None:
+            told = met * (core.scale * core.weights[b, a] * tap.passed)[..., None]
+            into[here] += _divided_back(core, told).reshape(into[here].shape)
+        if wanted:
+            view = values[here].astype(np.float64).reshape(*core.samples, channels)
+            for name, told in tap.numbers_back(weights, met, divided(core, view), wanted).items():
+                found[name] += told
+    tell(progress, total, total)
+    return Gradient(into, found)
+
+
+def indices(core: Footprints) -> tuple[Array, Array]:
+    """Column and row indices k, l of the samples of a view, of finer ones where the plan divides them."""
+    (rows, columns), refine = core.samples, core.refine
+    if refine == 1:
+        return np.arange(columns, dtype=float), np.arange(rows, dtype=float)
+    down, across = core.division(rows), core.division(columns)
+    return tuple(one.start + np.arange(len(one.first)) / refine for one in (across, down))  # type: ignore[return-value]
+
+
+def divided(core: Footprints, view: Array) -> Array:
+    """The samples of a view (l, k, channels), divided where the plan says so."""
+    if core.refine == 1:
+        return view
+    return np.asarray(np.einsum("al,bk,lkc->abc", *_divisions(core), view, optimize=True))
+
+
+def _divided_back(core: Footprints, fine: Array) -> Array:
+    """The transpose of `divided`."""
+    if core.refine == 1:
+        return fine
+    return np.asarray(np.einsum("al,bk,abc->lkc", *_divisions(core), fine, optimize=True))
+
+
+def _divisions(core: Footprints) -> tuple[Array, Array]:
+    """How rows and columns of samples are divided, as matrices (finer samples, samples)."""
+    rows, columns = core.samples
+    return core.division(rows).matrix(rows), core.division(columns).matrix(columns)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Tap(Brief):
+    """One view tap of a core: arrays are (rows of samples l, columns of samples k[, channels])."""
+
+    core: Footprints
+    b: int
+    a: int
+    k: Array
+    l: Array
+
+    @cached_property
+    def transmissions(self) -> list[Array]:
+        """What each mask lets pass."""
+        return [mask.weights(self.b, self.a, self.k, self.l) for mask in self.core.masks]
+
+    @property
+    def passed(self) -> Array:
+        """What all masks let pass."""
+        return self.passed_but(-1)
+
+    def passed_but(self, left_out: int) -> Array:
+        """What all masks but one let pass."""
+        rest = [one for n, one in enumerate(self.transmissions) if n != left_out]
+        return np.asarray(math.prod(rest, start=np.ones((len(self.l), len(self.k)))))
+
+    def down(self, row: int) -> tuple[str, float, Array, float, float]:
+        """Of which samples a raster row takes shares: the arguments of `shares`, (l, k)."""
+        core = self.core
+        y = core.y[self.b, self.a] + core.step[1, 0] * self.k[None, :] + core.step[1, 1] * self.l[:, None]
+        return core.interpolation, float(row), y, core.row_step / core.refine, core.opening
+
+    def across(self, row: int) -> tuple[str, Array, Array, float, float]:
+        """Likewise which columns of samples the pixels of a raster row take, (pixels, k)."""
+        core, pixel = self.core, np.arange(self.core.raster_shape[1], dtype=float)
+        x = core.x[self.b, self.a] + core.shear * (row - core.y[self.b, self.a]) + core.column_step * self.k
+        return core.interpolation, pixel[:, None], x[None, :], core.column_step / core.refine, core.opening
+
+    def gathered(self, weights: Array) -> Array:
+        """H: the raster's weights as each sample meets them."""
+        met = np.zeros((len(self.l), len(self.k), weights.shape[2]))
+        for row, line in enumerate(weights):
+            down = shares(*self.down(row))
+            if down.any():
+                met += down[..., None] * (shares(*self.across(row)).T @ line)
+        return met
+
+    def numbers_back(self, weights: Array, met: Array, light: Array, wanted: Collection[str]) -> dict[str, Array]:
+        """What the raster's weights say of numbers, through this tap alone; light: L, met: H."""
+        core, b, a = self.core, self.b, self.a
+        told: dict[str, Array] = {}
+        whole = (met * light).sum(axis=2)
+        of_taps = np.zeros(core.weights.shape)
+        of_taps[b, a] = (whole * self.passed).sum()
+        told["weights"] = core.scale * of_taps
+        told["scale"] = np.asarray(core.weights[b, a] * of_taps[b, a])
+        for n in range(len(core.masks)):
+            if any(name.startswith(f"masks[{n}].") for name in wanted):
+                told |= self.mask_back(n, core.scale * core.weights[b, a] * whole * self.passed_but(n))
+        if not MOVING.isdisjoint(wanted):
+            told |= self.places_back(core.scale * core.weights[b, a] * weights, light * self.passed[..., None])
+        return {name: told[name] for name in wanted}
+
+    def mask_back(self, n: int, weights: Array) -> dict[str, Array]:
+        """What weights of a mask's transmission at the samples say of the mask."""
+        mask = self.core.masks[n]
+        texture, of_row, of_column = smooth_back(
+            mask.texture, *mask.places(self.b, self.a, self.k, self.l), weights
+        )
+        row, column = np.zeros(mask.row.shape), np.zeros(mask.column.shape)
+        row[self.b, self.a], column[self.b, self.a] = of_row.sum(), of_column.sum()
+        step = np.array([[(told * self.k).sum(), (told.T * self.l).sum()] for told in (of_column, of_row)])
+        return {
+            f"masks[{n}].{name}": one
+            for name, one in {"texture": texture, "column": column, "row": row, "step": step}.items()
+        }
+
+    def places_back(self, weights: Array, flux: Array) -> dict[str, Array]:
+        """What the raster's weights say of where samples fall and over what; flux: L · Π T."""
+        core, b, a = self.core, self.b, self.a
+        x = y = opening = column_step = shear = 0.0
+        step = np.zeros((2, 2))
+        for row, line in enumerate(weights):
+            down = shares(*self.down(row))
+            if not down.any():
+                continue
+            mixed = shares(*self.across(row)).T @ line
+            by_y, by_height, by_opening = (
+                slope * (flux * mixed).sum(axis=2) for slope in share_slopes(*self.down(row))
+            )
+            y += by_y.sum()
+            opening += by_opening.sum()
+            step[1, 0] += (by_y * self.k).sum()
+            step[1, 1] += (by_y.T * self.l).sum() + np.sign(core.row_step) / core.refine * by_height.sum()
+            fallen = (down[..., None] * flux).sum(axis=0)
+            by_x, by_width, by_opening = (slope * (line @ fallen.T) for slope in share_slopes(*self.across(row)))
+            x += by_x.sum()
+            y -= core.shear * by_x.sum()
+            opening += by_opening.sum()
+            shear += (row - core.y[b, a]) * by_x.sum()
+            column_step += (by_x * self.k).sum() + np.sign(core.column_step) / core.refine * by_width.sum()
+        # column_step = x/k − shear · y/k, and shear = x/l : y/l
+        shear -= core.step[1, 0] * column_step
+        step += [
+            [column_step, shear / core.step[1, 1]],
+            [-core.shear * column_step, -core.shear / core.step[1, 1] * shear],
+        ]
+        of_x, of_y = np.zeros(core.x.shape), np.zeros(core.y.shape)
+        of_x[b, a], of_y[b, a] = x, y
+        return {"x": of_x, "y": of_y, "step": step, "opening": np.asarray(opening)}
