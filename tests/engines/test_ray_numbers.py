@@ -17,7 +17,7 @@ import pytest
 import vcc
 from vcc.base.errors import InputError
 from vcc.base.units import mm
-from vcc.engines import reference
+from vcc.engines import ray_numbers, reference
 from vcc.engines.reference_ray_numbers import ray_numbers_back
 from vcc.plan.numbers import numbers, with_numbers
 from vcc.plan.rays.edges import EDGES
@@ -160,6 +160,39 @@ def test_the_reference_agrees_with_difference_quotients(name):
         ), each
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_compiled_rays_agree_with_the_reference(name):
+    """To 1e-5 of the largest entry: tables are in single precision there, all else is in double.
+
+    What is nothing but rounding of the picture when a number is changed by a share of itself may differ.
+    """
+    core, values, raster = case(name)
+    names, size = wanted(core), np.abs(reference.rays(core, values, threads=1).values * raster).sum()
+    right = ray_numbers_back(core, values, raster, names, beside=1)
+    told = ray_numbers.ray_numbers_back(core, values, raster, names, beside=1, threads=2)
+    assert list(told) == names
+    for each in names:
+        number = numbers(core)[each]
+        rounding = 1e-14 * size / np.abs(number[np.isfinite(number)]).max(initial=1e-6)
+        largest = np.abs(right[each]).max(initial=0)
+        np.testing.assert_allclose(told[each], right[each], rtol=0, atol=1e-5 * largest + rounding, err_msg=each)
+
+
+def test_any_number_of_threads_makes_the_same_bytes():
+    """Of a picture of several tiles, with tables of all kinds."""
+    core, _, _ = case("zeros and cosines")
+    random = np.random.default_rng(1)
+    core = replace(core, raster_shape=(70, 40), samples=2)
+    values, raster = random.random(core.views), random.standard_normal((70, 40, 1))
+    names = wanted(core)
+    one, two, three = (
+        ray_numbers.ray_numbers_back(core, values, raster, names, threads=threads) for threads in (1, 2, 3)
+    )
+    for each in names:
+        assert np.any(one[each]) == (each != "points")
+        assert one[each].tobytes() == two[each].tobytes() == three[each].tobytes()
+
+
 def test_the_cases_go_by_all_ways():
     steps = {type(step).__name__ for name in CASES for step in case(name)[0].steps}
     assert steps >= {"Move", "CellsUnbend", "CellGaps", "FacetsUnbend", "TextureUnbend", "Disc", "Rectangle"}
@@ -175,5 +208,6 @@ def test_the_cases_go_by_all_ways():
 def test_what_moves_only_an_edge_is_refused():
     core, values, raster = case("zeros and cosines")
     edge = next(f"steps[{n}].radius" for n, step in enumerate(core.steps) if type(step).__name__ == "Disc")
-    with pytest.raises(InputError, match="is a hard edge inside the path of rays"):
-        ray_numbers_back(core, values, raster, [edge])
+    for engine in (ray_numbers_back, ray_numbers.ray_numbers_back):
+        with pytest.raises(InputError, match="is a hard edge inside the path of rays"):
+            engine(core, values, raster, [edge])

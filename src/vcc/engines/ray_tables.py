@@ -204,3 +204,42 @@ class Drawn(NamedTuple):
     start: int
     rays: int
     flipped: NDArray[np.int64]
+
+
+class Told(NamedTuple):
+    """What the rays of some tiles say of the numbers: sums to which `vcc.engines.ray_number_kernels` adds.
+
+    Args:
+        scale: (1,), but for the scale itself, as all that follow.
+        sensor: (6,): first pixel, pitch, sensitive area, (x, y) each.
+        window: (11,): of s from the window's point (a, b), from the place (x, y), and its offset; of t likewise;
+            of the solid angle.
+        scatter: (diffusers, 4), see `Window`.
+        cells: (24,): along x place_from_sensor, place_from_slope, offset, beyond, beyond_from_sensor,
+            beyond_from_slope, beyond_offset and middle, along y likewise; half (x, y); the opening's half width
+            and radius; of the lattice the pitch (times it), rotation and offset (x, y).
+        kinds: like those of `Cells`.
+        borders: likewise.
+        indices: (20,), index_from_ray.
+        motion: (4,).
+        steps: (steps, 20), see `vcc.engines.ray_numbers`.
+        matrices: (steps, 20): the affine maps of steps that are such; only read.
+        shares: like the tables of `Steps`; empty where nobody wants it.
+        slopes: likewise.
+        points: like the table of `Points`; likewise.
+    """
+
+    scale: Array
+    sensor: Array
+    window: Array
+    scatter: Array
+    cells: Array
+    kinds: Array
+    borders: Array
+    indices: Array
+    motion: Array
+    steps: Array
+    matrices: Array
+    shares: Array
+    slopes: Array
+    points: Array

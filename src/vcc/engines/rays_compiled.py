@@ -41,11 +41,12 @@ def traced(
     channels = values.shape[4] if values.ndim == 5 else 1
     rows, columns = core.raster_shape
     pictures = np.empty((2, rows, columns, channels), dtype=np.float32)
-    given = _field(core, values, channels), _sensor(core), _points(core, beside), _aim(core.aim), _steps(core)
     tiles = [tables.Tile(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)]
     tally = np.zeros(3)
     with Workers(threads) as pool:
-        add = partial(kernels.add_tile, *given, pool.ended, pictures)
+        add = partial(
+            kernels.add_tile, light_field(core, values, channels), *given(core, beside), pool.ended, pictures
+        )
         # Tallies are summed in the order of tiles: the same sums whatever the number of threads.
         for done, part in enumerate(pool.map(add, tiles), start=1):
             tally += part
@@ -54,7 +55,13 @@ def traced(
     return Partial(pictures[0], pictures[1], asked, lacking, int(traced_rays), core.samples)
 
 
-def _field(core: Rays, values: NDArray[Any], channels: int) -> tables.LightField:
+def given(core: Rays, beside: int) -> tuple[tables.Sensor, tables.Points, tables.Aim, tables.Steps]:
+    """What kernels that trace rays are given of a core."""
+    return _sensor(core), _points(core, beside), _aim(core.aim), _steps(core)
+
+
+def light_field(core: Rays, values: NDArray[Any], channels: int) -> tables.LightField:
+    """Samples, and how the rays of a core look them up."""
     kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
     return tables.LightField(
         tables.Samples(np.ascontiguousarray(values, dtype=kind).reshape(-1), core.views, channels),

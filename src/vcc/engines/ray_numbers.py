@@ -1,0 +1,231 @@
+"""What a raster by rays says of the plan's numbers, by the compiled kernel, on several threads.
+
+Tiles of the picture are parted into groups, the same whatever the number of threads. Each group has sums of its
+own, which are added in the order of the groups: so the numbers are the same to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.progress import Progress, tell
+from vcc.base.workers import Workers
+from vcc.engines import ray_number_kernels as kernels
+from vcc.engines import ray_tables as tables
+from vcc.engines.rays_compiled import TILE, given, light_field
+from vcc.plan.numbers import numbers
+from vcc.plan.rays import edges, steps
+from vcc.plan.rays.model import Rays
+from vcc.plan.rays.windows import CellWindows, Window
+
+Array = NDArray[np.float64]
+
+GROUPS = 64
+"""Groups of tiles at most."""
+GROUPS_BYTES = 2**26
+"""Of the sums of all groups, if possible: where tables are large there are fewer groups, and fewer threads."""
+
+
+def ray_numbers_back(
+    core: Rays,
+    values: NDArray[Any],
+    raster: NDArray[np.floating],
+    wanted: Collection[str],
+    beside: int = 0,
+    threads: int = 1,
+    progress: Progress | None = None,
+) -> dict[str, Array]:
+    """The derivative of ⟨raster, what rays make of the samples⟩ to numbers of the core.
+
+    See `vcc.engines.reference_ray_numbers.ray_numbers_back`; the same numbers for any number of threads.
+
+    Args:
+        core: what is traced.
+        values: samples (v, u, t, s[, channels]).
+        raster: weights of the picture's values, (rows, columns, channels).
+        wanted: names of numbers (`vcc.plan.numbers.numbers` of the core).
+        beside: 0, or 1 for the blocks of points beside those of the first round.
+        threads: how many work at once.
+        progress: called with (done, total) in groups of tiles.
+
+    Returns:
+        For each name an array of its number's shape.
+
+    Raises:
+        InputError: a number that moves nothing but a hard edge which rays run into.
+    """
+    edges.check_no_edge(core, wanted)
+    shapes = {name: number.shape for name, number in numbers(core).items()}
+    channels = values.shape[4] if values.ndim == 5 else 1
+    sensor, points, aim, packed = given(core, beside)
+    weights = np.ascontiguousarray(raster, dtype=np.float64).reshape(*core.raster_shape, channels) / core.samples
+    back = partial(
+        kernels.numbers_of_tiles, light_field(core, values, channels), sensor, points, aim, packed, weights
+    )
+    empty = partial(_nothing, core, packed, set(wanted))
+    groups = _groups(core.raster_shape, sum(each.nbytes for each in empty()))
+    total = empty()
+    with Workers(threads) as pool:
+
+        def of_group(tiles: NDArray[np.int64]) -> tables.Told:
+            told = empty()
+            back(pool.ended, told, tiles)
+            return told
+
+        for done, told in enumerate(pool.map(of_group, groups), start=1):
+            for mine, theirs in zip(total, told, strict=True):
+                if mine is not total.matrices:
+                    mine += theirs
+            tell(progress, done, len(groups))
+    found = _named(core, packed, total)
+    return {name: np.asarray(found.get(name, np.zeros(shapes[name]))).reshape(shapes[name]) for name in wanted}
+
+
+def _groups(raster_shape: tuple[int, int], size: int) -> list[NDArray[np.int64]]:
+    """Tiles (first row, end row, first column, end column), some at a time: (tiles, 4) each."""
+    rows, columns = raster_shape
+    tiles = np.array(
+        [(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)], dtype=np.int64
+    )
+    return np.array_split(tiles, max(min(GROUPS, len(tiles), GROUPS_BYTES // max(size, 1)), 1))
+
+
+def _nothing(core: Rays, packed: tables.Steps, wanted: set[str]) -> tables.Told:
+    """Sums of nothing yet, with those of tables where they are wanted."""
+    last = {name.rsplit(".", 1)[-1] for name in wanted if name.startswith("steps[")}
+    by_shares = any(name.endswith((".values", ".texture.values")) for name in wanted)
+    aim = core.aim
+    scatters = len(aim.slope_from_scatter) if isinstance(aim, Window) else 0
+    return tables.Told(
+        scale=np.zeros(1),
+        sensor=np.zeros(6),
+        window=np.zeros(11),
+        scatter=np.zeros((scatters, 4)),
+        cells=np.zeros(24),
+        kinds=np.zeros((*aim.cells.powers.shape, 3) if isinstance(aim, CellWindows) else (1, 1, 3)),
+        borders=np.zeros(aim.opening.borders.shape if isinstance(aim, CellWindows) else (0, 2)),
+        indices=np.zeros(20),
+        motion=np.zeros(4),
+        steps=np.zeros((len(core.steps), 20)),
+        matrices=_matrices(core),
+        shares=np.zeros(len(packed.shares) if by_shares else 0),
+        slopes=np.zeros(len(packed.slopes) if last & {"values", "powers", "slopes"} else 0),
+        points=np.zeros(core.points.shape[::-1] if "points" in wanted else (0, 0)),
+    )
+
+
+def _matrices(core: Rays) -> Array:
+    """The affine maps of steps that are such, (steps, 20)."""
+    matrices = np.zeros((len(core.steps), 20))
+    for n, step in enumerate(core.steps):
+        if isinstance(step, steps.Move):
+            matrices[n] = step.before_from_behind.matrix[:4].reshape(-1)
+    return matrices
+
+
+def _named(core: Rays, packed: tables.Steps, told: tables.Told) -> dict[str, Array]:
+    """The derivatives by the numbers' names, tables left out that were not summed."""
+    named = {
+        "first_pixel": told.sensor[:2],
+        "pitch": told.sensor[2:4],
+        "sensitive": told.sensor[4:],
+        "index_from_ray": _square(told.indices),
+        "motion": told.motion,
+    }
+    aim = core.aim
+    of_aim = _of_window(aim, told) if isinstance(aim, Window) else _of_cells(aim, told)
+    named |= {f"aim.{name}": value for name, value in of_aim.items()}
+    for n, step in enumerate(core.steps):
+        of_step = _of_step(step, packed.whole[n].tolist(), told, told.steps[n])
+        named |= {f"steps[{n}].{name}": value for name, value in of_step.items()}
+    if told.points.size:
+        named["points"] = told.points.T
+    return {"scale": told.scale, **{name: value * core.scale for name, value in named.items()}}
+
+
+def _square(matrix: Array) -> Array:
+    """5×5 of the first four rows."""
+    return np.concatenate([matrix, np.zeros(5)]).reshape(5, 5)
+
+
+def _of_window(aim: Window, told: tables.Told) -> dict[str, Array]:
+    s, t, weight = told.window[:5], told.window[5:10], told.window[10]
+    (a, b), (c, d) = aim.slope_from_point
+    per_determinant = (np.pi if aim.disc else 4.0) * np.sign(np.linalg.det(aim.slope_from_point))
+    of_weight = weight * per_determinant * np.array([[d, -c], [-b, a]])
+    return {
+        "slope_from_point": np.stack([s[:2], t[:2]]) + of_weight,
+        "slope_from_sensor": np.stack([s[2:4], t[2:4]]),
+        "offset": np.array([s[4], t[4]]),
+        **{f"slope_from_scatter[{n}][1]": term for n, term in enumerate(told.scatter)},
+    }
+
+
+def _of_cells(aim: CellWindows, told: tables.Told) -> dict[str, Array]:
+    x, y, rest = told.cells[:8], told.cells[8:16], told.cells[16:]
+    sight = (
+        "place_from_sensor",
+        "place_from_slope",
+        "offset",
+        "beyond",
+        "beyond_from_sensor",
+        "beyond_from_slope",
+        "beyond_offset",
+    )
+    return {
+        **{f"sight.{name}": np.array([x[n], y[n]]) for n, name in enumerate(sight)},
+        "stop.middle": np.array([x[7], y[7]]),
+        "stop.half": rest[:2],
+        "opening.half": np.array([rest[2], 0.0]),
+        "opening.radius": rest[3],
+        "opening.borders": told.borders,
+        **{
+            f"cells.lattice.{name}": value
+            for name, value in _of_lattice(aim.cells.lattice.pitch, rest[4:]).items()
+        },
+        "cells.powers": told.kinds[..., 0],
+        "cells.slopes": told.kinds[..., 1:],
+    }
+
+
+def _of_lattice(pitch: float, sums: Array) -> dict[str, Array]:
+    return {"pitch": sums[0] / pitch, "rotation": sums[1], "offset": sums[2:4]}
+
+
+def _of_step(step: steps.Step, whole: list[int], told: tables.Told, own: Array) -> dict[str, Array]:
+    """What a step's sums say of its numbers; ``whole`` is what the kernel was given of it."""
+    match step:
+        case steps.Move():
+            return {"before_from_behind": _square(own)}
+        case steps.CellsUnbend(lattice, _, powers):
+            lattices = _of_lattice(lattice.pitch, own)
+            found = {"decentre": own[2:4], **{f"lattice.{name}": value for name, value in lattices.items()}}
+            if told.slopes.size:
+                kinds = told.slopes[whole[3] :][: 3 * powers.size].reshape(*powers.shape, 3)
+                found |= {"powers": kinds[..., 0], "slopes": kinds[..., 1:]}
+            return found
+        case steps.FacetsUnbend(directions) if told.slopes.size:
+            return {"slopes": told.slopes[whole[1] :][: 2 * directions.size].reshape(-1, 4)[:, 2:]}
+        case steps.TextureUnbend(texture):
+            return _of_texture("texture", texture, own, told.slopes[whole[2] :])
+        case steps.TextureShares(texture):
+            return _of_texture("texture", texture, own, told.shares[whole[2] :])
+        case steps.CellShares(values) if told.shares.size:
+            return {"values": told.shares[whole[2] :][: values.size]}
+        case steps.Cosines():
+            turned, of_frequency = own[:2], own[2:4]
+            return {"middle": -np.array(step.frequency) * turned, "frequency": of_frequency, "phase": turned.sum()}
+        case steps.Unscatter(width=steps.Texture() as width):
+            return _of_texture("width", width, own, told.shares[whole[8] :])
+        case _:
+            return {}
+
+
+def _of_texture(name: str, texture: steps.Texture, own: Array, table: Array) -> dict[str, Array]:
+    found = {f"{name}.start": -own[:2], f"{name}.spacing": -own[2:4]}
+    return found | ({f"{name}.values": table[: texture.values.size]} if table.size else {})
