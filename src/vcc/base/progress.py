@@ -8,6 +8,13 @@ Progress = Callable[[int, int], None]
 """Called with (done, total) as work advances; what it raises ends the work."""
 
 
+def part_of(progress: Progress | None, part: int, parts: int) -> Progress | None:
+    """The progress of one of several parts that count to the same total."""
+    if progress is None or parts == 1:
+        return progress
+    return lambda done, total: progress(part * total + done, parts * total)
+
+
 ENDS_WORK = "ends_work"
 """The attribute of what `Progress` raised: no fault of what is being worked on."""
 

@@ -10,24 +10,25 @@ bands of rows.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.progress import Progress, tell
+from vcc.base.progress import Progress, part_of, tell
 from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
-from vcc.engines import rays_compiled, sharpening_kernels
+from vcc.engines import ray_transpose, rays_compiled, sharpening_kernels
 from vcc.engines.footprint_samples import FineGrid, MaskColumns, textures
+from vcc.engines.ray_numbers import ray_numbers_back
 from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import REACH, taps
-from vcc.plan.protocol import Partial
+from vcc.plan.protocol import Gradient, Partial
 from vcc.plan.rays.model import Rays
 
 BAND = 64
@@ -62,6 +63,33 @@ def rays(
 ) -> Partial:
     """The raster of samples (v, u, t, s[, channels]), float32, by compiled rays."""
     return rays_compiled.traced(core, values, beside, threads, progress)
+
+
+def rays_back(
+    core: Rays,
+    values: NDArray[Any],
+    raster: NDArray[np.floating],
+    *,
+    samples: bool = True,
+    wanted: Collection[str] = (),
+    beside: int = 0,
+    threads: int,
+    progress: Progress | None = None,
+) -> Gradient:
+    """What a raster's weights say of samples, float32, and of numbers; see `vcc.plan.protocol.BackRunner`.
+
+    Of a part of a core that is run with a border of dark views (`vcc.run.drive`), the border's samples are given
+    what rays carry to them, too: that belongs to the neighbours, and is left to them.
+    """
+    parts = int(samples) + bool(wanted)
+    return Gradient(
+        ray_transpose.scattered(core, values.shape, raster, beside, threads, part_of(progress, 0, parts))
+        if samples
+        else None,
+        ray_numbers_back(core, values, raster, wanted, beside, threads, part_of(progress, parts - 1, parts))
+        if wanted
+        else {},
+    )
 
 
 def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:

@@ -6,6 +6,7 @@ own, which are added in the order of the groups: so the numbers are the same to 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from functools import partial
 from typing import Any
@@ -51,7 +52,7 @@ def ray_numbers_back(
         wanted: names of numbers (`vcc.plan.numbers.numbers` of the core).
         beside: 0, or 1 for the blocks of points beside those of the first round.
         threads: how many work at once.
-        progress: called with (done, total) in groups of tiles.
+        progress: called with (done, total) in pixels.
 
     Returns:
         For each name an array of its number's shape.
@@ -69,7 +70,7 @@ def ray_numbers_back(
     )
     empty = partial(_nothing, core, packed, set(wanted))
     groups = _groups(core.raster_shape, sum(each.nbytes for each in empty()))
-    total = empty()
+    total, pixels = empty(), math.prod(core.raster_shape)
     with Workers(threads) as pool:
 
         def of_group(tiles: NDArray[np.int64]) -> tables.Told:
@@ -81,7 +82,7 @@ def ray_numbers_back(
             for mine, theirs in zip(total, told, strict=True):
                 if mine is not total.matrices:
                     mine += theirs
-            tell(progress, done, len(groups))
+            tell(progress, pixels * done // len(groups), pixels)
     found = _named(core, packed, total)
     return {name: np.asarray(found.get(name, np.zeros(shapes[name]))).reshape(shapes[name]) for name in wanted}
 

@@ -243,3 +243,46 @@ class Told(NamedTuple):
     shares: Array
     slopes: Array
     points: Array
+
+
+class Look(NamedTuple):
+    """How rays look up a light field, without its numbers; see `LightField`."""
+
+    views: tuple[int, int, int, int]
+    index_from_ray: Array
+    motion: Array
+    between: bool
+
+
+class Found(NamedTuple):
+    """Where the rays of some pixels meet the light field, as they were traced and in the order of views.
+
+    Args:
+        places: (rays, 6): indices (i, j, k, l), what the ray weighs, the number of its pixel.
+        views: (rays,) int32, the number of the first of the views that each lies between.
+        ordered: as ``places``: those of one view after those of another, in the order of rays otherwise.
+        begin: (views + 1,) int64, where those of each view begin in ``ordered``.
+    """
+
+    places: Array
+    views: NDArray[np.int32]
+    ordered: Array
+    begin: NDArray[np.int64]
+
+
+class Grown(NamedTuple):
+    """What each sample adds to a weighted sum of a picture, as it grows.
+
+    Args:
+        values: flat, in the order (v, u, t, s, channel), float32 or float64.
+        views: (v, u, t, s).
+        channels: numbers a sample.
+        motion: see `LightField`.
+        between: see `LightField`.
+    """
+
+    values: NDArray[Any]
+    views: tuple[int, int, int, int]
+    channels: int
+    motion: Array
+    between: bool

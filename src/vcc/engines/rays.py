@@ -5,6 +5,7 @@ The rays are the core's own (`vcc.plan.rays.model.Rays.looked_up`), which define
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -16,7 +17,6 @@ from vcc.base.progress import Progress, tell
 from vcc.fields.sampled import to_dtype
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
-from vcc.plan.rays.windows import CellWindows
 
 Array = NDArray[np.float64]
 
@@ -56,6 +56,33 @@ def traced(core: Rays, values: Any, double: bool, beside: int, progress: Progres
     return Partial(one + two, 2 * (one - two), asked, lacking, rays, core.samples)
 
 
+def scattered(
+    core: Rays, shape: tuple[int, ...], raster: NDArray[Any], beside: int, progress: Progress | None = None
+) -> Array:
+    """What each sample adds to a weighted sum of `traced`'s values: its transpose, in double precision.
+
+    Args:
+        core: what is traced.
+        shape: of the samples, (v, u, t, s[, channels]).
+        raster: the weights, (rows, columns, channels).
+        beside: as for `traced`.
+        progress: called with (done, total) in pixels.
+    """
+    rows, columns = core.raster_shape
+    channels = raster.shape[2]
+    weights = np.reshape(raster, (rows * columns, channels)).astype(np.float64) * core.scale
+    samples = np.zeros((channels, math.prod(core.views)))
+    for pixel in _pieces(core):
+        index, share = core.looked_up(pixel, core.block(pixel) ^ beside)
+        inside, _ = core.held(index)
+        for at, weight in _looked_at(core, index, share * inside):
+            for channel, line in enumerate(samples):
+                carried = weight * weights[pixel, channel][:, None, None]
+                np.add.at(line, at.reshape(-1), carried.reshape(-1))
+        tell(progress, int(pixel[-1]) + 1, rows * columns)
+    return np.ascontiguousarray(samples.T).reshape(shape)
+
+
 def memory_of_rays(core: Rays) -> int:
     """Bytes that tracing plainly takes beside the samples and the raster, estimated."""
     rays = min(RAYS_AT_ONCE, core.rays)
@@ -66,10 +93,7 @@ def memory_of_rays(core: Rays) -> int:
 
 def _pieces(core: Rays) -> Iterator[NDArray[np.int64]]:
     """Numbers of pixels, some at a time."""
-    cells = 1
-    if isinstance(core.aim, CellWindows):
-        cells = (2 * core.aim.reach[0] + 1) * (2 * core.aim.reach[1] + 1)
-    at_once = max(RAYS_AT_ONCE // (core.samples * cells), 1)
+    at_once = max(RAYS_AT_ONCE // (core.samples * core.most_cells), 1)
     total = core.raster_shape[0] * core.raster_shape[1]
     for first in range(0, total, at_once):
         yield np.arange(first, min(first + at_once, total))
@@ -77,6 +101,17 @@ def _pieces(core: Rays) -> Iterator[NDArray[np.int64]]:
 
 def _found(core: Rays, xp: Any, samples: Any, index: Array, share: Array, working: Any) -> Any:
     """What rays find in the light field, interpolated in all four dimensions, times their shares."""
+    total = None
+    for at, weight in _looked_at(core, index, share):
+        where = xp.asarray(at.reshape(-1), device=device(samples))
+        taken = xp.reshape(xp.take(samples, where, axis=0), (*at.shape, samples.shape[1]))
+        found = taken * xp.asarray(weight[..., None], dtype=working, device=device(samples))
+        total = found if total is None else total + found
+    return total
+
+
+def _looked_at(core: Rays, index: Array, share: Array) -> Iterator[tuple[NDArray[np.int64], Array]]:
+    """The samples between which each ray falls, by their numbers, and what each of them adds to what it finds."""
     nv, nu, nt, ns = core.views
     i, j, k, l = np.moveaxis(index, -1, 0)
     ci, cj = np.clip(i, 0, nu - 1), np.clip(j, 0, nv - 1)
@@ -90,7 +125,6 @@ def _found(core: Rays, xp: Any, samples: Any, index: Array, share: Array, workin
         ]
     else:
         corners = [((ci + 0.5).astype(np.int64), (cj + 0.5).astype(np.int64), np.ones_like(ci))]
-    total = None
     for view_i, view_j, weight in corners:
         away = np.stack([i - view_i, j - view_j])
         moved = np.tensordot(core.motion, away, axes=1) if core.between_views else np.zeros_like(away)
@@ -102,9 +136,4 @@ def _found(core: Rays, xp: Any, samples: Any, index: Array, share: Array, workin
                 c, r = first[0] + dk, first[1] + dl
                 w = share * weight * np.abs(1 - dk - part[0]) * np.abs(1 - dl - part[1])
                 w = w * ((c >= 0) & (c < ns) & (r >= 0) & (r < nt))
-                at = ((view_j * nu + view_i) * nt + np.clip(r, 0, nt - 1)) * ns + np.clip(c, 0, ns - 1)
-                where = xp.asarray(at.reshape(-1), device=device(samples))
-                taken = xp.reshape(xp.take(samples, where, axis=0), (*at.shape, samples.shape[1]))
-                found = taken * xp.asarray(w[..., None], dtype=working, device=device(samples))
-                total = found if total is None else total + found
-    return total
+                yield ((view_j * nu + view_i) * nt + np.clip(r, 0, nt - 1)) * ns + np.clip(c, 0, ns - 1), w

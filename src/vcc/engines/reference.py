@@ -9,20 +9,21 @@ that is looked at, x(q) + shear · (y − y(q)), so that the shares still sum to
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.progress import Progress, tell
-from vcc.engines.rays import memory_of_rays, traced
+from vcc.base.progress import Progress, part_of, tell
+from vcc.engines.rays import memory_of_rays, scattered, traced
 from vcc.engines.reference_back import divided, indices
 from vcc.engines.reference_back import footprints_back as footprints_back  # of the engine
+from vcc.engines.reference_ray_numbers import ray_numbers_back
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import shares
-from vcc.plan.protocol import Partial
+from vcc.plan.protocol import Gradient, Partial
 from vcc.plan.rays.model import Rays
 
 Array = NDArray[np.float64]
@@ -58,6 +59,31 @@ def footprints(
 def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None) -> Partial:
     """The raster of samples (v, u, t, s[, channels]) by the plan's own rays, in double precision."""
     return traced(core, values, True, beside, progress)
+
+
+def rays_back(
+    core: Rays,
+    values: NDArray[Any],
+    raster: NDArray[np.floating],
+    *,
+    samples: bool = True,
+    wanted: Collection[str] = (),
+    beside: int = 0,
+    threads: int,
+    progress: Progress | None = None,
+) -> Gradient:
+    """What a raster's weights say of samples and numbers, float64; see `vcc.plan.protocol.BackRunner`.
+
+    Of a part of a core that is run with a border of dark views (`vcc.run.drive`), the border's samples are given
+    what rays carry to them, too: that belongs to the neighbours, and is left to them.
+    """
+    parts = int(samples) + bool(wanted)
+    return Gradient(
+        scattered(core, values.shape, raster, beside, part_of(progress, 0, parts)) if samples else None,
+        ray_numbers_back(core, values, raster, wanted, beside, threads, part_of(progress, parts - 1, parts))
+        if wanted
+        else {},
+    )
 
 
 def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:

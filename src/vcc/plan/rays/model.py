@@ -130,6 +130,14 @@ class Rays(Value):
         return self.raster_shape[0] * self.raster_shape[1] * self.samples
 
     @property
+    def most_cells(self) -> int:
+        """Through how many cells of an array a pixel's rays may go; 1 for a window."""
+        if not isinstance(self.aim, CellWindows):
+            return 1
+        down, across = self.aim.reach
+        return (2 * down + 1) * (2 * across + 1)
+
+    @property
     def samples_touched(self) -> int:
         """How many samples of the light field the rays look at, those that are looked at twice counted twice."""
         return 16 * self.rays

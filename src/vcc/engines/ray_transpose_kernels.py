@@ -1,0 +1,221 @@
+"""The compiled kernels that trace rays as `vcc.engines.ray_kernels` does, and hand to samples what they carry.
+
+Rays of neighbouring pixels meet the same samples, so they are first traced and put in the order of the views that
+they meet, and then each row of views is handed what is its own, by one thread: nobody waits for another, the
+samples of a view that are in use stay in the first-level cache, and every sum is taken in one order.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vcc.engines.compiled import compiled
+from vcc.engines.ray_kernels import (
+    PACKET,
+    at_pixel,
+    cells_at,
+    hashed,
+    middle_of,
+    room,
+    take_steps,
+    through_cell,
+    through_window,
+    to_indices,
+    turn_to,
+)
+from vcc.engines.ray_tables import Drawn
+from vcc.engines.vector_scatter import spread_views_of_1, spread_views_of_3, spread_views_of_4
+
+_compiled = compiled(fastmath={"contract", "nsz"})
+_inlined = compiled(fastmath={"contract", "nsz"}, inline="always")
+
+
+@_inlined
+def keep_rays(look, rays, n, pixel, found, filled):  # type: ignore[no-untyped-def]
+    """Keep where those of n rays that meet the light field do; returns how many are kept now.
+
+    Which do is said by `ray_kernels.add_rays`. Places are replaced by indices.
+    """
+    (nv, nu, nt, ns), index_from_ray, motion, between = look
+    x, y, s, t, share = rays
+    places, views = found.places, found.views
+    to_indices(index_from_ray, rays, n)
+    # So far outside the pictures all views that a ray is between are dark.
+    dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
+    dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
+    for p in range(n):
+        i, j, k, l = x[p], y[p], s[p], t[p]
+        if share[p] == 0.0 or not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
+            continue
+        if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
+            continue
+        i, j = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
+        if between:
+            i0, j0 = min(int(i), max(nu - 2, 0)), min(int(j), max(nv - 2, 0))
+        else:
+            i0, j0 = int(i + 0.5), int(j + 0.5)
+        places[filled, 0], places[filled, 1], places[filled, 2] = x[p], y[p], k
+        places[filled, 3], places[filled, 4], places[filled, 5] = l, share[p], pixel
+        views[filled] = j0 * nu + i0
+        filled += 1
+    return filled
+
+
+@_compiled
+def put_in_order(found, filled):  # type: ignore[no-untyped-def]
+    """Put the places that are kept in the order of their views."""
+    places, views, ordered, begin = found
+    begin[:] = 0
+    for p in range(filled):
+        begin[views[p] + 1] += 1
+    for view in range(1, len(begin)):
+        begin[view] += begin[view - 1]
+    for p in range(filled):
+        to, view = begin[views[p]], views[p]
+        for n in range(6):
+            ordered[to, n] = places[p, n]
+        begin[view] += 1
+    for view in range(len(begin) - 1, 0, -1):  # each begins where the one before it ended
+        begin[view] = begin[view - 1]
+    begin[0] = 0
+
+
+@_compiled
+def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # type: ignore[no-untyped-def]
+    """Trace the pixels of a tile from its pixel ``start`` on, as long as there is room to keep what they meet.
+
+    Returns:
+        The number, in the tile, of the first pixel that was not traced: as many as there are once all were. After
+        ``ended[0]`` is true it means nothing.
+    """
+    table, samples, beside, seed = points
+    cells = aim.cells
+    blocks = table.shape[1] // samples
+    rays, near, images, flipped = room()
+    share = rays.share
+    columns = min(tile.end_column, sensor.columns) - tile.first_column
+    pixels = (min(tile.end_row, sensor.rows) - tile.first_row) * columns
+    filled, number = 0, start
+    while number < pixels and not ended[0]:
+        row, column = tile.first_row + number // columns, tile.first_column + number % columns
+        pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
+        seen = cells_at(aim.by_cell, cells, middle, sensor.sensitive, near)
+        if filled + seen * samples > len(found.places):
+            break
+        first = ((np.int64(hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
+        for q in range(seen):
+            turn_to(aim.by_cell, cells, seed, pixel, near, q, images, flipped)
+            for done in range(0, samples, PACKET):
+                n = min(PACKET, samples - done)
+                drawn = Drawn(table, first + done, n, flipped)
+                at_pixel(drawn, middle, sensor.sensitive, rays)
+                if aim.by_cell:
+                    through_cell(drawn, images, cells, rays)
+                else:
+                    through_window(drawn, aim.window, rays)
+                sent = 0
+                for p in range(n):
+                    sent += share[p] > 0.0
+                if sent == 0:
+                    continue
+                take_steps(steps, drawn, rays)
+                filled = keep_rays(look, rays, n, pixel, found, filled)
+        number += 1
+    put_in_order(found, filled)
+    return number
+
+
+@_compiled
+def spread_view(grown, base, k, l, weight, weights, pixel):  # type: ignore[no-untyped-def]
+    """Add to a view's samples around (k, l) what they add to a pixel; the transpose of `ray_kernels.add_view`."""
+    values, (_, _, rows, columns), channels, _, _ = grown
+    k0, l0 = math.floor(k), math.floor(l)
+    fk, fl = k - k0, l - l0
+    c, r = int(k0), int(l0)
+    for dr in range(2):
+        for dc in range(2):
+            if c + dc >= 0 and c + dc < columns and r + dr >= 0 and r + dr < rows:
+                w = np.float32(weight * (fl if dr else 1.0 - fl) * (fk if dc else 1.0 - fk))
+                at = base + ((r + dr) * columns + c + dc) * channels
+                for channel in range(channels):
+                    values[at + channel] += w * weights[pixel + channel]
+
+
+@_compiled
+def spread_row(grown, weights, ordered, begin, row):  # type: ignore[no-untyped-def]
+    """Hand to samples what the rays carry whose first view is in a row of views.
+
+    That are samples of this row of views and, where rays lie between views, of the next one.
+
+    Args:
+        grown: `vcc.engines.ray_tables.Grown`.
+        weights: of the pixels' values, flat, float32.
+        ordered: (tiles, rays, 6), what was found in some tiles, whose order is that of sums.
+        begin: (tiles, views + 1), where each view's begin; see `vcc.engines.ray_tables.Found`.
+        row: of views.
+    """
+    values, (nv, nu, nt, ns), channels, motion, between = grown
+    # As in `ray_kernels.add_rays`.
+    parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
+    vectors = parted and (channels == 1 or channels == 3 or channels == 4)
+    line, picture, row_of_views = ns * channels, nt * ns * channels, nu * nt * ns * channels
+    one = np.float32(1)
+    for tile in range(len(ordered)):
+        places = ordered[tile]
+        for column in range(nu):
+            view = row * nu + column
+            base = row * row_of_views + column * picture
+            for p in range(begin[tile, view], begin[tile, view + 1]):
+                i, j, k, l = places[p, 0], places[p, 1], places[p, 2], places[p, 3]
+                weight, pixel = places[p, 4], int(places[p, 5]) * channels
+                if not between:
+                    spread_view(grown, base, k, l, weight, weights, pixel)
+                    continue
+                fi, fj = min(max(i, 0.0), nu - 1.0) - column, min(max(j, 0.0), nv - 1.0) - row
+                if vectors:
+                    k0, l0 = k + motion[0, 0] * (i - column), l + motion[1, 1] * (j - row)
+                    k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
+                    kf0, kf1, lf0, lf1 = math.floor(k0), math.floor(k1), math.floor(l0), math.floor(l1)
+                    inside = (
+                        min(kf0, kf1) >= 0
+                        and max(kf0, kf1) < ns - 1
+                        and min(lf0, lf1) >= 0
+                        and max(lf0, lf1) < nt - 1
+                    )
+                    if inside:
+                        c0, c1 = int(kf0) * channels, int(kf1) * channels
+                        r0, r1 = int(lf0) * line, int(lf1) * line
+                        fi, fj = np.float32(fi), np.float32(fj)
+                        fk0, fk1 = np.float32(k0 - kf0), np.float32(k1 - kf1)
+                        fl0, fl1 = np.float32(l0 - lf0), np.float32(l1 - lf1)
+                        lower = np.float32(weight) * fj
+                        upper = np.float32(weight) - lower
+                        above_1, below_1 = upper * fl0, lower * fl1
+                        left_1, right_1 = (one - fi) * fk0, fi * fk1
+                        upper_corners = base + r0 + c0, base + picture + r0 + c1
+                        lower_corners = base + row_of_views + r1 + c0, base + row_of_views + picture + r1 + c1
+                        corners = upper_corners + lower_corners
+                        rows = upper - above_1, above_1, lower - below_1, below_1
+                        columns = one - fi - left_1, left_1, fi - right_1, right_1
+                        if channels == 3:
+                            spread_views_of_3(values, corners, line, rows, columns, weights, pixel)
+                        elif channels == 1:
+                            spread_views_of_1(values, corners, line, rows, columns, weights, pixel)
+                        else:
+                            spread_views_of_4(values, corners, line, rows, columns, weights, pixel)
+                        continue
+                for dj in range(2):
+                    wj = weight * (fj if dj else 1.0 - fj)
+                    if wj == 0.0:
+                        continue
+                    for di in range(2):
+                        w = wj * (fi if di else 1.0 - fi)
+                        if w == 0.0:
+                            continue
+                        away_i, away_j = i - (column + di), j - (row + dj)
+                        view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j
+                        view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
+                        beside = base + dj * row_of_views + di * picture
+                        spread_view(grown, beside, view_k, view_l, w, weights, pixel)
