@@ -79,7 +79,7 @@ def _sensor(core: Rays) -> tables.Sensor:
 
 def _points(core: Rays, beside: int) -> tables.Points:
     seed = core.seed & 0xFFFFFFFF  # the hash takes no more of it
-    return tables.Points(np.ascontiguousarray(core.points.T), core.samples, beside, seed)
+    return tables.Points(np.ascontiguousarray(core.points.T, dtype=np.float32), core.samples, beside, seed)
 
 
 def _steps(core: Rays) -> tables.Steps:

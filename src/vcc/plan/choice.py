@@ -7,38 +7,50 @@ from dataclasses import replace
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.optics.train import Train
+from vcc.plan.decisions import ANEW, Decisions, plan_again
 from vcc.plan.depth_rule import denser
 from vcc.plan.footprints.compile import blurs_or_why_not, compile_footprints
+from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.how import How
 from vcc.plan.model import MadeFor, Plan
 from vcc.plan.rays.compile import compile_rays
 
 
-def compile_best(train: Train, grid: Grid, how: How | None = None) -> Plan:
+def compile_best(train: Train, grid: Grid, how: How | None = None, decisions: Decisions | None = None) -> Plan:
     """The plan by which an engine makes the picture that an optical train makes of a light field.
 
     Args:
         train: the optics and the sensor.
         grid: of the light field.
         how: what was chosen; None takes the defaults.
+        decisions: what was decided before, for plans of one structure whose numbers follow the train's parameters
+            smoothly, textures in double precision; none yet, and they are taken here. None decides all anew and
+            keeps nothing.
 
     Raises:
-        InputError: options that do not go with one another, an element that returns what it must not.
+        InputError: options that do not go with one another, an element that returns what it must not, a train for
+            which the decisions given no longer hold.
     """
-    plan = _compiled(train, grid, how or How())
+    kept = ANEW if decisions is None else decisions
+    kept.hold("the order of the elements", tuple((element.kind, element.name) for element in train.elements))
+    plan = _compiled(train, grid, how or How(), kept)
     return replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame))
 
 
-def _compiled(train: Train, grid: Grid, how: How) -> Plan:
-    by_footprints = "asked for" if how.method == "rays" else blurs_or_why_not(train, grid, how)
+def _compiled(train: Train, grid: Grid, how: How, decisions: Decisions) -> Plan:
+    by_footprints = _blurs(train, grid, how, decisions)
     if how.between_views == "depth":
         if isinstance(by_footprints, str):
             raise InputError(
                 "between_views='depth' is for pictures made by footprints; this one is made by rays "
                 f"({by_footprints}): leave it out, and rays interpolate along the parallax of one depth"
             )
-        made, between, why = denser(train, grid)
-        plan = _compiled(train, made, replace(how, between_views="auto"))
+        made, between, why = decisions.keep(
+            "views in between",
+            lambda: denser(train, grid),
+            lambda one, other: one[0].shape == other[0].shape,
+        )
+        plan = _compiled(train, made, replace(how, between_views="auto"), decisions.of("views in between"))
         return replace(plan, views_between=between, notes=(*plan.notes, why))
     if not isinstance(by_footprints, str):
         for name, given in (("samples", how.samples), ("tolerance", how.tolerance)):
@@ -47,7 +59,7 @@ def _compiled(train: Train, grid: Grid, how: How) -> Plan:
                     f"{name} is for pictures made by rays, and this camera needs none: footprints have no "
                     "sampling error. Leave it out, or pass method='rays'"
                 )
-        return compile_footprints(train, grid, how, by_footprints)
+        return compile_footprints(train, grid, how, by_footprints, decisions)
     if how.method == "footprints":
         raise InputError(f"this camera's picture cannot be made by footprints: {by_footprints}. Use method='rays'")
     for name, value, fine in (
@@ -59,4 +71,36 @@ def _compiled(train: Train, grid: Grid, how: How) -> Plan:
                 f"{name}={value!r} is for pictures made by footprints; this one is made by rays "
                 f"({by_footprints}): leave it out"
             )
-    return compile_rays(train, grid, how, by_footprints)
+    return compile_rays(train, grid, how, by_footprints, decisions)
+
+
+def _blurs(train: Train, grid: Grid, how: How, decisions: Decisions) -> Blurs | str:
+    """What the diffusers come to where a picture is made by footprints; else why it is not, in words.
+
+    Raises:
+        InputError: it was made by footprints, and cannot be any longer.
+    """
+    if how.method == "rays":
+        return "asked for"
+
+    def found() -> Blurs | str:
+        return blurs_or_why_not(train, grid, how, decisions)
+
+    def both(one: str | None, other: str | None) -> bool:
+        return (one is None) == (other is None)
+
+    if not decisions.lasting:
+        return found()
+    first: list[Blurs | str] = []
+
+    def why_rays() -> str | None:
+        first.append(found())
+        return first[0] if isinstance(first[0], str) else None
+
+    why = decisions.keep("footprints or rays", why_rays, both)
+    if why is not None:
+        return why
+    blurs = first[0] if first else found()
+    if isinstance(blurs, str):
+        raise plan_again(f"footprints or rays ({blurs})")
+    return blurs

@@ -6,12 +6,49 @@ and what was decided on the way (how many taps, how fine a texture, which filter
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, TypeVar
 
+from vcc.base.errors import InputError
 from vcc.base.values import content
 
 Decided = TypeVar("Decided")
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two decisions have equal content."""
+    return content(one) == content(other)
+
+
+def plan_again(what: str) -> InputError:
+    """The refusal to follow a camera where a plan's decisions no longer hold.
+
+    Args:
+        what: is no longer what it was, in words.
+    """
+    return InputError(
+        f"{what}: not what it was when the plan was made, so that the plan's numbers cannot follow. Plan again "
+        "from here, or keep the parameter from moving so far"
+    )
+
+
+@dataclass
+class _Book:
+    """What decisions are written into, by name.
+
+    Args:
+        kept: what was decided.
+        alike: by what some decisions are compared.
+        made: (key, what was made of it).
+        remembers: whether what is made is kept.
+    """
+
+    kept: dict[str, Any] = field(default_factory=dict)
+    alike: dict[str, Callable[[Any, Any], bool]] = field(default_factory=dict)
+    made: dict[str, tuple[Hashable, Any]] = field(default_factory=dict)
+    remembers: bool = False
 
 
 class Decisions:
@@ -20,27 +57,97 @@ class Decisions:
     A plan that is made with decisions keeps its textures in double precision.
     """
 
-    def __init__(self) -> None:
-        self._kept: dict[str, Any] = {}
+    lasting: ClassVar[bool] = True
+    """Whether decisions are kept, and numbers must follow smoothly."""
 
-    def keep(self, name: str, decide: Callable[[], Decided]) -> Decided:
+    def __init__(self) -> None:
+        self._book, self._about = _Book(), ""
+
+    def of(self, what: str) -> Decisions:
+        """The same decisions, but that names of those taken through it begin with what they are about."""
+        part = type(self)()
+        part._book, part._about = self._book, f"{self._about}{what}, "
+        return part
+
+    def keep(
+        self, name: str, decide: Callable[[], Decided], alike: Callable[[Decided, Decided], bool] = same
+    ) -> Decided:
         """What was decided under a name; where nothing was, it is decided now.
 
         Args:
             name: of the decision, in words that `differences` can show.
             decide: decides.
+            alike: whether two decisions come to the same for `differences`.
         """
-        if name not in self._kept:
-            self._kept[name] = decide()
-        kept: Decided = self._kept[name]
+        name = self._about + name
+        if name not in self._book.kept:
+            self._book.kept[name] = decide()
+            self._book.alike[name] = alike
+        kept: Decided = self._book.kept[name]
         return kept
+
+    def hold(self, name: str, now: Decided) -> Decided:
+        """What is so now, and must have been so from the first.
+
+        Raises:
+            InputError: it was not.
+        """
+        if not same(self.keep(name, lambda: now), now):
+            raise plan_again(self._about + name)
+        return now
+
+    def made(self, name: str, key: Callable[[], Hashable], make: Callable[[], Decided]) -> Decided:
+        """What is made of a key: what was made and remembered of it, or made now.
+
+        Args:
+            name: of what is made.
+            key: all that it depends on.
+            make: makes it.
+        """
+        name, now = self._about + name, key()
+        if name in self._book.made and self._book.made[name][0] == now:
+            kept: Decided = self._book.made[name][1]
+            return kept
+        new = make()
+        if self._book.remembers:
+            self._book.made[name] = (now, new)
+        return new
+
+    @contextmanager
+    def remembering(self) -> Iterator[None]:
+        """What is made within is remembered, one thing a name."""
+        self._book.remembers = True
+        try:
+            yield
+        finally:
+            self._book.remembers = False
 
     def differences(self, other: Decisions) -> tuple[str, ...]:
         """The names under which two sets of decisions hold something else, in the order of their taking."""
-        names = dict.fromkeys([*self._kept, *other._kept])
-        missing = object()
+        mine, others = self._book.kept, other._book.kept
+        names = dict.fromkeys([*mine, *others])
+        both = mine.keys() & others.keys()
         return tuple(
-            name
-            for name in names
-            if content(self._kept.get(name, missing)) != content(other._kept.get(name, missing))
+            name for name in names if name not in both or not self._book.alike[name](mine[name], others[name])
         )
+
+
+class _Anew(Decisions):
+    """Decisions that nobody keeps: all are taken anew."""
+
+    lasting = False
+
+    def of(self, what: str) -> Decisions:
+        return self
+
+    def keep(
+        self, name: str, decide: Callable[[], Decided], alike: Callable[[Decided, Decided], bool] = same
+    ) -> Decided:
+        return decide()
+
+    def made(self, name: str, key: Callable[[], Hashable], make: Callable[[], Decided]) -> Decided:
+        return make()
+
+
+ANEW: Decisions = _Anew()
+"""What plans are made with that nothing has to follow."""

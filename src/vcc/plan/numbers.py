@@ -25,7 +25,8 @@ def numbers(thing: Any) -> dict[str, Array]:
 
     Args:
         thing: a core, an operator, or a tuple of them; dataclasses and tuples are gone through, whole numbers,
-            texts and whatever else is no floating-point number are passed over.
+            texts and whatever else is no floating-point number are passed over. Arrays in double precision are
+            handed out as they are, not copied.
     """
     return dict(_leaves(thing, ""))
 
@@ -56,7 +57,7 @@ def _leaf(thing: Any) -> Array | None:
     if isinstance(thing, Affine):
         return thing.matrix
     if isinstance(thing, np.ndarray):
-        return thing.astype(np.float64) if thing.dtype.kind == "f" else None
+        return thing.astype(np.float64, copy=False) if thing.dtype.kind == "f" else None
     pair = isinstance(thing, tuple) and thing and all(isinstance(part, float) for part in thing)
     return np.array(thing, dtype=np.float64) if pair or isinstance(thing, float) else None
 

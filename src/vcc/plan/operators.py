@@ -316,9 +316,18 @@ class AlongAxes(Brief, Value):
     half_widths: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def tents(cls, vertical: float, horizontal: float) -> AlongAxes:
-        """What fills the gaps between the pictures of neighbouring views; half widths in pixels, 0 for none."""
-        return cls(tent(vertical), tent(horizontal), "gaps between views filled by tents", (vertical, horizontal))
+    def tents(
+        cls, vertical: float, horizontal: float, beside: tuple[int | None, int | None] = (None, None)
+    ) -> AlongAxes:
+        """What fills the gaps between the pictures of neighbouring views.
+
+        Args:
+            vertical: half width of the tent along columns, pixels; 0 for none.
+            horizontal: likewise along rows.
+            beside: weights on each side of the middle of both; None: as many as it takes.
+        """
+        down, across = (tent(*each) for each in zip((vertical, horizontal), beside, strict=True))
+        return cls(down, across, "gaps between views filled by tents", (vertical, horizontal))
 
     def apply(self, raster: Any) -> Any:
         """The raster (rows, columns, channels) filtered."""
@@ -472,11 +481,16 @@ def merged(after: Sequence[After]) -> Iterator[After]:
 # --- weights ---
 
 
-def tent(half_width: float) -> Array:
-    """A tent of this half width in pixels, averaged over each pixel: an odd number of weights of sum 1."""
+def tent(half_width: float, beside: int | None = None) -> Array:
+    """A tent of this half width in pixels, averaged over each pixel: an odd number of weights of sum 1.
+
+    Args:
+        half_width: pixels; 0 for none.
+        beside: weights on each side of the middle; None: as many as it takes.
+    """
     if half_width == 0:
         return np.ones(1)
-    reach = math.ceil(half_width + 0.5)
+    reach = math.ceil(half_width + 0.5) if beside is None else beside
     edges = np.clip((np.arange(-reach, reach + 2) - 0.5) / half_width, -1, 1)
     return np.diff(edges - np.sign(edges) * edges**2 / 2)
 

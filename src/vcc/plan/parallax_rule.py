@@ -9,7 +9,7 @@ vector, so the tent is one blur of the finished picture, whatever the views hold
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from vcc.base.affine import Affine
 from vcc.base.checks import above_zero
 from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
+from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.how import How
 
 Array = NDArray[np.float64]
 
@@ -55,6 +57,28 @@ def index_motions(frame: Affine, vergences: Array) -> Array:
     singular = np.abs(np.linalg.det(within)) <= 1e-12 * np.abs(within).max(axis=(1, 2)) ** 2
     within = np.where(singular[:, None, None], np.eye(2), within)
     return np.where(singular[:, None, None], 0.0, np.linalg.solve(within, across))
+
+
+def between_views_of(
+    grid: Grid, frame: Affine, on_sensor: Array, how: How, decisions: Decisions = ANEW
+) -> BetweenViews:
+    """What is chosen by `choose_between_views`; where that is kept, its gaps follow the optics.
+
+    The motion is that of a point of the scene, which stays where it is. The gap that it leaves between the
+    pictures of neighbouring views is filled by what it is now.
+    """
+    chosen = decisions.keep(
+        "gaps between views that are filled",
+        lambda: choose_between_views(grid, frame, on_sensor, how.between_views, how.scene_distance),
+        lambda one, other: [gap > 0 for gap in one.gap_filled] == [gap > 0 for gap in other.gap_filled],
+    )
+    if not decisions.lasting or not any(chosen.gap_filled):
+        return chosen
+    views = np.array(grid.extent[::-1]) > 1
+    along = (on_sensor[:, :2] - on_sensor[:, 2:] @ chosen.motion) * views
+    horizontal, vertical = (float(extent) for extent in np.abs(along).sum(axis=1))
+    down, across = chosen.gap_filled
+    return replace(chosen, gap_filled=(vertical * (down > 0), horizontal * (across > 0)))
 
 
 def choose_between_views(

@@ -27,6 +27,8 @@ MEAN = 1
 """Powers of sinc that a mean over a cell has cost."""
 FREQUENCIES = 96
 """Frequencies at which a filter is fitted, from 0 to half a cycle a pixel."""
+OF_SERIES = 2
+"""Weights on each side of a filter of two terms of the series; a filter that is fitted has more."""
 DETAIL = 0.05
 """Cycles a pixel: below it filters are fitted evenly, above it less closely, as 1/ν²."""
 
@@ -60,19 +62,31 @@ def symmetric(wanted: Callable[[Array], Array], half: int) -> Array:
     return np.concatenate([side[::-1], [1 - 2 * side.sum()], side])
 
 
-def along_axis(losses: float, step: float, spline: bool = False) -> Array:
+def weights_beside(losses: float, step: float, spline: bool = False) -> int:
+    """How many weights a filter of `along_axis` has on each side of its middle: of a series, or of a fit."""
+    size = abs(step)
+    if size < 1e-3 or losses < 1e-9:
+        return 0
+    if spline:
+        return math.ceil(2 * size - 1e-9) + 3
+    return math.ceil(2 * size - 1e-9) + 2 if size > 1 else OF_SERIES
+
+
+def along_axis(losses: float, step: float, spline: bool = False, beside: int | None = None) -> Array:
     """The filter of a finished picture along one axis.
 
     Args:
         losses: powers of sinc that its samples have lost.
         step: pixels from one sample to the next, of any sign.
         spline: whether footprints are cubic B-splines, of which samples see [1, 4, 1]/6, rather than tents.
+        beside: weights on each side of the middle; None: as many as it takes (`weights_beside`).
 
     Returns:
         An odd number of weights of sum 1; a single one where nothing is lost.
     """
     size = abs(step)
-    if size < 1e-3 or losses < 1e-9:
+    half = weights_beside(losses, step, spline) if beside is None else beside
+    if half == 0:
         return np.ones(1)
     if spline:
 
@@ -80,9 +94,9 @@ def along_axis(losses: float, step: float, spline: bool = False) -> Array:
             return 3 / (2 + np.cos(2 * np.pi * size * frequency)) * gain(losses - TENT, size * frequency)
 
         # The spline's own inverse falls to 0.27 from sample to sample; two of them leave 7 % at worst, far up.
-        return symmetric(undone, math.ceil(2 * size - 1e-9) + 3)
-    if size > 1:  # weights that lie between pixels take some more of them
-        return symmetric(lambda frequency: gain(losses, size * frequency), math.ceil(2 * size - 1e-9) + 2)
+        return symmetric(undone, half)
+    if half != OF_SERIES:  # weights that lie between pixels take some more of them
+        return symmetric(lambda frequency: gain(losses, size * frequency), half)
     # The series in s of a step of one pixel, which x² = size²·(s + s²/3 + …) makes of that in x.
     first = losses / 6 * size**2
     second = losses / 18 * size**2 + (losses / 180 + losses**2 / 72) * size**4

@@ -63,7 +63,15 @@ class Kernel(abc.ABC):
         s, t = self.deflections(xi, eta)
         return np.stack([s, t], axis=-1), np.full(xi.size, 1.0 / xi.size)
 
-    def weights(self, steps_from_slopes: ArrayLike) -> Array:
+    def steps_beside(self, steps_from_slopes: ArrayLike) -> tuple[int, int]:
+        """(rows, columns) of a lattice that the kernel covers on each side of its middle; see `weights`."""
+        width, height = np.abs(np.asarray(steps_from_slopes)) @ np.array(self.reach)
+        half_width, half_height = (
+            int(np.ceil(min(steps, 1e9) - FULL_STEP)) if steps > 0 else 0 for steps in (width, height)
+        )
+        return half_height, half_width
+
+    def weights(self, steps_from_slopes: ArrayLike, beside: tuple[int, int] | None = None) -> Array:
         """The kernel on a lattice: what a convolution of samples that are interpolated linearly needs.
 
         Entry [dy, dx], counted from the middle, is ∫ D(δ) tent(dx − x) tent(dy − y) dδ with
@@ -73,6 +81,7 @@ class Kernel(abc.ABC):
 
         Args:
             steps_from_slopes: lattice steps per slope, 2×2: [[x/δs, x/δt], [y/δs, y/δt]].
+            beside: (b, a), rows and columns of the lattice on each side of its middle; None: `steps_beside`.
 
         Returns:
             Shape (2b+1, 2a+1), float64, wide enough for the whole kernel; right to about 1e-5 of their sum, and
@@ -84,10 +93,7 @@ class Kernel(abc.ABC):
                 steps.
         """
         matrix = checks.array("steps_from_slopes", steps_from_slopes, "a 2×2 matrix of numbers", 2, 2)
-        reach = np.array(self.reach)
-        half_width, half_height = (
-            int(np.ceil(min(steps, 1e9) - FULL_STEP)) if steps > 0 else 0 for steps in np.abs(matrix) @ reach
-        )
+        half_height, half_width = self.steps_beside(matrix) if beside is None else beside
         size = 2 * max(half_width, half_height) + 1
         if size > LARGEST_WEIGHTS:
             raise InputError(
@@ -99,7 +105,8 @@ class Kernel(abc.ABC):
             return closed
         if size > FINEST_LATTICE:
             factor = -(-size // FINEST_LATTICE)
-            return refined(self.weights(matrix / factor), factor)
+            coarse = None if beside is None else (-(-half_height // factor), -(-half_width // factor))
+            return refined(self.weights(matrix / factor, coarse), factor)
         slopes, shares = self.quadrature(min(max(8 * size, 512), 2048))
         return deposited(slopes @ matrix.T, shares, half_width, half_height)
 

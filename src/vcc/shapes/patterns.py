@@ -220,17 +220,19 @@ class Circle(Pattern):
         """Area of the circle left of x and above y."""
         radius = self.diameter / 2
         x, y = np.clip(x, -radius, radius), np.clip(y, -radius, radius)
-        reach = np.sqrt(radius**2 - y * y)  # |x| below which the line at y runs inside the circle
+        reach = np.sqrt(np.maximum(radius**2 - y * y, 0))  # |x| below which the line at y runs inside the circle
 
-        def area_below_arc(a: Array) -> Array:
-            # ∫₀ᵃ √(R² − x²) dx
-            return (a * np.sqrt(np.maximum(radius**2 - a * a, 0)) + radius**2 * np.arcsin(a / radius)) / 2
-
+        area_below_arc = self._below_arc
         inner = np.clip(x, -reach, reach)
         cut = y * (inner + reach) + area_below_arc(inner) - area_below_arc(-reach)
         full = area_below_arc(np.minimum(x, -reach)) - area_below_arc(np.asarray(-radius))
         full = full + np.where(x > reach, area_below_arc(x) - area_below_arc(reach), 0.0)
         return cut + np.where(y >= 0, 2 * full, 0.0)
+
+    def _below_arc(self, a: Array) -> Array:
+        """∫₀ᵃ √(R² − x²) dx."""
+        radius = self.diameter / 2
+        return np.asarray((a * np.sqrt(np.maximum(radius**2 - a * a, 0)) + radius**2 * np.arcsin(a / radius)) / 2)
 
 
 @dataclass(frozen=True)

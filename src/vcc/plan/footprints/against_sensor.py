@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.optics.sensor import Sensor
+from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.footprints.means import mean_over
 from vcc.plan.footprints.planes import Plane
 
 Array = NDArray[np.float64]
@@ -16,20 +18,21 @@ PARTS_OF_A_PIXEL = 4
 """Parts each way by which a mask against the sensor is looked at within pixels."""
 
 
-def transmission(sensor: Sensor, planes: list[Plane]) -> Array | None:
+def transmission(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANEW) -> Array | None:
     """The mean transmission over each pixel of what lies against the sensor."""
     if not planes:
         return None
     vertical, horizontal = sensor.sensitive_pitches
     total = np.ones(sensor.shape)
-    for plane in planes:
+    for n, plane in enumerate(planes):
         x = sensor.column_places - plane.decentre[0]
         y = sensor.row_places - plane.decentre[1]
-        total = total * plane.pattern.mean(x[None, :], y[:, None], horizontal, vertical)
+        its = decisions.of(f"mask {n + 1} against the sensor")
+        total = total * mean_over(plane.pattern, x[None, :], y[:, None], horizontal, vertical, its)
     return total
 
 
-def detail(sensor: Sensor, planes: list[Plane]) -> Array | None:
+def detail(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANEW) -> Array | None:
     """What the variation of a mask against the sensor within pixels does; see `vcc.plan.operators.OnSensor`.
 
     The mean of a product is not the product of the means. With the light in a pixel as its mean P, slope and
@@ -49,9 +52,10 @@ def detail(sensor: Sensor, planes: list[Plane]) -> Array | None:
     x = (sensor.column_places[:, None] + place * horizontal).reshape(1, -1)
     y = (sensor.row_places[:, None] + place * vertical).reshape(-1, 1)
     means = np.ones((y.size, x.size))
-    for plane in planes:
+    for n, plane in enumerate(planes):
         part = opening * horizontal / parts, opening * vertical / parts
-        means = means * plane.pattern.mean(x - plane.decentre[0], y - plane.decentre[1], *part)
+        its = decisions.of(f"mask {n + 1} against the sensor within pixels")
+        means = means * mean_over(plane.pattern, x - plane.decentre[0], y - plane.decentre[1], *part, its)
     blocks = means.reshape(rows, parts, columns, parts) / parts**2
 
     def moment(power_y: Array, power_x: Array) -> Array:
@@ -74,4 +78,5 @@ def detail(sensor: Sensor, planes: list[Plane]) -> Array | None:
     detail[2, 2] += twist / 4
     detail[0, 2] -= twist / 4
     detail[2, 0] -= twist / 4
-    return detail if np.abs(detail).max() > 1e-6 else None
+    there = decisions.keep("detail within pixels", lambda: bool(np.abs(detail).max() > 1e-6))
+    return detail if there else None

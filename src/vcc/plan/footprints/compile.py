@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +19,12 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid, Sample
 from vcc.optics.train import Stage, Train
+from vcc.plan.decisions import ANEW, Decisions, plan_again
 from vcc.plan.footprints import against_sensor as masks
 from vcc.plan.footprints.cells import divide_samples, divide_views, tap_places
 from vcc.plan.footprints.coverage import missing_rays
 from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
-from vcc.plan.footprints.mask_textures import mask_lookup
+from vcc.plan.footprints.mask_textures import ROUNDING, mask_lookup
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane, depends_on_view_only, open_parts, tap_origin
 from vcc.plan.footprints.shares import SMALLEST_STEP
@@ -29,8 +32,8 @@ from vcc.plan.footprints.words import coarse_textures, notes_of
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews, OnSensor, SwapPixelAxes
-from vcc.plan.parallax_rule import BetweenViews, choose_between_views
-from vcc.plan.sharpening import MEAN, TENT, across_plane, along_axis
+from vcc.plan.parallax_rule import BetweenViews, between_views_of
+from vcc.plan.sharpening import MEAN, TENT, across_plane, along_axis, weights_beside
 from vcc.shapes.patterns import Open
 
 Array = NDArray[np.float64]
@@ -43,11 +46,13 @@ FAR = 2**24
 """Pixels of the sensor and of what the filter of a sharp picture looks at around it, two samples on each side.
 Beyond that, where a sample is a thousand pixels wide, samples are interpolated by cubics and nothing is filtered:
 41 to 50 dB where sharp pictures have 43 to 45 and linear ones 33 to 39 (cosines of 5.5 samples)."""
+ROOM = 1.25
+"""By how much the gap between views may grow within decisions that are kept."""
 LARGEST_RASTER = 2**28
 """Pixels of the sensor and its margin: 1 GiB for each colour channel."""
 
 
-def blurs_or_why_not(train: Train, grid: Grid, how: How) -> Blurs | str:
+def blurs_or_why_not(train: Train, grid: Grid, how: How, decisions: Decisions = ANEW) -> Blurs | str:
     """What the diffusers come to where a picture can be made by footprints; else why it cannot, in words.
 
     The words name the element.
@@ -55,7 +60,7 @@ def blurs_or_why_not(train: Train, grid: Grid, how: How) -> Blurs | str:
     for stage in train.stages:
         if stage.faces.bending is not None:
             return f"{stage.element.label} bends rays by a function of position that is not affine"
-    blurs = diffusers_as_blurs(train, grid, how.interpolation == "sharp")
+    blurs = diffusers_as_blurs(train, grid, how.interpolation == "sharp", decisions)
     if isinstance(blurs, Blurs) and blurs.picture is not None:
         rows, columns = (n + m for n, m in zip(train.sensor.shape, blurs.picture.shape, strict=True))
         if rows * columns > LARGEST_RASTER:
@@ -63,7 +68,7 @@ def blurs_or_why_not(train: Train, grid: Grid, how: How) -> Blurs | str:
     return blurs
 
 
-def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs) -> Plan:
+def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisions = ANEW) -> Plan:
     """The plan by which footprints make the picture that an optical train makes of a light field.
 
     Args:
@@ -71,51 +76,72 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs) -> Plan
         grid: of the light field.
         how: what was chosen.
         blurs: what the diffusers come to (`blurs_or_why_not`).
+        decisions: where these are kept, the plan is made as the first one was.
 
     Raises:
-        InputError: a frame that the sensor cannot be reached by.
+        InputError: a frame that the sensor cannot be reached by, or decisions that no longer hold.
     """
     given = grid
     if blurs.views is not None:
         grid = grid.grown(*(n // 2 for n in blurs.views.shape))
     sharp, sensor = how.interpolation == "sharp", train.sensor
     at_sensor = train.arriving_at_sensor
-    frame, samples, swapped = _without_transposition(grid, at_sensor)
+    frame, samples, swapped = _without_transposition(grid, at_sensor, decisions)
     pixels_from_metres = sensor.frame.inverse()
     metres = (at_sensor @ frame).matrix[:2]
     on_sensor = pixels_from_metres.linear @ metres[:, :4]
     origin = pixels_from_metres(metres[:, 4])
-    step = _cleaned(on_sensor[:, 2:], samples)
+    step = _cleaned(on_sensor[:, 2:], samples, decisions)
 
-    between = choose_between_views(grid, frame, on_sensor, how.between_views, how.scene_distance)
-    planes, against_sensor = _absorbing_planes(train, frame, metres)
-    view_planes = [p for p in planes if depends_on_view_only(p, samples, between.motion)]
-    path_planes = [p for p in planes if p not in view_planes]
+    between = between_views_of(grid, frame, on_sensor, how, decisions)
+    planes, against_sensor = _absorbing_planes(train, frame, metres, decisions)
+    at_views = decisions.hold(
+        "which masks tell views apart only",
+        tuple(depends_on_view_only(plane, samples, between.motion) for plane in planes),
+    )
+    view_planes = [plane for plane, so in zip(planes, at_views, strict=True) if so]
+    path_planes = [plane for plane, so in zip(planes, at_views, strict=True) if not so]
 
-    division = divide_views(planes, path_planes, between, how.refine)
+    division = decisions.keep(
+        "parts of views' cells",
+        lambda: divide_views(planes, path_planes, between, how.refine),
+        lambda one, other: (one.parts, one.spread) == (other.parts, other.spread),
+    )
     divide = division.parts
-    fine = divide_samples(path_planes, between, grid.extent, how.refine)
+    fine = decisions.keep(
+        "parts of samples", lambda: divide_samples(path_planes, between, grid.extent, how.refine)
+    )
     rows, row_shift, row_share = tap_places(grid.shape[0], division)
     columns, column_shift, column_share = tap_places(grid.shape[1], division)
     index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
     shift = np.stack(np.broadcast_arrays(column_shift[None, :], row_shift[:, None]), axis=-1)
 
-    parts = open_parts(view_planes, index, shift, between.motion, samples, divide)
+    parts = open_parts(view_planes, index, shift, between.motion, samples, divide, decisions)
     weights = row_share[:, None] * column_share[None, :] * parts.weights
-    used_rows, used_columns = _used(weights)
+    used_rows, used_columns = _used(weights, decisions)
     keep = np.ix_(used_rows, used_columns)
     index, shift, weights, off_middle = index[keep], shift[keep], weights[keep], parts.middle[keep]
 
     tap = tap_origin(on_sensor, origin, index, shift, between.motion)
     points = grid.sample == "point" and fine == 1
     lookups = tuple(
-        mask_lookup(plane, index, shift + off_middle, between.motion, samples, divide, fine, not points)
-        for plane in path_planes
+        mask_lookup(
+            plane,
+            index,
+            shift + off_middle,
+            between.motion,
+            samples,
+            divide,
+            fine,
+            not points,
+            decisions.of(f"mask {n + 1} in mid-path"),
+        )
+        for n, plane in enumerate(path_planes)
     )
     missing, reason = missing_rays(view_planes, grid.shape, samples, weights, tap, step, sensor.shape)
     core = Footprints(
         raster_shape=sensor.shape,
-        interpolation=_sharp_footprint(step, fine) if sharp else how.interpolation,
+        interpolation=_sharp_footprint(step, fine, decisions) if sharp else how.interpolation,
         scale=grid.sample_volume / (sensor.pitches[0] * sensor.pitches[1]),
         view_rows=rows[used_rows],
         view_columns=columns[used_columns],
@@ -128,13 +154,13 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs) -> Plan
         refine=fine,
         opening=math.sqrt(sensor.fill_factor),
     )
-    sharpened = _Sharpened.of(core, grid.sample) if sharp else _Sharpened(core)
-    detail = masks.detail(sensor, against_sensor) if sharp else None
-    guard, after = _after(between, divide, blurs, sharpened, train, detail is not None)
+    sharpened = _Sharpened.of(core, grid.sample, decisions) if sharp else _Sharpened(core)
+    detail = masks.detail(sensor, against_sensor, decisions) if sharp else None
+    guard, after = _after(between, divide, blurs, sharpened, train, detail is not None, decisions)
     before: list[Before] = [] if blurs.views is None else [BlurViews(blurs.views)]
     if swapped:
         before.append(SwapPixelAxes())
-    transmission = masks.transmission(sensor, against_sensor)
+    transmission = masks.transmission(sensor, against_sensor, decisions)
     if guard or transmission is not None:
         after.append(OnSensor(guard, transmission, detail))
     notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, fine, swapped)
@@ -173,7 +199,7 @@ class _Sharpened:
         return 0 if self.plane is None else max(self.plane.shape) // 2
 
     @classmethod
-    def of(cls, core: Footprints, sample: Sample) -> _Sharpened:
+    def of(cls, core: Footprints, sample: Sample, decisions: Decisions) -> _Sharpened:
         """What gives back what linear interpolation takes.
 
         Where samples are divided because a mask is finer than they are, they are filtered as they are divided,
@@ -186,10 +212,17 @@ class _Sharpened:
         step = core.step / core.refine
         (xk, xl), (yk, yl) = step
         if not (xl or yk):
-            if math.prod(n + 4 * abs(size) for n, size in zip(core.raster_shape, (yl, xk), strict=True)) > FAR:
+            wide = math.prod(n + 4 * abs(size) for n, size in zip(core.raster_shape, (yl, xk), strict=True))
+            if decisions.keep("samples too wide to be sharpened", lambda: wide > FAR):
                 return cls(replace(core, interpolation="cubic"))
             spline = core.interpolation == "spline"
-            return cls(core, (along_axis(losses, yl, spline), along_axis(losses, xk, spline)))
+            beside = decisions.keep(
+                "weights of the filters that give sharpness back",
+                lambda: (weights_beside(losses, yl, spline), weights_beside(losses, xk, spline)),
+            )
+            return cls(
+                core, (along_axis(losses, yl, spline, beside[0]), along_axis(losses, xk, spline, beside[1]))
+            )
         # Light is spread along the samples' columns on the sensor, and across at fixed rows of pixels; a pixel's
         # mean is taken along the columns, too.
         shear = xl / yl
@@ -197,19 +230,28 @@ class _Sharpened:
         spread += [(1.0, core.opening * np.array([shear, 1.0])), (-1.0, core.opening * np.array([0.0, 1.0]))]
         if losses > TENT:
             spread += [(float(MEAN), step[:, 0]), (float(MEAN), step[:, 1])]
-        half = min(2 + math.ceil(2 * max(0.0, float(np.abs(step).max()) - 1)), LARGEST_SHEARED_FILTER)
+        half = decisions.keep(
+            "weights of the filter that gives sharpness back",
+            lambda: min(2 + math.ceil(2 * max(0.0, float(np.abs(step).max()) - 1)), LARGEST_SHEARED_FILTER),
+        )
         return cls(core, plane=across_plane(spread, half))
 
 
 def _after(
-    between: BetweenViews, divide: int, blurs: Blurs, sharpened: _Sharpened, train: Train, detail: bool
+    between: BetweenViews,
+    divide: int,
+    blurs: Blurs,
+    sharpened: _Sharpened,
+    train: Train,
+    detail: bool,
+    decisions: Decisions,
 ) -> tuple[int, list[After]]:
     """Pixels around the sensor that the filters look at, and the filters: gaps filled, diffusers, sharpness."""
     after: list[After] = []
-    guard, smear = _smear(between, divide)
+    guard, tents = _smear(between, divide, decisions)
     _check_raster(train.sensor.shape, guard)
-    if any(smear):
-        after.append(AlongAxes.tents(*smear))
+    if tents is not None:
+        after.append(tents)
     if blurs.picture is not None:
         guard += max(blurs.picture.shape) // 2
         after.append(Blur(blurs.picture, "picture blurred by a diffuser", scatters=True))
@@ -220,35 +262,45 @@ def _after(
     return guard + sharpened.reach + detail, after
 
 
-def _sharp_footprint(step: Array, fine: int) -> str:
+def _sharp_footprint(step: Array, fine: int, decisions: Decisions) -> str:
     """The footprint that is sharpened: a tent, which is quick; a spline where pixels would see a tent's bends."""
     parted = not (step[0, 1] or step[1, 0])
-    return "spline" if fine == 1 and parted and max(abs(step[0, 0]), abs(step[1, 1])) > FINER_PIXELS else "linear"
+    finer = max(abs(step[0, 0]), abs(step[1, 1])) > FINER_PIXELS
+    return decisions.keep("footprint of samples", lambda: "spline" if fine == 1 and parted and finer else "linear")
 
 
-def _without_transposition(grid: Grid, at_sensor: Affine) -> tuple[Affine, tuple[int, int], bool]:
+def _without_transposition(
+    grid: Grid, at_sensor: Affine, decisions: Decisions
+) -> tuple[Affine, tuple[int, int], bool]:
     """The frame with its pixel axes in the order in which rows of samples land on rows of the sensor."""
     frame, (nt, ns) = grid.frame, grid.shape[2:4]
     down = (at_sensor @ frame).linear[1]
-    if abs(down[3]) >= abs(down[2]):
+    swapped = decisions.keep("order of the axes of pixels", lambda: bool(abs(down[3]) < abs(down[2])))
+    if not swapped:
         return frame, (nt, ns), False
     exchange = Affine(np.eye(5)[[0, 1, 3, 2, 4]])
     return frame @ exchange, (ns, nt), True
 
 
-def _cleaned(step: Array, samples: tuple[int, int]) -> Array:
+def _cleaned(step: Array, samples: tuple[int, int], decisions: Decisions) -> Array:
     """Steps without cross terms that are rounding errors, and without zeros on the way to the pixels."""
     step = step.copy()
-    for row, column in ((0, 1), (1, 0)):
-        if abs(step[row, column]) * max(samples) < 1e-6:
-            step[row, column] = 0.0
+    crossing = np.abs(step[[0, 1], [1, 0]]) * max(samples)
+    straight = decisions.keep("steps across the sensor that are rounding", lambda: crossing < ROUNDING)
+    if (straight & (crossing >= ROUNDING)).any():
+        raise plan_again("rows of samples that land on rows of pixels")
+    step[[0, 1], [1, 0]] = np.where(straight, 0.0, step[[0, 1], [1, 0]])
     for axis in (0, 1):
-        if abs(step[axis, axis]) < SMALLEST_STEP:
+        if decisions.hold(
+            f"views that fall into points, axis {axis}", bool(abs(step[axis, axis]) < SMALLEST_STEP)
+        ):
             step[axis, axis] = np.copysign(SMALLEST_STEP, step[axis, axis])
     return step
 
 
-def _absorbing_planes(train: Train, frame: Affine, sensor_place: Array) -> tuple[list[Plane], list[Plane]]:
+def _absorbing_planes(
+    train: Train, frame: Affine, sensor_place: Array, decisions: Decisions
+) -> tuple[list[Plane], list[Plane]]:
     """What absorbs in mid-path, and what lies against the sensor (rewrite rule below).
 
     Rule: a mask whose every ray meets it where it meets the sensor multiplies the picture. Precondition:
@@ -269,8 +321,17 @@ def _absorbing_planes(train: Train, frame: Affine, sensor_place: Array) -> tuple
         # What stands in one plane is multiplied there, before anything is averaged.
         patterns = [(stage.faces.pattern, stage.element.decentre) for stage in stages]
         label = " and ".join(dict.fromkeys(stage.element.label for stage in stages))
-        plane = Plane.at(place, [(pattern, middle) for pattern, middle in patterns if pattern is not None], label)
+        plane = Plane.at(
+            place,
+            [(pattern, middle) for pattern, middle in patterns if pattern is not None],
+            label,
+            decisions.of(f"plane {len(in_path) + len(against_sensor) + 1} of masks"),
+        )
         (against_sensor if _same_place(place, sensor_place) else in_path).append(plane)
+    decisions.hold("which masks stand in one plane", tuple(len(stages) for _, stages in groups))
+    decisions.hold(
+        "which masks stand against the sensor", tuple(_same_place(place, sensor_place) for place, _ in groups)
+    )
     return in_path, against_sensor
 
 
@@ -278,17 +339,44 @@ def _same_place(one: Array, other: Array) -> bool:
     return np.allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
 
 
-def _used(weights: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    rows, columns = np.flatnonzero(weights.any(axis=1)), np.flatnonzero(weights.any(axis=0))
-    first = np.zeros(1, dtype=np.int64)
-    return (rows if rows.size else first), (columns if columns.size else first)
+def _used(weights: Array, decisions: Decisions) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows and columns of taps that give light; where decisions are kept, and one without on each side."""
+    found = []
+    for axis, along in enumerate(("rows", "columns")):
+        lit = weights.any(axis=1 - axis)
+        used = decisions.keep(f"{along} of taps", partial(_kept_taps, lit, decisions.lasting))
+        if np.delete(lit, used).any():
+            raise plan_again(f"{along} of views that give light")
+        found.append(used)
+    return found[0], found[1]
 
 
-def _smear(between: BetweenViews, divide: int) -> tuple[int, tuple[float, float]]:
-    """The tent that fills gaps between taps' pictures, and the margin from which it brings in light."""
-    vertical, horizontal = (gap / divide for gap in between.gap_filled)
-    smear = (vertical if vertical > 1 else 0.0, horizontal if horizontal > 1 else 0.0)
-    return (math.ceil(max(smear)) + 1 if any(smear) else 0), smear
+def _kept_taps(lit: Any, wider: bool) -> NDArray[np.int64]:
+    """Those that are lit, or the first where none is; and their neighbours."""
+    if not lit.any():
+        return np.arange(len(lit)) if wider else np.zeros(1, dtype=np.int64)
+    if wider:
+        lit = lit | np.append(lit[1:], False) | np.append(False, lit[:-1])
+    return np.flatnonzero(lit)
+
+
+def _smear(between: BetweenViews, divide: int, decisions: Decisions) -> tuple[int, AlongAxes | None]:
+    """The margin from which tents that fill gaps between taps' pictures bring in light, and the tents."""
+    gaps = [gap / divide for gap in between.gap_filled]
+    filled = decisions.keep("gaps that are wider than a pixel", lambda: [gap > 1 for gap in gaps])
+    if not any(filled):
+        return 0, None
+    smear = [gap if so else 0.0 for gap, so in zip(gaps, filled, strict=True)]
+    if not decisions.lasting:
+        return math.ceil(max(smear)) + 1, AlongAxes.tents(smear[0], smear[1])
+    down, across = decisions.keep(
+        "reach of the tents that fill gaps",
+        lambda: [math.ceil(ROOM * gap + 0.5) if gap > 0 else 0 for gap in smear],
+        lambda one, other: True,
+    )
+    if smear[0] > down + 0.5 or smear[1] > across + 0.5:
+        raise plan_again("gaps between views")
+    return max(down, across) + 1, AlongAxes.tents(smear[0], smear[1], (down, across))
 
 
 def _check_raster(sensor_shape: tuple[int, int], guard: int) -> None:

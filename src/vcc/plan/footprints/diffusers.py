@@ -18,6 +18,7 @@ Where neither holds, rays are traced.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,16 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.optics.train import Stage, Train
-from vcc.plan.sharpening import along_axis
+from vcc.plan.decisions import ANEW, Decisions, plan_again
+from vcc.plan.sharpening import along_axis, weights_beside
+from vcc.shapes.kernel_weights import axes_of
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.sheets import clear_over
 
 Array = NDArray[np.float64]
+
+ROOM = 1.25
+"""By how much a kernel may grow within decisions that are kept."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,17 +54,18 @@ class Blurs(Brief):
     notes: tuple[str, ...] = ()
 
 
-def diffusers_as_blurs(train: Train, grid: Grid, sharp: bool = True) -> Blurs | str:
+def diffusers_as_blurs(train: Train, grid: Grid, sharp: bool = True, decisions: Decisions = ANEW) -> Blurs | str:
     """The blurs by which the rules replace all diffusers of a camera, or why they do not.
 
     Args:
         train: with diffusers or without.
         grid: that it looks at.
         sharp: whether the tent by which a kernel is shared out on its lattice is given back.
+        decisions: by which kernels have their sizes.
     """
     picture: Array | None = None
     views: Array | None = None
-    notes = []
+    notes: list[str] = []
     for n, stage in enumerate(train.stages):
         if stage.faces.spread is None:
             continue
@@ -67,18 +74,21 @@ def diffusers_as_blurs(train: Train, grid: Grid, sharp: bool = True) -> Blurs | 
             return f"{label} scatters by a kernel that varies over its surface"
         kernel = stage.faces.spread.kernels[0]
         obstacle = behind(train, n, grid)
+        its = decisions.of(f"diffuser {len(notes) + 1}")
         try:
             if obstacle is None:
-                picture = _convolved(picture, _on_lattice(kernel, _pixels_from_slopes(train, n), sharp))
+                picture = _convolved(picture, _on_lattice(kernel, _pixels_from_slopes(train, n), sharp, its))
                 notes.append(
                     f"blur of the picture: {label}, since all behind it is affine and nothing there absorbs"
                 )
             elif meets_views_in_points(train, grid, n):
-                views = _convolved(views, _on_lattice(kernel, _samples_from_slopes(train, grid, n), sharp))
+                views = _convolved(views, _on_lattice(kernel, _samples_from_slopes(train, grid, n), sharp, its))
                 notes.append(f"blur of each view: {label}, since each view meets it in one place")
             else:
                 return f"{label} scatters, and {obstacle} behind it"
         except InputError:
+            if decisions.lasting:
+                raise
             return f"{label} scatters further than a blur can reach"
     return Blurs(picture, views, tuple(notes))
 
@@ -147,13 +157,13 @@ def _samples_from_slopes(train: Train, grid: Grid, n: int) -> Array:
     return np.asarray((train.stages[n].arriving @ grid.frame).inverse().linear[2:, 2:])
 
 
-def _on_lattice(kernel: Kernel, steps_from_slopes: Array, sharp: bool) -> Array:
+def _on_lattice(kernel: Kernel, steps_from_slopes: Array, sharp: bool, decisions: Decisions) -> Array:
     """A kernel's weights; ``sharp``, without what they spread by sharing out what falls between lattice points.
 
     Along an axis that adds E|δ| − E δ² steps² to the variance of a kernel narrower than a step, and 1/6 to that of
     a wide one, as much as sinc² takes.
     """
-    weights = kernel.weights(steps_from_slopes)
+    weights = kernel.weights(steps_from_slopes, _beside(kernel, steps_from_slopes, decisions))
     if not sharp:
         return weights
     slopes, shares = kernel.quadrature()
@@ -164,8 +174,29 @@ def _on_lattice(kernel: Kernel, steps_from_slopes: Array, sharp: bool) -> Array:
         along = weights.sum(axis=axis)
         step = np.arange(len(along)) - len(along) // 2
         added = along @ step**2 - (along @ step) ** 2 - wanted[axis]
-        filters.append(along_axis(min(max(12 * added, 0.0), 3.0), 1.0))
+        losses = min(max(12 * added, 0.0), 3.0)
+        beside = decisions.keep(f"filter along axis {axis}", partial(weights_beside, losses, 1.0))
+        filters.append(along_axis(losses, 1.0, beside=beside))
     return _convolved(weights, np.outer(filters[1], filters[0]))
+
+
+def _beside(kernel: Kernel, steps_from_slopes: Array, decisions: Decisions) -> tuple[int, int] | None:
+    """Room for a kernel that may grow; None where nothing has to follow it."""
+    if not decisions.lasting:
+        return None
+    decisions.hold("axes that the kernel lies along", axes_of(steps_from_slopes, kernel.reach))
+    needed = kernel.steps_beside(steps_from_slopes)
+    rows, columns = decisions.keep(
+        "reach of the kernel", lambda: kernel.steps_beside(ROOM * steps_from_slopes), _within_room
+    )
+    if needed[0] > rows or needed[1] > columns:
+        raise plan_again(f"reach of a kernel, {max(needed)} steps where there is room for {max(rows, columns)}")
+    return rows, columns
+
+
+def _within_room(one: tuple[int, int], other: tuple[int, int]) -> bool:
+    """Whether two sizes differ by less than the room that kernels have."""
+    return all(b <= ROOM * a + 1 and a <= ROOM * b + 1 for a, b in zip(one, other, strict=True))
 
 
 def _convolved(one: Array | None, other: Array) -> Array:

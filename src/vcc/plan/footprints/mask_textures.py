@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
+from vcc.base.values import content
+from vcc.plan.decisions import ANEW, Decisions, plan_again
+from vcc.plan.footprints.means import mean_over
 from vcc.plan.footprints.model import MaskLookup
 from vcc.plan.footprints.planes import Plane, tap_origin
 from vcc.plan.sharpening import symmetric
@@ -28,6 +33,36 @@ TEXTURE_FILTER = 5
 """Weights on each side of a texture's filter, beside those that the box of a sample takes."""
 AROUND = 2
 """Points of a texture around what is looked up: those of splines, and what the filter leaves beside an edge."""
+ROUNDING = 1e-6
+"""Points or pixels, over a whole view, that are rounding."""
+ROOM = 0.1
+"""By how much of what samples meet of a mask a texture that is kept reaches beyond it on each side."""
+COARSER = 1.5
+"""By how much the footprint of samples may change before another texture would be made."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Lattice(Brief):
+    """Where the points of a mask's texture stand, on the mask, and how long the filters are that make it.
+
+    Args:
+        first: numbers (x, y) of the first point; number 0 stands at the mask's middle.
+        last: of the last point.
+        spacing: (x, y) of the points, metres.
+        by_views: along (x, y), whether the box of a view's part is the wider one, that patterns are averaged over.
+        beside: weights of the filters along (x, y) on each side of their middles.
+    """
+
+    first: Array
+    last: Array
+    spacing: Array
+    by_views: NDArray[np.bool_]
+    beside: tuple[int, int]
+
+    def like(self, other: Lattice) -> bool:
+        """Whether one serves as well as the other."""
+        ratio = self.spacing / other.spacing
+        return bool(np.maximum(ratio, 1 / ratio).max() < COARSER)
 
 
 def mask_lookup(
@@ -39,7 +74,7 @@ def mask_lookup(
     divide: int,
     fine: int,
     over_samples: bool = True,
-    exact: bool = False,
+    decisions: Decisions = ANEW,
 ) -> MaskLookup:
     """The mask averaged over a sample's footprint, as a texture, and where each sample reads it.
 
@@ -53,28 +88,69 @@ def mask_lookup(
         fine: parts of a sample, each way.
         over_samples: whether to average over the sample's cell besides that of the view: samples that are points
             meet the mask in a point.
-        exact: whether the texture stays in double precision.
+        decisions: where these are kept, the texture stays in double precision, and its points where they are.
+
+    Raises:
+        InputError: samples that meet the mask beyond the points that were kept.
     """
     place = tap_origin(plane.at_index, plane.offset, index, shift, motion)
     view_part = np.abs(plane.view_step(motion)).sum(axis=1) / divide
     sample_part = np.abs(plane.sample_step).sum(axis=1) / fine * over_samples
     footprint = np.hypot(view_part, sample_part)
     bound = np.array(plane.pattern.size) / 2 + footprint
-    low, high = _region(place, plane.sample_step, samples, bound)
-    spacing = _spacing(footprint, np.minimum(2 * bound, high - low))
-    # Points lie on one lattice, whatever part of the mask is needed: pieces of a light field read the same.
-    first, last = np.floor(low / spacing) - AROUND, np.ceil(high / spacing) + AROUND
-    last = np.maximum(last, first + 2)
-    start = first * spacing
+    region = _region(place, plane.sample_step, samples, bound)
+    boxes = (view_part, sample_part)
+    lattice = _lattice(region, bound, boxes, decisions)
+    (column, row), spacing = lattice.first * lattice.spacing, lattice.spacing
+    texture = decisions.made(
+        "texture",
+        lambda: (content(plane.pattern), content(lattice), content(boxes)),
+        lambda: _texture(plane.pattern, lattice, boxes, decisions),
+    )
     return MaskLookup(
-        texture=_texture(
-            plane.pattern, (first, last), spacing, (view_part, sample_part), np.float64 if exact else np.float32
-        ),
-        column=(place[..., 0] - start[0]) / spacing[0],
-        row=(place[..., 1] - start[1]) / spacing[1],
-        step=_cleaned(plane.sample_step / spacing[:, None], samples),
+        texture=texture,
+        column=(place[..., 0] - column) / spacing[0],
+        row=(place[..., 1] - row) / spacing[1],
+        step=cleaned(plane.sample_step / spacing[:, None], samples, decisions),
         label=plane.label,
     )
+
+
+def _lattice(
+    region: tuple[Array, Array], bound: Array, boxes: tuple[Array, Array], decisions: Decisions
+) -> Lattice:
+    """The lattice for a region: one, whatever part of the mask is needed: pieces of a light field read alike.
+
+    Args:
+        region: lowest and highest (x, y) that are read, metres.
+        bound: half the size (x, y) of what there is to read.
+        boxes: sizes (x, y) over which patterns are averaged: of a view's part, and of a sample's.
+        decisions: the lattice is kept, with room around the region.
+    """
+
+    def ends(spacing: Array, low: Array, high: Array) -> tuple[Array, Array]:
+        first = np.floor(low / spacing) - AROUND
+        return first, np.maximum(np.ceil(high / spacing) + AROUND, first + 2)
+
+    def decided() -> Lattice:
+        low, high = region
+        room = ROOM * decisions.lasting
+        spacing = _spacing(np.hypot(*boxes), np.minimum(2 * bound, high - low))
+        low, high = (
+            np.maximum(low - room * (high - low), -(1 + room) * bound),
+            np.minimum(high + room * (high - low), (1 + room) * bound),
+        )
+        wider = boxes[0] >= boxes[1]
+        narrow = np.minimum(*boxes) * (1 + room) / spacing
+        beside = (TEXTURE_FILTER + math.ceil(narrow[0] / 2), TEXTURE_FILTER + math.ceil(narrow[1] / 2))
+        return Lattice(*ends(spacing, low, high), spacing, wider, beside)
+
+    lattice = decisions.keep("points of its texture", decided, Lattice.like)
+    if decisions.lasting:
+        first, last = ends(lattice.spacing, *region)
+        if (first < lattice.first).any() or (last > lattice.last).any():
+            raise plan_again("where samples meet a mask")
+    return lattice
 
 
 def _region(place: Array, step: Array, samples: tuple[int, int], bound: Array) -> tuple[Array, Array]:
@@ -100,11 +176,7 @@ def _spacing(footprint: Array, extent: Array) -> Array:
 
 
 def _texture(
-    pattern: Pattern,
-    ends: tuple[Array, Array],
-    spacing: Array,
-    boxes: tuple[Array, Array],
-    kind: type[np.floating],
+    pattern: Pattern, lattice: Lattice, boxes: tuple[Array, Array], decisions: Decisions
 ) -> NDArray[np.floating]:
     """Means of a pattern over two boxes, one after the other, at points of a lattice: (rows, columns).
 
@@ -112,32 +184,37 @@ def _texture(
 
     Args:
         pattern: of the mask.
-        ends: numbers (x, y) of the first and of the last point.
-        spacing: (x, y) of the points, metres.
-        boxes: their sizes (x, y), metres.
-        kind: of the texture's numbers.
+        lattice: its points.
+        boxes: sizes (x, y) of that of a view's part and of that of a sample's, metres.
+        decisions: where these are kept, in double precision.
     """
-    wide, narrow = np.maximum(*boxes), np.minimum(*boxes)
-    filters = [_filter(float(width)) for width in narrow / spacing]
+    wide, narrow = (np.where(lattice.by_views == views, *boxes) for views in (True, False))
+    filters = [
+        _filter(float(width), beside)
+        for width, beside in zip(narrow / lattice.spacing, lattice.beside, strict=True)
+    ]
     x, y = (
-        np.arange(first - len(weights) // 2, last + len(weights) // 2 + 1) * apart
-        for first, last, weights, apart in zip(*ends, filters, spacing, strict=True)
+        np.arange(first - beside, last + beside + 1) * apart
+        for first, last, beside, apart in zip(
+            lattice.first, lattice.last, lattice.beside, lattice.spacing, strict=True
+        )
     )
-    means = np.empty((y.size, x.size), dtype=kind)
-    for some in np.array_split(np.arange(y.size), -(-means.size // POINTS_AT_ONCE)):
-        means[some] = pattern.mean(x[None, :], y[some, None], float(wide[0]), float(wide[1]))
+    means = np.empty((y.size, x.size), dtype=np.float64 if decisions.lasting else np.float32)
+    across = x[None, :]
+    for n, some in enumerate(np.array_split(np.arange(y.size), -(-means.size // POINTS_AT_ONCE))):
+        part = decisions.of(f"part {n}")
+        means[some] = mean_over(pattern, across, y[some, None], float(wide[0]), float(wide[1]), part)
     return _filtered(means, filters)
 
 
-def _filter(box: float) -> Array:
+def _filter(box: float, beside: int) -> Array:
     """The filter of a texture along one axis: a mean over a box, and what looking it up by splines takes.
 
     Args:
         box: its width in points of the texture.
+        beside: weights on each side of its middle.
     """
-    return symmetric(
-        lambda frequency: np.sinc(box * frequency) * _given_back(frequency), TEXTURE_FILTER + math.ceil(box / 2)
-    )
+    return symmetric(lambda frequency: np.sinc(box * frequency) * _given_back(frequency), beside)
 
 
 def _given_back(frequency: Array) -> Array:
@@ -187,6 +264,16 @@ def texture_error(texture: NDArray[np.floating]) -> float:
     return math.sqrt(squares / 30240) / largest
 
 
-def _cleaned(step: Array, samples: tuple[int, int]) -> Array:
-    """Steps across the texture, in points from sample to sample, without what is rounding over a whole view."""
-    return np.where(np.abs(step) * max(samples) < 1e-6, 0.0, step)
+def cleaned(step: Array, samples: tuple[int, int], decisions: Decisions = ANEW) -> Array:
+    """Steps across a texture, in points from sample to sample, without what is rounding over a whole view.
+
+    Where decisions are kept only what leads from rows to columns and back is, for all else may begin to grow.
+    """
+    tiny = np.abs(step) * max(samples) < ROUNDING
+    if not decisions.lasting:
+        return np.where(tiny, 0.0, step)
+    crossing = ~np.eye(2, dtype=bool)
+    cleared = decisions.keep("steps that are rounding", lambda: tiny & crossing)
+    if (cleared & ~tiny).any():
+        raise plan_again("rows of samples that lie along rows of a mask")
+    return np.where(cleared, 0.0, step)

@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
+from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.footprints.means import mean_over
 from vcc.shapes.patterns import Cells, Pattern
 from vcc.shapes.sheets import in_one_plane
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-9
+"""Of a cell: less light is what areas that cancel leave, and its middle would jump about."""
 PARTS_OF_A_CELL = 6
 """Parts each way by which the open part of a view's cell is found."""
 
@@ -32,16 +36,24 @@ class Plane(Brief):
     offset: Array
 
     @classmethod
-    def at(cls, place: Array, patterns: list[tuple[Pattern, tuple[float, float]]], label: str) -> Plane:
+    def at(
+        cls,
+        place: Array,
+        patterns: list[tuple[Pattern, tuple[float, float]]],
+        label: str,
+        decisions: Decisions = ANEW,
+    ) -> Plane:
         """The plane of all patterns that samples meet in one place.
 
         Args:
             place: (x, y) in metres from index (i, j, k, l, 1), 2×5.
             patterns: each with the place of its middle, metres.
             label: what they are called.
+            decisions: by which the place is chosen from which all is counted.
         """
         # About their common middle where they have one, as each of them would be by itself.
-        decentre = patterns[0][1] if len({middle for _, middle in patterns}) == 1 else (0.0, 0.0)
+        common = decisions.keep("one middle", lambda: len({middle for _, middle in patterns}) == 1)
+        decentre = patterns[0][1] if common else (0.0, 0.0)
         pattern = in_one_plane([(one, (x - decentre[0], y - decentre[1])) for one, (x, y) in patterns])
         return cls(pattern, label, decentre, place[:, :4], place[:, 4] - np.array(decentre))
 
@@ -58,12 +70,18 @@ class Plane(Brief):
         return np.asarray(self.offset + self.sample_step @ np.array([(columns - 1) / 2, (rows - 1) / 2]))
 
     def view_weights(
-        self, index: Array, shift: Array, motion: Array, samples: tuple[int, int], divide: int = 1
+        self,
+        index: Array,
+        shift: Array,
+        motion: Array,
+        samples: tuple[int, int],
+        divide: int = 1,
+        decisions: Decisions = ANEW,
     ) -> Array:
         """The open share of each tap's cell, for a plane that tells views apart only; see `tap_origin`."""
         place = tap_origin(self.at_index, self.middle_of_view(samples), index, shift, motion)
         width, height = np.abs(self.view_step(motion)).sum(axis=1) / divide
-        return self.pattern.mean(place[..., 0], place[..., 1], float(width), float(height))
+        return mean_over(self.pattern, place[..., 0], place[..., 1], float(width), float(height), decisions)
 
     def view_step(self, motion: Array) -> Array:
         """2×2: metres moved here per view, a point of the scene being followed."""
@@ -102,7 +120,13 @@ class OpenParts(Brief):
 
 
 def open_parts(
-    planes: list[Plane], index: Array, shift: Array, motion: Array, samples: tuple[int, int], divide: int
+    planes: list[Plane],
+    index: Array,
+    shift: Array,
+    motion: Array,
+    samples: tuple[int, int],
+    divide: int,
+    decisions: Decisions = ANEW,
 ) -> OpenParts:
     """What of each tap's cell is open behind planes that tell views apart only; see `tap_origin`.
 
@@ -113,20 +137,23 @@ def open_parts(
     middle = np.zeros((*index.shape[:2], 2))
     if not planes:
         return OpenParts(weights, middle)
-    for plane in planes:
-        weights = weights * plane.view_weights(index, shift, motion, samples, divide)
+    for n, plane in enumerate(planes):
+        its = decisions.of(f"mask {n + 1} at the views")
+        weights = weights * plane.view_weights(index, shift, motion, samples, divide, its)
     part = ((np.arange(PARTS_OF_A_CELL) + 0.5) / PARTS_OF_A_CELL - 0.5) / divide
     inside = np.stack(np.meshgrid(part, part), axis=-1)
     shape = (*index.shape[:2], PARTS_OF_A_CELL, PARTS_OF_A_CELL, 2)
     index_of_parts = np.broadcast_to(index[:, :, None, None], shape)
     shift_of_parts = shift[:, :, None, None] + inside
     shares = np.ones(shape[:4])
-    for plane in planes:
+    for n, plane in enumerate(planes):
+        its = decisions.of(f"parts of mask {n + 1} at the views")
         shares = shares * plane.view_weights(
-            index_of_parts, shift_of_parts, motion, samples, divide * PARTS_OF_A_CELL
+            index_of_parts, shift_of_parts, motion, samples, divide * PARTS_OF_A_CELL, its
         )
     light = shares.sum(axis=(2, 3))
-    lit = light > 0
+    least = ROUNDING if decisions.lasting else 0.0
+    lit = decisions.keep("taps that are lit", lambda: light > least) & (light > least)
     middle[lit] = (shares[..., None] * inside).sum(axis=(2, 3))[lit] / light[lit][:, None]
     if len(planes) > 1:  # apart from each other: what both leave of a cell is not the product of their shares
         weights = shares.mean(axis=(2, 3))

@@ -16,16 +16,20 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.optics.deflections import CellDeflection, FacetDeflection
+from vcc.plan.decisions import ANEW, plan_again
 from vcc.plan.rays import cell_windows
-from vcc.plan.rays.path import Path
-from vcc.plan.rays.slack import Slack, strayed
-from vcc.plan.rays.strips import UNBOUNDED, windows
+from vcc.plan.rays.path import Leg, Path
+from vcc.plan.rays.slack import Slack, Slopes, largest_bend, strayed
+from vcc.plan.rays.strips import UNBOUNDED, window_of, windows, windows_by_strips
 from vcc.plan.rays.windows import Aim, CellWindows, Window
 
 Array = NDArray[np.float64]
 
 ROUNDS = 8
 """Plates deflect by where they are met, and are met by how they deflect: bounds are refined so often."""
+ROOM = 1.1
+"""By how much more what bends rays may bend them within decisions that are kept."""
 SETTLED = 0.01
 """Share of the slack by which it changes where no more rounds are needed."""
 WORTH_NARROWING = 0.7
@@ -34,13 +38,122 @@ WORTH_NARROWING = 0.7
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Aimed(Brief):
-    """An aim, and for each leg the region (low, high) in which rays that are aimed so meet its stage, metres."""
+    """An aim, and what it was found by.
+
+    Args:
+        aim: where to.
+        regions: for each leg (low, high) between which rays that are aimed so meet its stage, metres.
+        slack: by how much rays can stray, by which it was found.
+        everything: whether of all bounds (`vcc.plan.rays.strips.bounds`).
+    """
 
     aim: Aim
     regions: list[tuple[Array, Array]]
+    slack: Slack
+    everything: bool
+
+
+@dataclass(frozen=True)
+class KeptAim:
+    """What of an aim is decided; its numbers follow the optics.
+
+    Args:
+        everything: see `vcc.plan.rays.strips.bounds`.
+        bends: by how much each leg's stage bends rays at most, with room; None: as it does now.
+        strips: the two that cut out the window; None where cells have windows of their own.
+        towards: (number of the leg, words) of the bound that cells look at; None for a window.
+        reach: (rows, columns) of cells that are looked at on each side.
+        halvings: of the rays of a pixel.
+    """
+
+    everything: bool
+    bends: tuple[Slopes, ...]
+    strips: tuple[int, int] | None
+    towards: tuple[int, str] | None = None
+    reach: tuple[int, int] = (0, 0)
+    halvings: int = 0
+
+    def like(self, other: KeptAim) -> bool:
+        """Whether both aim at the same, by as many rays."""
+        return replace(self, bends=(), towards=None) == replace(other, bends=(), towards=None)
 
 
 def aimed(path: Path) -> tuple[Aimed, Aimed | None]:
+    """Where to aim, and what the camera asks for where that is more; as it was decided, where that is kept.
+
+    Raises:
+        InputError: nothing bounds the rays, or they leave what was kept.
+    """
+    if not path.decisions.lasting:
+        return found(path)
+    asked: list[Aimed | None] = []
+
+    def decided() -> KeptAim:
+        taken, more = found(replace(path, decisions=ANEW))
+        asked.append(more)
+        return _kept(path, taken)
+
+    kept = path.decisions.keep("aim of the rays", decided, KeptAim.like)
+    return _as_kept(path, kept), asked[0] if asked else None
+
+
+def _kept(path: Path, taken: Aimed) -> KeptAim:
+    """What of an aim that was found is to be kept."""
+    aim, anew = taken.aim, replace(path, decisions=ANEW)
+    largest = [largest_bend(leg, region) for leg, region in zip(path.legs, taken.regions, strict=True)]
+    bends = tuple(
+        None if most is None or _the_same_anywhere(leg) else (ROOM * most[0], ROOM * most[1])
+        for leg, most in zip(path.legs, largest, strict=True)
+    )
+    if isinstance(aim, CellWindows):
+        kept = KeptAim(taken.everything, bends, None, aim.towards, aim.reach, aim.halvings)
+        for _ in range(2):  # the cells that are seen by all that can stray, and may bend others
+            _, slack = strayed(anew, aim, bends)
+            wider = cell_windows.cell_windows_towards(anew, slack.whole, kept.everything, *aim.towards)
+            if wider is not None:
+                return replace(kept, bends=bends, reach=wider.reach)
+            bends = tuple(
+                None if room is None else most for room, most in zip(bends, largest, strict=True)
+            )  # more cells than are looked at one by one: no room
+        return kept
+    pair = next(
+        pair
+        for pair, window in windows_by_strips(anew, taken.slack.unknown, taken.everything)
+        if window.words == aim.words and window.solid_angle == aim.solid_angle
+    )
+    return KeptAim(taken.everything, bends, pair)
+
+
+def _the_same_anywhere(leg: Leg) -> bool:
+    """Whether what bends rays bends them by as much wherever they meet it, and needs no room."""
+    return isinstance(leg.stage.faces.bending, CellDeflection | FacetDeflection)
+
+
+def _as_kept(path: Path, kept: KeptAim) -> Aimed:
+    """The aim that was decided, as the optics are now."""
+    anew = replace(path, decisions=ANEW)
+    _, slack = strayed(path, _chosen(anew, Slack.none(path), kept), kept.bends)
+    aim = _chosen(path, slack, kept)
+    regions, _ = strayed(path, aim, kept.bends)
+    for leg, region, most in zip(path.legs, regions, kept.bends, strict=True):
+        now = largest_bend(leg, region)
+        if now is not None and most is not None and (now[0] > most[0] or now[1] > most[1]):
+            raise plan_again(f"how far rays stray (bent by {leg.stage.element.label})")
+    return Aimed(aim, regions, slack, kept.everything)
+
+
+def _chosen(path: Path, slack: Slack, kept: KeptAim) -> Aim:
+    """The window, or the windows of cells, that were decided on."""
+    if kept.strips is not None:
+        return window_of(path, slack.unknown, kept.everything, kept.strips)
+    assert kept.towards is not None
+    cells = cell_windows.cell_windows_towards(path, slack.whole, kept.everything, *kept.towards)
+    if cells is None or cells.reach[0] > kept.reach[0] or cells.reach[1] > kept.reach[1]:
+        raise plan_again("the cells that pixels see")
+    return replace(cells, reach=kept.reach, halvings=kept.halvings)
+
+
+def found(path: Path) -> tuple[Aimed, Aimed | None]:
     """Where to aim, and what the camera asks for where that is more.
 
     A camera asks for all rays that its stops let through. Of those, a light field holds what its views cover:
@@ -69,7 +182,7 @@ def settled(path: Path, everything: bool) -> Aimed:
     else:
         _refuse(path)
     aim = smallest(path, slack, everything)  # once more, with all that rays can stray by
-    return Aimed(aim, strayed(path, aim)[0])
+    return Aimed(aim, strayed(path, aim)[0], slack, everything)
 
 
 def _refuse(path: Path) -> NoReturn:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.optics.deflections import CellDeflection
 from vcc.optics.sensor import Sensor
+from vcc.plan.decisions import Decisions
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.strips import Bound, bounds
 from vcc.plan.rays.windows import CellOpening, CellWindows, Sight, Stop
@@ -39,9 +40,37 @@ def cell_windows(path: Path, slack: list[Array], everything: bool) -> CellWindow
     leg = _array(path)
     if leg is None:
         return None
-    beyond = [bound for bound in bounds(path, slack, everything) if bound.number > leg.number]
-    found = list(_towards(path, leg, [bound for bound in beyond if np.isfinite(bound.half).all()]))
+    found = list(_towards(path, leg, _beyond(path, leg, slack, everything)))
     return min(found, key=lambda windows: solid_angle(windows, path.train.sensor), default=None)
+
+
+def cell_windows_towards(
+    path: Path, slack: list[Array], everything: bool, number: int, words: str
+) -> CellWindows | None:
+    """The same towards one bound, whatever they are now.
+
+    Args:
+        path: from the sensor.
+        slack: see `cell_windows`.
+        everything: likewise.
+        number: of the bound's leg.
+        words: of the bound, where the light field has two.
+    """
+    leg = _array(path)
+    if leg is None:
+        return None
+    alike = [
+        bound
+        for bound in _beyond(path, leg, slack, everything)
+        if bound.number == number and (number < len(path.legs) or bound.words == words)
+    ]
+    return next(iter(_towards(path, leg, alike)), None)
+
+
+def _beyond(path: Path, leg: Leg, slack: list[Array], everything: bool) -> list[Bound]:
+    """What bounds rays beyond an array, along both axes."""
+    found = [bound for bound in bounds(path, slack, everything) if bound.number > leg.number]
+    return [bound for bound in found if np.isfinite(bound.half).all()]
 
 
 def _array(path: Path) -> Leg | None:
@@ -65,7 +94,7 @@ def _towards(path: Path, leg: Leg, beyond: list[Bound]) -> Iterator[CellWindows]
     bending, element = leg.stage.faces.bending, leg.stage.element
     assert isinstance(bending, CellDeflection)
     cells = replace(bending, lattice=_moved(bending.lattice, element.decentre))
-    opening = _opening(leg.stage.faces.pattern, bending.lattice)
+    opening = _opening(leg.stage.faces.pattern, bending.lattice, path.decisions)
     for bound in beyond:
         way = bound.from_sensor @ leg.from_sensor.inverse()
         sight = None if _mixed(way) else _sight(leg.from_sensor, way, bound.axes)
@@ -77,7 +106,7 @@ def _towards(path: Path, leg: Leg, beyond: list[Bound]) -> Iterator[CellWindows]
         reach = _reach(cells, opening, sight, stop, path.pixel)
         if (2 * reach[0] + 1) * (2 * reach[1] + 1) <= MOST_CELLS:
             words = f"{bound.words} through each cell of {element.label}"
-            yield CellWindows(cells, opening, sight, stop, reach, words)
+            yield CellWindows(cells, opening, sight, stop, reach, words, towards=(bound.number, bound.words))
 
 
 def _moved(lattice: Lattice, decentre: tuple[float, float]) -> Lattice:
@@ -85,12 +114,12 @@ def _moved(lattice: Lattice, decentre: tuple[float, float]) -> Lattice:
     return replace(lattice, offset=(lattice.offset[0] + decentre[0], lattice.offset[1] + decentre[1]))
 
 
-def _opening(pattern: Pattern | None, lattice: Lattice) -> CellOpening:
+def _opening(pattern: Pattern | None, lattice: Lattice, decisions: Decisions) -> CellOpening:
     """What of a lattice's cells is open: whole cells, where nothing stands before them."""
     apertures = _apertures(pattern, lattice)
     radius = apertures.scale * lattice.pitch / 2 if apertures.circular else math.inf
     half = np.array(lattice.reach) * (1 if apertures.circular else apertures.scale)
-    return CellOpening(np.minimum(half, radius), _borders(apertures), radius)
+    return CellOpening(np.minimum(half, radius), _borders(apertures, decisions), radius)
 
 
 def _apertures(pattern: Pattern | None, lattice: Lattice) -> CellApertures:
@@ -101,7 +130,7 @@ def _apertures(pattern: Pattern | None, lattice: Lattice) -> CellApertures:
     return CellApertures(lattice)
 
 
-def _borders(apertures: CellApertures) -> Array:
+def _borders(apertures: CellApertures, decisions: Decisions) -> Array:
     """The strips that cut out an opening in the shape of its cell; see `CellOpening.borders`."""
     if apertures.circular:
         return np.zeros((0, 2))
@@ -109,6 +138,9 @@ def _borders(apertures: CellApertures) -> Array:
     across = apertures.lattice.rotation + np.arange(sides) * math.pi / sides  # to the sides, from the centre
     x, y = np.cos(across), np.sin(across)
     bounding = np.abs(y) > 1e-9  # others are the rectangle's own sides
+    decisions.hold(
+        "sides of cells that lie along the axes (which those of an array that is turned never do)", bounding
+    )
     half = apertures.scale * apertures.lattice.pitch / 2
     return np.stack([-x[bounding] / y[bounding], half / np.abs(y[bounding])], axis=-1)
 

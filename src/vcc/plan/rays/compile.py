@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.units import short
+from vcc.base.values import content
 from vcc.fields.grid import Grid
 from vcc.optics.deflections import CellDeflection, FacetDeflection
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.train import Stage, Train
+from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.operators import Before, SharpenViews
@@ -25,10 +28,19 @@ from vcc.plan.rays.beam import footprint
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.points import table
-from vcc.plan.rays.textures import COARSE_SIZES, POINTS_PER_FOOTPRINT, SIZES, WORTH_SAYING, means_around, textured
+from vcc.plan.rays.textures import (
+    COARSE_SIZES,
+    POINTS_PER_FOOTPRINT,
+    SIZES,
+    WORTH_SAYING,
+    Sampled,
+    means_around,
+    textured,
+)
 from vcc.plan.rays.windows import Aim, Window
 from vcc.shapes.lattice import CellApertures, CellBlock
-from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
+from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern, Polygon
+from vcc.shapes.polygon_areas import polygon_mean
 from vcc.shapes.sheets import Product
 
 Array = NDArray[np.float64]
@@ -39,7 +51,9 @@ ASKING_PIXELS, ASKING_RAYS = 16, 2**16
 right to 1/2√n, 0.2 %, or better."""
 
 
-def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") -> Plan:
+def compile_rays(
+    train: Train, grid: Grid, how: How, reason: str = "asked for", decisions: Decisions = ANEW
+) -> Plan:
     """The plan by which rays make the picture that an optical train makes of a light field.
 
     Args:
@@ -52,8 +66,10 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         InputError: an element that returns what it must not (named), or optics through which no bound on the rays
             can be found.
     """
-    motion, followed = _motion(grid, how)
-    path = Path(train, grid, motion, how.rays_a_pixel or DEFAULT_SAMPLES)
+    motion, followed = decisions.keep(
+        "parallax along which views are interpolated", lambda: _motion(grid, how), lambda one, other: True
+    )
+    path = Path(train, grid, motion, how.rays_a_pixel or DEFAULT_SAMPLES, decisions)
     taken, asked = aimed(path)
     notes = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {taken.aim.words}"]
     core = _core(path, taken, how, notes)
@@ -67,11 +83,16 @@ def compile_rays(train: Train, grid: Grid, how: How, reason: str = "asked for") 
         cautions=tuple(_cautions(train)),
         notes=tuple(notes),
     )
-    if asked is None:
-        return plan
-    missing = _missing(core, path, asked)
-    more = f"the camera asks for light from {asked.aim.words}, of which the light field lacks {missing:.1%}"
-    return replace(plan, missing_rays=missing, notes=(*plan.notes, more))
+
+    def lacking() -> tuple[float, str] | None:
+        if asked is None:
+            return None
+        missing = _missing(core, replace(path, decisions=ANEW), asked)
+        words = f"the camera asks for light from {asked.aim.words}, of which the light field lacks {missing:.1%}"
+        return missing, words
+
+    more = decisions.keep("rays that are missing", lacking, lambda one, other: (one is None) == (other is None))
+    return plan if more is None else replace(plan, missing_rays=more[0], notes=(*plan.notes, more[1]))
 
 
 def _core(path: Path, taken: Aimed, how: How, notes: list[str]) -> Rays:
@@ -81,6 +102,7 @@ def _core(path: Path, taken: Aimed, how: How, notes: list[str]) -> Rays:
     first = sensor.frame(np.zeros((1, 2)))[0]
     wide, high = path.pixel.tolist()
     made, index_from_ray = _steps(path, taken, notes)
+    kind = np.float64 if path.decisions.lasting else np.float32
     nv, nu, nt, ns = path.grid.shape[:4]
     return Rays(
         raster_shape=sensor.shape,
@@ -96,7 +118,11 @@ def _core(path: Path, taken: Aimed, how: How, notes: list[str]) -> Rays:
         scale=1.0,
         samples=path.samples >> taken.aim.halvings,
         seed=how.seed,
-        points=table(how.seed, path.scatters, taken.aim.on_disc),
+        points=path.decisions.made(
+            "points of the rays",
+            lambda: (how.seed, content(path.scatters), taken.aim.on_disc),
+            partial(table, how.seed, path.scatters, taken.aim.on_disc, kind),
+        ),
         views_may_end=path.stop_at_views,
     )
 
@@ -160,6 +186,8 @@ class _Met:
         index_from_slope: (4, 2), by how many samples of the light field a ray moves for a slope there; None where
             that is not known.
         sizes: points a side of textures for masks, and for bends.
+        passes: lowest and highest (x, y) of what passes in its plane, metres.
+        decisions: about it.
     """
 
     stage: Stage
@@ -167,6 +195,8 @@ class _Met:
     footprint: Array | None
     index_from_slope: Array | None
     sizes: tuple[tuple[int, ...], tuple[int, ...]]
+    passes: tuple[Array, Array]
+    decisions: Decisions
 
     @property
     def label(self) -> str:
@@ -184,10 +214,13 @@ def _steps(path: Path, taken: Aimed, notes: list[str], coarse: bool = False) -> 
     for leg, region in zip(path.legs, taken.regions, strict=True):
         pending = leg.undone @ pending
         stage, faces = leg.stage, leg.stage.faces
-        met = _Met(stage, region, footprint(path, taken.aim, leg), path.index_from_slope(leg), sizes)
+        its = path.decisions.of(f"element {len(path.legs) - leg.number} from the front")
+        onward = path.index_from_slope(leg)
+        met = _Met(stage, region, footprint(path, taken.aim, leg), onward, sizes, leg.stop, its)
         here: list[steps.Step] = []
         with stage.named():
-            if faces.pattern is not None and not _is_aimed_at(taken.aim, leg):
+            at = its.hold("whether rays are aimed at it", _is_aimed_at(taken.aim, leg))
+            if faces.pattern is not None and not at:
                 here += _transmission(faces.pattern, met, notes)
             if faces.bending is not None:
                 here.append(_deflection(met, notes))
@@ -239,25 +272,30 @@ def _transmission(pattern: Pattern, met: _Met, notes: list[str]) -> list[steps.S
             pattern.middle[0] + decentre[0] - size[0] * columns / 2,
             pattern.middle[1] + decentre[1] - size[1] * rows / 2,
         )
-        return [steps.CellShares(pattern.values.astype(np.float32), corner, size, label)]
+        kind = np.float64 if met.decisions.lasting else np.float32
+        return [steps.CellShares(pattern.values.astype(kind), corner, size, label)]
     if isinstance(pattern, CosineSum):
         across, down = (2 * math.pi / period for period in pattern.periods)
         return [steps.Cosines(decentre, (across, down), pattern.phase, pattern.harmonics, label)]
 
-    def sampled(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
-        return means_around(pattern, x - decentre[0], y - decentre[1], spacing)[..., None]
+    def means(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
+        if its.lasting and isinstance(pattern, Polygon):
+            return polygon_mean(pattern, x, y, *spacing)[..., None]
+        return means_around(pattern, x, y, spacing)[..., None]
 
     def itself(x: Array, y: Array) -> Array:
-        return np.asarray(pattern(x - decentre[0], y - decentre[1]))[..., None]
+        return np.asarray(pattern(x, y))[..., None]
 
+    its = met.decisions.of("mask")
     enough = None if met.footprint is None else met.footprint / POINTS_PER_FOOTPRINT
-    texture, error = textured(sampled, met.region, met.sizes[0], itself=itself, spacing_enough=enough)
+    sampled = Sampled(means, decentre, met.region, met.passes, pattern, itself)
+    texture, error = textured(sampled, met.sizes[0], decisions=its, spacing_enough=enough)
     if error > WORTH_SAYING:
         note = f"{label} is finer than its texture shows: {error:.1%} root mean square of its largest value"
         if met.footprint is not None:
             note += f", of which a pixel averages {min(met.footprint / texture.spacing):.0f} points across or more"
         notes.append(note)
-    single = replace(texture, values=texture.values.astype(np.float32))
+    single = texture if its.lasting else replace(texture, values=texture.values.astype(np.float32))
     return [steps.TextureShares(single, label)]
 
 
@@ -269,11 +307,14 @@ def _deflection(met: _Met, notes: list[str]) -> steps.Step:
     if isinstance(bending, FacetDeflection):
         return steps.FacetsUnbend(bending.directions, bending.slopes, decentre, label)
 
-    def sampled(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
-        s, t = bending(x - decentre[0], y - decentre[1])
+    def slopes(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
+        s, t = bending(x, y)
         return np.stack(np.broadcast_arrays(s, t), axis=-1)
 
-    texture, error = textured(sampled, met.region, met.sizes[1], index_from_value=met.index_from_slope)
+    sampled = Sampled(slopes, decentre, met.region, met.passes, bending)
+    texture, error = textured(
+        sampled, met.sizes[1], decisions=met.decisions.of("bend"), index_from_value=met.index_from_slope
+    )
     if error > WORTH_SAYING:
         notes.append(
             f"{label} bends by a texture of {texture.values.shape[0]}² points, {error:.1%} root mean square of "
@@ -287,15 +328,15 @@ def _scatter(scatter: Scatter, column: int, met: _Met) -> steps.Unscatter:
     kernels = len(scatter.kernels)
     cumulative = width = None
     if scatter.weights is not None:
-        shares = _sheet(scatter.weights, met)
+        shares = _sheet(scatter.weights, met, "shares of kernels")
         cumulative = replace(shares, values=np.cumsum(shares.values, axis=-1))
     if scatter.width is not None:
-        width = _sheet(scatter.width, met)
+        width = _sheet(scatter.width, met, "widths of kernels")
     pick = column + 2 * kernels if cumulative is not None else -1
     return steps.Unscatter(column, kernels, pick, cumulative, width, met.label)
 
 
-def _sheet(given: object, met: _Met) -> steps.Texture:
+def _sheet(given: object, met: _Met, what: str) -> steps.Texture:
     """A map over a sheet as a texture: as it is where it is one, else sampled."""
     decentre = met.stage.element.decentre
     if isinstance(given, SheetMap):
@@ -306,14 +347,15 @@ def _sheet(given: object, met: _Met) -> steps.Texture:
             decentre[0] - given.width / 2 + spacing[0] / 2,
             decentre[1] - given.height / 2 + spacing[1] / 2,
         )
-        return steps.Texture(values.astype(np.float32), start, spacing)
+        return steps.Texture(values.astype(np.float64 if met.decisions.lasting else np.float32), start, spacing)
 
-    def sampled(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
-        values = np.asarray(given(x - decentre[0], y - decentre[1]))  # type: ignore[operator]
+    def numbers(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
+        values = np.asarray(given(x, y))  # type: ignore[operator]
         shape = np.broadcast_shapes(x.shape, y.shape)
         return values[..., None] if values.shape == shape else values
 
-    return textured(sampled, met.region, met.sizes[1])[0]
+    sampled = Sampled(numbers, decentre, met.region, met.passes, given)
+    return textured(sampled, met.sizes[1], decisions=met.decisions.of(what))[0]
 
 
 # --- between views ---

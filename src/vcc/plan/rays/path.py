@@ -13,6 +13,7 @@ from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
+from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.rays.points import FIRST_COLUMNS, columns_of
 
 Array = NDArray[np.float64]
@@ -54,17 +55,19 @@ class Path(Brief):
         grid: that they end in.
         motion: 2×2, along which they are interpolated between views (`Rays.motion`).
         samples: rays a pixel.
+        decisions: where these are kept, what bounds the rays is.
     """
 
     train: Train
     grid: Grid
     motion: Array
     samples: int
+    decisions: Decisions = ANEW
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
         """The stages as rays meet them, the last one of the train first."""
-        stages, stops = self.train.stages, _stops(self.train.stages)
+        stages, stops = self.train.stages, _stops(self.train.stages, self.decisions)
         undone, entrance_from_sensor = self.train.approach_to_sensor.inverse(), self._entrance_from_sensor
         legs: list[Leg] = []
         column = FIRST_COLUMNS
@@ -133,7 +136,8 @@ class Path(Brief):
     @cached_property
     def stop_at_views(self) -> bool:
         """Whether a stop stands where each view is a point, so that it says which views are wanted."""
-        return any(leg.bounds_rays and self._tells_views_apart(leg) for leg in self.legs)
+        there = any(leg.bounds_rays and self._tells_views_apart(leg) for leg in self.legs)
+        return self.decisions.hold("a stop at the views", there)
 
     def _tells_views_apart(self, leg: Leg) -> bool:
         """Whether all rays of a view meet a leg in one place, but for rounding."""
@@ -155,10 +159,12 @@ def _undone(stage: Stage) -> Affine:
     return approach if stage.centred is None else approach @ stage.centred.inverse()
 
 
-def _stops(stages: tuple[Stage, ...]) -> list[tuple[Array, Array]]:
+def _stops(stages: tuple[Stage, ...], decisions: Decisions) -> list[tuple[Array, Array]]:
     """For each stage what passes in its plane: bounded by all that stands in that plane."""
     stops = [_own_stop(stage) for stage in stages]
     same = [n for n, stage in enumerate(stages) if n and np.array_equal(stage.approach.matrix, np.eye(5))]
+    if any(faces.pattern is not None for faces in (stages[m].faces for n in same for m in (n - 1, n))):
+        decisions.hold("which stops stand in one plane", same)
     for n in [*same, *reversed(same)]:  # forwards, then backwards
         low = np.maximum(stops[n][0], stops[n - 1][0])
         high = np.minimum(stops[n][1], stops[n - 1][1])

@@ -25,13 +25,16 @@ def columns_of(scatter: Scatter) -> int:
     return 2 * len(scatter.kernels) + (scatter.weights is not None)
 
 
-def table(seed: int, scatters: Sequence[Scatter], disc: bool) -> NDArray[np.float32]:
+def table(
+    seed: int, scatters: Sequence[Scatter], disc: bool, kind: type[np.floating] = np.float32
+) -> NDArray[np.floating]:
     """The points that all pixels share; see `vcc.plan.rays.model.Rays.points`.
 
     Args:
         seed: of their scrambling.
         scatters: the diffusers, the one nearest to the sensor first.
         disc: whether rays are aimed at a disc.
+        kind: of the numbers of diffusers; a table without any is in single precision.
     """
     dimensions = FIRST_COLUMNS + sum(2 + (scatter.weights is not None) for scatter in scatters)
     first = _first_columns(dimensions, seed, disc)
@@ -48,7 +51,7 @@ def table(seed: int, scatters: Sequence[Scatter], disc: bool) -> NDArray[np.floa
         if scatter.weights is not None:
             columns.append(even[:, next_one])
             next_one += 1
-    return np.stack([column.astype(np.float32) for column in columns], axis=1)
+    return np.stack([column.astype(kind) for column in columns], axis=1)
 
 
 @lru_cache(maxsize=4)

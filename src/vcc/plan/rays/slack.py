@@ -6,6 +6,7 @@ region that grows with all that lies behind it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.windows import Aim
 
 Array = NDArray[np.float64]
+Slopes = tuple[float, float] | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,8 +47,17 @@ class Slack(Brief):
         return sum(float(np.abs(part).sum()) for part in self.whole)
 
 
-def strayed(path: Path, aim: Aim) -> tuple[list[tuple[Array, Array]], Slack]:
-    """Where rays that are aimed so meet each leg's stage, (low, high) in metres, and how far they can stray."""
+def strayed(
+    path: Path, aim: Aim, bends: Sequence[Slopes] | None = None
+) -> tuple[list[tuple[Array, Array]], Slack]:
+    """Where rays that are aimed so meet each leg's stage, (low, high) in metres, and how far they can stray.
+
+    Args:
+        path: from the sensor.
+        aim: where rays are aimed.
+        bends: by how much each leg's stage changes slopes at most; None, for all or for one: as it
+            does where it is met.
+    """
     beam = beam_towards(path, aim)
     unknown = replace(beam, loose=np.zeros((4, 0)))
     regions: list[tuple[Array, Array]] = []
@@ -56,7 +67,10 @@ def strayed(path: Path, aim: Aim) -> tuple[list[tuple[Array, Array]], Slack]:
         slack.whole.append(beam.loose)
         slack.unknown.append(unknown.loose)
         regions.append(_met(beam, leg))
-        beam, unknown = _bent(beam, unknown, leg, regions[-1])
+        kept = None if bends is None else bends[leg.number]
+        most = largest_bend(leg, regions[-1]) if kept is None else kept
+        if most is not None:
+            beam, unknown = beam.loosened(most), unknown.loosened(most)
         beam, unknown = _scattered(beam, unknown, leg)
     slack.whole.append(beam.moved(path.entrance_from_last).loose)
     slack.unknown.append(unknown.moved(path.entrance_from_last).loose)
@@ -70,15 +84,17 @@ def _met(beam: Beam, leg: Leg) -> tuple[Array, Array]:
     return low, np.maximum(high, low)
 
 
-def _bent(beam: Beam, unknown: Beam, leg: Leg, region: tuple[Array, Array]) -> tuple[Beam, Beam]:
-    """The beam before what bends it. What varies over the surface cannot be made up for by the aim."""
+def largest_bend(leg: Leg, region: tuple[Array, Array]) -> Slopes:
+    """By how much (|δs|, |δt|) a leg's stage bends rays at most that meet it in a region; None where it does not.
+
+    What varies over the surface cannot be made up for by the aim.
+    """
     bending, middle = leg.stage.faces.bending, leg.stage.element.decentre
     if bending is None:
-        return beam, unknown
+        return None
     reach = np.maximum(*(np.abs(corner - middle) for corner in region))
     with leg.stage.named():
-        largest = bending.largest(float(reach[0]), float(reach[1]))
-    return beam.loosened(largest), unknown.loosened(largest)
+        return bending.largest(float(reach[0]), float(reach[1]))
 
 
 def _scattered(beam: Beam, unknown: Beam, leg: Leg) -> tuple[Beam, Beam]:

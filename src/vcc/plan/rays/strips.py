@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
+from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.windows import Window
 from vcc.shapes.patterns import Circle
 
 Array = NDArray[np.float64]
+Pair = tuple[int, int]
 
 GRID_OF_VIEWS, PICTURES = "the grid of views", "the views' pictures"
 """What the light field bounds rays by: its indices (i, j), and (k, l)."""
@@ -42,6 +44,7 @@ class Bound(Brief):
         loose: by how much rays can stray there from where affine optics lead.
         circle: whether it is a round hole.
         words: what it is.
+        decisions: where these are kept, what a hole is taken for when it is widened is.
     """
 
     number: int
@@ -52,6 +55,7 @@ class Bound(Brief):
     loose: Array
     circle: bool
     words: str
+    decisions: Decisions = ANEW
 
     def widened(self, known: Array | float = 0.0) -> tuple[Array, bool]:
         """Half the size by which rays are bound, straying included, and whether that is a disc.
@@ -65,7 +69,8 @@ class Bound(Brief):
         loose = self.loose - known
         if self.circle:
             radius = self.half + np.linalg.norm(loose)
-            if np.pi * np.prod(radius) < 4 * np.prod(self.half + loose):
+            smaller = bool(np.pi * np.prod(radius) < 4 * np.prod(self.half + loose))
+            if self.decisions.keep(f"stop {self.number} taken for round", lambda: smaller):
                 return radius, True
         return self.half + loose, False
 
@@ -117,7 +122,7 @@ def bounds(path: Path, slack: list[Array], everything: bool) -> list[Bound]:
         slack: how far rays can stray, see `vcc.plan.rays.slack.Slack`.
         everything: the views' pictures too, and the grid of views anyway.
     """
-    found = [_stop(leg, slack[leg.number]) for leg in path.legs]
+    found = [_stop(leg, slack[leg.number], path.decisions) for leg in path.legs]
     if everything or not path.stop_at_views:
         found.append(_of_light_field(path, slack, slice(0, 2), GRID_OF_VIEWS))
     if everything:
@@ -130,7 +135,7 @@ def pictures(path: Path, slack: list[Array]) -> Bound:
     return _of_light_field(path, slack, slice(2, 4), PICTURES)
 
 
-def _stop(leg: Leg, slack: Array) -> Bound:
+def _stop(leg: Leg, slack: Array, decisions: Decisions) -> Bound:
     pattern, (low, high) = leg.stage.faces.pattern, leg.stop
     half = np.asarray((high - low) / 2)
     circle = isinstance(pattern, Circle) and np.allclose(half, pattern.diameter / 2, rtol=1e-12, atol=0)
@@ -141,8 +146,9 @@ def _stop(leg: Leg, slack: Array) -> Bound:
         middle=np.add(low, high, out=np.zeros(2), where=np.isfinite(half)) / 2,  # of no meaning where unbounded
         half=half,
         loose=np.abs(slack[:2]).sum(axis=1),
-        circle=circle,
+        circle=decisions.hold(f"stop {leg.number} is round", bool(circle)),
         words=leg.stage.element.label,
+        decisions=decisions,
     )
 
 
@@ -170,23 +176,37 @@ def windows(path: Path, slack: list[Array], everything: bool) -> list[Window]:
         slack: how far rays can stray, but for what windows make up for.
         everything: see `bounds`.
     """
+    return [window for _, window in windows_by_strips(path, slack, everything)]
+
+
+def windows_by_strips(path: Path, slack: list[Array], everything: bool) -> list[tuple[Pair, Window]]:
+    """The same, each with the numbers of the two strips that cut it out, of those that `window_of` knows."""
     strips = [strip for bound in bounds(path, slack, everything) for strip in bound.strips()]
     found = list(_cut_out(path, strips))
     return found or list(_cut_out(path, [*strips, *pictures(path, slack).strips()]))
 
 
-def _cut_out(path: Path, strips: list[Strip]) -> Iterator[Window]:
-    for pair in itertools.combinations([strip for strip in strips if strip.bounds_slopes], 2):
-        rows = np.stack([strip.from_sensor for strip in pair])
+def window_of(path: Path, slack: list[Array], everything: bool, pair: Pair) -> Window:
+    """The window that two strips cut out, whatever it is now, by the numbers that `windows_by_strips` gave."""
+    strips = [strip for bound in bounds(path, slack, everything) for strip in bound.strips()]
+    strips += pictures(path, slack).strips() if max(pair) >= len(strips) else []
+    return _window(path, (strips[pair[0]], strips[pair[1]]))
+
+
+def _cut_out(path: Path, strips: list[Strip]) -> Iterator[tuple[Pair, Window]]:
+    bounding = [n for n, strip in enumerate(strips) if strip.bounds_slopes]
+    for one, other in itertools.combinations(bounding, 2):
+        rows = np.stack([strips[n].from_sensor for n in (one, other)])
         if abs(rows[0, 2] * rows[1, 3]) < abs(rows[0, 3] * rows[1, 2]):  # s along the window's first axis
-            pair, rows = pair[::-1], rows[::-1]
+            one, other = other, one
         parallel = abs(np.linalg.det(rows[:, 2:])) <= 1e-9 * np.prod(np.linalg.norm(rows[:, 2:], axis=1))
         if not parallel:
-            yield _window(path, pair, rows)
+            yield (one, other), _window(path, (strips[one], strips[other]))
 
 
-def _window(path: Path, pair: tuple[Strip, ...], rows: Array) -> Window:
-    """The slopes within two strips, whose coordinates from rays on the sensor are the rows, (2, 4)."""
+def _window(path: Path, pair: tuple[Strip, Strip]) -> Window:
+    """The slopes within two strips."""
+    rows = np.stack([strip.from_sensor for strip in pair])
     slope_from_place = np.asarray(np.linalg.inv(rows[:, 2:]), dtype=np.float64)
     return Window(
         slope_from_point=slope_from_place @ np.diag([strip.half for strip in pair]),

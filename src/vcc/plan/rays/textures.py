@@ -8,10 +8,14 @@ between points, and may be as coarse as what a pixel's rays spread over allows.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
+from vcc.base.values import content
+from vcc.plan.decisions import ANEW, Decisions, plan_again
 from vcc.plan.rays.steps import Texture
 from vcc.shapes.patterns import Pattern
 
@@ -32,26 +36,126 @@ eighth of it, the picture is off by up to 0.4/64 of the edge, 0.6 %; no light is
 WORTH_SAYING = 1e-3
 """Error of a texture, as `FINE_ENOUGH`, from which on a plan says it."""
 POINTS_AT_ONCE = 2**17
+ROOM = 0.1
+"""By how much of a region a texture that is kept reaches beyond it on each side, within what passes."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sampled(Brief):
+    """What is sampled of an element.
+
+    Args:
+        values: the numbers that points of a texture hold, a function of (x, y, spacing), places (1, columns) and
+            (rows, 1) in metres from the element's middle.
+        middle: place (x, y) of the element, metres.
+        region: lowest and highest (x, y) at which rays meet it, metres.
+        passes: the same of what passes in its plane; infinite where nothing bounds it.
+        of: what the values are of; equal things have equal values.
+        itself: the function of (x, y) that a texture stands for, where that is not ``values``.
+    """
+
+    values: Callable[[Array, Array, tuple[float, float]], Array]
+    middle: tuple[float, float]
+    region: tuple[Array, Array]
+    passes: tuple[Array, Array]
+    of: object
+    itself: Callable[[Array, Array], Array] | None = None
+
+    def from_middle(self) -> tuple[Array, Array]:
+        """The region, counted from the element's middle."""
+        low, high = self.region
+        return low - self.middle, high - self.middle
+
+    def with_room(self) -> Sampled:
+        """The same with room around the region."""
+        (low, high), (lowest, highest) = self.region, self.passes
+        room = ROOM * (high - low)
+        region = (
+            np.maximum(low - room, np.minimum(lowest, low)),
+            np.minimum(high + room, np.maximum(highest, high)),
+        )
+        return replace(self, region=region)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Points(Brief):
+    """Where the points of a texture stand on its element.
+
+    Args:
+        size: points a side.
+        start: place (x, y) of the first, metres from the element's middle.
+        spacing: (x, y), metres.
+        error: of the texture, see `textured`.
+    """
+
+    size: int
+    start: tuple[float, float]
+    spacing: tuple[float, float]
+    error: float
+
+    def holds(self, low: Array, high: Array) -> bool:
+        """Whether a region lies within them, but for one spacing, over which the outermost values are held."""
+        last = np.array(self.start) + np.array(self.spacing) * self.size
+        return bool((low >= np.array(self.start) - self.spacing).all() and (high <= last).all())
+
+    def like(self, other: Points) -> bool:
+        """Whether they are as many and almost as close."""
+        return self.size == other.size and np.allclose(self.spacing, other.spacing, rtol=0.5, atol=0)
 
 
 def textured(
-    sampled: Callable[[Array, Array, tuple[float, float]], Array],
-    region: tuple[Array, Array],
+    sampled: Sampled,
     sizes: tuple[int, ...] = SIZES,
     *,
-    itself: Callable[[Array, Array], Array] | None = None,
+    decisions: Decisions = ANEW,
+    spacing_enough: Array | None = None,
+    index_from_value: Array | None = None,
+) -> tuple[Texture, float]:
+    """A texture that is fine enough, and its error; see `made_fine_enough`.
+
+    Args:
+        sampled: what is sampled.
+        sizes: see `made_fine_enough`.
+        decisions: where these are kept, so are the points, on the element, with room around the region.
+        spacing_enough: see `made_fine_enough`.
+        index_from_value: likewise.
+
+    Raises:
+        InputError: a region beyond the points that were kept.
+    """
+    enough = {"spacing_enough": spacing_enough, "index_from_value": index_from_value}
+    if not decisions.lasting:
+        return made_fine_enough(sampled, sizes, **enough)
+
+    def decided() -> Points:
+        texture, error = made_fine_enough(sampled.with_room(), sizes, **enough)
+        x, y = (start - middle for start, middle in zip(texture.start, sampled.middle, strict=True))
+        return Points(texture.values.shape[0], (x, y), texture.spacing, error)
+
+    points = decisions.keep("points of its texture", decided, Points.like)
+    if not points.holds(*sampled.from_middle()):
+        raise plan_again("where rays meet an element")
+    values = decisions.made(
+        "texture",
+        lambda: (content(sampled.of), content(points)),
+        lambda: _values(sampled, points.start, points.spacing, points.size),
+    )
+    x, y = (start + middle for start, middle in zip(points.start, sampled.middle, strict=True))
+    return Texture(values, (x, y), points.spacing), points.error
+
+
+def made_fine_enough(
+    sampled: Sampled,
+    sizes: tuple[int, ...],
     spacing_enough: Array | None = None,
     index_from_value: Array | None = None,
 ) -> tuple[Texture, float]:
     """The coarsest texture that is fine enough for a function over a region, and its error anywhere.
 
     Args:
-        sampled: the numbers that points of the texture hold, a function of (x, y, spacing), places (1, columns)
-            and (rows, 1) in metres.
-        region: lowest and highest (x, y), metres.
+        sampled: what is sampled, and where.
         sizes: points a side. After the first, the first one is tried that should do: interpolation errs as the
             square of the spacing. The last one is taken if none should.
-        itself: the function of (x, y) that the texture stands for, where that is not ``sampled``.
         spacing_enough: distance (x, y) of points that is fine enough whatever the error, metres; None: none is.
         index_from_value: (4, numbers), by how many samples of the light field rays move for an error of the
             numbers; None where that is not known, and the error counts alone.
@@ -59,7 +163,7 @@ def textured(
     Returns:
         The texture, and its root mean square error as a share of its largest value.
     """
-    low, high = region
+    low, high = sampled.region
     extent = np.maximum(high - low, 1e-9)
     generator = np.random.default_rng(0)
     x, y = (low[n] + extent[n] * generator.random(4096) for n in (0, 1))
@@ -67,17 +171,13 @@ def textured(
     while True:
         size = left.pop(0)
         spacing = (float(extent[0] / (size - 1)), float(extent[1] / (size - 1)))
-        column, row = low[0] + spacing[0] * np.arange(size), low[1] + spacing[1] * np.arange(size)
-        parts = np.array_split(row, -(-size * size // POINTS_AT_ONCE))
-        first = np.asarray(sampled(column[None, :], parts[0][:, None], spacing))
-        values = np.empty((size, size, first.shape[-1]))
-        values[: len(parts[0])] = first
-        done = len(parts[0])
-        for rows in parts[1:]:
-            values[done : done + len(rows)] = sampled(column[None, :], rows[:, None], spacing)
-            done += len(rows)
-        texture = Texture(values, (float(low[0]), float(low[1])), spacing)
-        truth = np.asarray(sampled(x, y, spacing) if itself is None else itself(x, y))
+        start = float(low[0]), float(low[1])
+        values = _values(sampled, start, spacing, size, sampled.middle)
+        texture = Texture(values, start, spacing)
+        from_middle = x - sampled.middle[0], y - sampled.middle[1]
+        truth = np.asarray(
+            sampled.values(*from_middle, spacing) if sampled.itself is None else sampled.itself(*from_middle)
+        )
         off = texture(x, y) - truth
         largest = float(np.abs(values).max())
         error = float(np.sqrt(np.mean(off**2))) / largest if largest > 0 else 0.0
@@ -94,6 +194,27 @@ def textured(
             return texture, error
         while len(left) > 1 and not does(left[0]):
             left.pop(0)
+
+
+def _values(
+    sampled: Sampled,
+    start: tuple[float, float],
+    spacing: tuple[float, float],
+    size: int,
+    middle: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """What the points of a texture hold, (size, size, numbers); ``start`` counted from where ``middle`` is."""
+    column, row = start[0] + spacing[0] * np.arange(size), start[1] + spacing[1] * np.arange(size)
+    across = np.asarray(column[None, :] - middle[0], dtype=np.float64)
+    parts: list[Array] = np.array_split(row, -(-size * size // POINTS_AT_ONCE))
+    first = np.asarray(sampled.values(across, parts[0][:, None] - middle[1], spacing))
+    values = np.empty((size, size, first.shape[-1]))
+    values[: len(parts[0])] = first
+    done = len(parts[0])
+    for rows in parts[1:]:
+        values[done : done + len(rows)] = sampled.values(across, rows[:, None] - middle[1], spacing)
+        done += len(rows)
+    return values
 
 
 def means_around(pattern: Pattern, x: Array, y: Array, spacing: tuple[float, float]) -> Array:

@@ -153,6 +153,7 @@ class CellWindows:
         reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are looked at.
         words: what is aimed at.
         halvings: how many times a pixel's rays are halved for each of the cells that it sees.
+        towards: (number of the leg, words) of what bounds the rays beyond the array.
     """
 
     cells: CellDeflection
@@ -162,6 +163,7 @@ class CellWindows:
     reach: tuple[int, int]
     words: str
     halvings: int = 0
+    towards: tuple[int, str] = (0, "")
 
     on_disc: ClassVar[bool] = False
     """Rays take points of the square, whatever the stop."""

@@ -1,0 +1,251 @@
+"""The way from values of parameters to the numbers of a plan, and from weights of these back to the parameters.
+
+A plan is made anew for each value of its parameters, by decisions that were taken once
+(`vcc.plan.decisions.Decisions`), so that its numbers are smooth functions of the parameters. The derivative to a
+parameter is the central difference of all numbers that follow it, in double precision. A plan takes milliseconds
+to make where what costs (textures) did not change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.base.errors import InputError
+from vcc.fields.grid import Grid
+from vcc.learn.parameters import Parameter, parameter, put, read
+from vcc.learn.scales import scale
+from vcc.optics.train import Train
+from vcc.plan.choice import compile_best
+from vcc.plan.decisions import Decisions, plan_again
+from vcc.plan.how import How
+from vcc.plan.model import Plan
+from vcc.plan.rays.edges import edges_that_cut
+from vcc.plan.rays.model import Rays
+
+Array = NDArray[np.float64]
+Values = Mapping[str, ArrayLike]
+Numbers = dict[str, Array]
+
+STEP = 1e-5
+"""Of a change of 1 (`vcc.learn.scales`): differences are taken of light moved by a ten-thousandth of a pixel."""
+MOST_BY_DIFFERENCES = 400
+"""Numbers that a parameter may have for its derivative to be taken by differences, two plans for each of them."""
+
+
+class Chain:
+    """A camera whose parameters change, before a light field.
+
+    Args:
+        train: the camera as it is when learning begins; all is decided for it, once.
+        grid: of the light field.
+        how: what was chosen of the computation; None takes the defaults.
+        names: of the parameters (`vcc.learn.parameters`).
+
+    Attributes:
+        train: as given.
+        grid: as given.
+        how: as given.
+        names: as given.
+        decisions: by which all plans are made.
+
+    Raises:
+        InputError: a parameter that there is not, or one that has no derivative here, named with the reason: it
+            moves rays against a hard edge that cuts them, its numbers do not follow it, or it is too large.
+    """
+
+    def __init__(self, train: Train, grid: Grid, how: How | None = None, names: Iterable[str] = ()) -> None:
+        self.train, self.grid, self.how = train, grid, how or How()
+        self.names = tuple(names)
+        self.decisions = Decisions()
+        self._steps = {name: STEP * scale(train, name) for name in self.names}
+        self._made: tuple[dict[str, bytes], Plan, Numbers] | None = None
+        self._form: tuple[tuple[str, tuple[int, ...]], ...] | None = None
+        self._check_sizes()
+        self._check_edges({})
+
+    def plan(self, values: Values | None = None) -> Plan:
+        """The plan for some values of the parameters.
+
+        Args:
+            values: by the names of parameters, SI units; those that are left out are the train's own.
+
+        Raises:
+            InputError: values that an element does not take, or for which the decisions no longer hold.
+        """
+        return self._at(values or {})[0]
+
+    def followed(self, values: Values | None = None) -> dict[str, tuple[str, ...]]:
+        """For each parameter the names of the plan's numbers (`Plan.numbers`) that follow it.
+
+        Args:
+            values: as for `plan`.
+
+        Raises:
+            InputError: as `pull`.
+        """
+        found = {}
+        for name in self.names:
+            moved: dict[str, None] = {}
+            for index in np.ndindex(read(self.train, name).shape):
+                moved |= dict.fromkeys(self._derivative(values or {}, name, index))
+            found[name] = tuple(number for number in self._at(values or {})[1] if number in moved)
+        return found
+
+    def pull(self, values: Values, cotangents: Mapping[str, ArrayLike]) -> dict[str, Array]:
+        """The derivatives to the parameters of what has these derivatives to the plan's numbers.
+
+        Args:
+            values: as for `plan`.
+            cotangents: derivatives to numbers of the plan, by the names of `Plan.numbers`, each of its number's
+                shape; those that are left out are 0.
+
+        Returns:
+            By the names of all parameters, float64, each of its parameter's shape.
+
+        Raises:
+            InputError: values at which a parameter cannot be followed, or rays that run into an edge there.
+        """
+        weights = {name: np.asarray(cotangent, dtype=np.float64) for name, cotangent in cotangents.items()}
+        self._at(values)
+        found = {}
+        for name in self.names:
+            found[name] = np.zeros(read(self.train, name).shape)
+            for index in np.ndindex(found[name].shape):
+                slopes = self._derivative(values, name, index, weights)
+                found[name][index] = sum(np.vdot(weights[number], slope) for number, slope in slopes.items())
+        return found
+
+    def replanned(self, values: Values | None = None) -> tuple[str, ...]:
+        """What planning again would decide otherwise, in words; nothing where it would decide all as it was.
+
+        Args:
+            values: as for `plan`.
+        """
+        fresh = Decisions()
+        compile_best(put(self.train, dict(values or {})), self.grid, self.how, fresh)
+        return self.decisions.differences(fresh)
+
+    # --- plans and their differences
+
+    def _at(self, values: Values) -> tuple[Plan, Numbers]:
+        """The plan for some values, and its numbers; what costs is kept for plans nearby."""
+        key = {name: np.asarray(value, dtype=np.float64).tobytes() for name, value in values.items()}
+        if self._made is None or self._made[0] != key:
+            with self.decisions.remembering():
+                plan = compile_best(put(self.train, dict(values)), self.grid, self.how, self.decisions)
+            numbers = plan.numbers()
+            self._check_form(numbers)
+            self._made = key, plan, numbers
+        return self._made[1:]
+
+    def _beside(self, values: Values, name: str, index: tuple[int, ...], step: float) -> Train | InputError:
+        """The train with one number of a parameter moved by a step; what it refuses."""
+        here = np.array(values[name], dtype=np.float64) if name in values else read(self.train, name)
+        here[index] += step
+        try:
+            return put(self.train, {**values, name: here})
+        except InputError as error:
+            return error
+
+    def _numbers(self, train: Train, name: str) -> Numbers:
+        try:
+            numbers = compile_best(train, self.grid, self.how, self.decisions).numbers()
+            self._check_form(numbers)
+        except InputError as error:
+            raise InputError(f"there is no derivative to {name}: {error}") from None
+        return numbers
+
+    def _derivative(
+        self, values: Values, name: str, index: tuple[int, ...], wanted: Mapping[str, Any] | None = None
+    ) -> Numbers:
+        """The derivatives of the plan's numbers to one number of a parameter; only of those that follow it.
+
+        By a central difference; beside the end of what a camera allows by one of three points on this side of it.
+        """
+        step = self._steps[name]
+        before, behind = (self._beside(values, name, index, side * step) for side in (-1, 1))
+        if isinstance(before, Train) and isinstance(behind, Train):
+            low, high = (self._numbers(train, name) for train in (before, behind))
+            return _combined(((-0.5, low), (0.5, high)), step, wanted)
+        if isinstance(before, InputError) and isinstance(behind, InputError):
+            raise InputError(f"there is no derivative to {name}: {before}")
+        side = -1 if isinstance(behind, InputError) else 1
+        near, far = (self._beside(values, name, index, n * side * step) for n in (1, 2))
+        if isinstance(near, InputError) or isinstance(far, InputError):
+            raise InputError(f"there is no derivative to {name}: {near if isinstance(near, InputError) else far}")
+        here = self._at(values)[1]
+        parts = (-1.5, here), (2.0, self._numbers(near, name)), (-0.5, self._numbers(far, name))
+        return _combined(parts, side * step, wanted)
+
+    # --- what is refused
+
+    def _check_form(self, numbers: Numbers) -> None:
+        """Refuse a plan that has other numbers than the first one."""
+        form = tuple((name, value.shape) for name, value in numbers.items())
+        if self._form is None:
+            self._form = form
+        if form != self._form:
+            raise plan_again("which numbers the plan has")
+
+    def _check_sizes(self) -> None:
+        for name in self.names:
+            found = parameter(self.train, name)
+            if found.array().size > MOST_BY_DIFFERENCES and array_puller(found) is None:
+                raise InputError(
+                    f"{name} ({found.owned_by}) has {found.array().size} numbers, and a parameter of its kind is "
+                    f"learned by differences, up to {MOST_BY_DIFFERENCES} of them: give it fewer"
+                )
+
+    def _check_edges(self, values: Values) -> None:
+        """Refuse parameters that move rays against hard edges that cut them."""
+        core = self._at(values)[0].core
+        if not isinstance(core, Rays) or not self.names:
+            return
+        for name, followed in self.followed(values).items():
+            changed = [number.removeprefix("core.") for number in followed if number.startswith("core.")]
+            cut = edges_that_cut(core, changed) if changed else ()
+            if cut:
+                owner = parameter(self.train, name).owned_by
+                raise InputError(
+                    f"there is no derivative to {name} ({owner}): it moves rays against {', '.join(cut)}, a hard "
+                    "edge inside the path of rays that each ray passes or not. Keep it as it is, or put a pattern "
+                    "that falls off smoothly in the edge's place"
+                )
+
+
+ArrayPuller = Callable[[Any, Mapping[str, Array]], Array]
+
+
+def array_puller(found: Parameter) -> ArrayPuller | None:
+    """How derivatives to numbers become those to a large array, all at once; None where by differences.
+
+    Args:
+        found: the parameter.
+    """
+    return None
+
+
+def _combined(parts: Iterable[tuple[float, Numbers]], step: float, wanted: Mapping[str, Any] | None) -> Numbers:
+    """Σ factor · numbers / step of plans beside one another, only where they differ.
+
+    Args:
+        parts: (factor, numbers of a plan), factors of sum 0.
+        step: between plans.
+        wanted: names of the numbers that count; None: all.
+    """
+    listed = list(parts)
+    found = {}
+    for name, first in listed[0][1].items():
+        if wanted is not None and name not in wanted:
+            continue
+        alike = [numbers[name] for _, numbers in listed]
+        if all(one is first or np.array_equal(one, first) for one in alike[1:]):
+            continue
+        held = np.isfinite(first)  # what is without bounds stays so
+        total = sum(factor * np.where(held, one, 0.0) for (factor, _), one in zip(listed, alike, strict=True))
+        found[name] = np.asarray(total / step)
+    return found

@@ -1,0 +1,251 @@
+"""Plans whose decisions are kept: made again for a camera a little different, they have the same numbers by name,
+and these follow the camera's parameters smoothly.
+
+The oracle is the calculus of differences: of a smooth function, central differences by steps that differ ten
+times agree to the square of the steps.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vcc
+from vcc import patterns
+from vcc.plan.choice import compile_best
+from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.footprints.means import mean_over
+from vcc.run.drive import drive
+from vcc.shapes.polygon_areas import polygon_mean
+from vcc.shapes.sheets import Product, Shifted
+from vcc.units import mm, um
+
+sys.path.append(str(Path(__file__).parents[1] / "physics"))
+from random_cameras import drawn
+
+STEPS = (3e-6, 3e-5, 3e-4)
+"""Two decades of steps, as shares of what `scale` gives."""
+LEFT_OUT = ("electronics", "source", "matrix", "stop_from_entrance", "fill_factor")
+
+
+def leaves(thing: Any, path: tuple = ()):
+    """(path, value) of all numbers of a dataclass that are of floating point."""
+    if isinstance(thing, float) and np.isfinite(thing):
+        yield path, thing
+    elif isinstance(thing, tuple):
+        for n, part in enumerate(thing):
+            yield from leaves(part, (*path, n))
+    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        for field in dataclasses.fields(thing):
+            if field.name not in LEFT_OUT:
+                yield from leaves(getattr(thing, field.name), (*path, field.name))
+
+
+def put(thing: Any, path: tuple, value: float) -> Any:
+    """The same with one number changed."""
+    if not path:
+        return value
+    head, *rest = path
+    if isinstance(thing, tuple):
+        return tuple(put(part, tuple(rest), value) if n == head else part for n, part in enumerate(thing))
+    return dataclasses.replace(thing, **{head: put(getattr(thing, head), tuple(rest), value)})
+
+
+def parts(camera: vcc.Camera) -> list[Any]:
+    return [*camera.elements, camera.sensor]
+
+
+def moved(camera: vcc.Camera, number: int, path: tuple, value: float) -> vcc.Camera:
+    changed = [put(part, path, value) if n == number else part for n, part in enumerate(parts(camera))]
+    return vcc.Camera(changed[:-1], changed[-1])
+
+
+def scale(camera: vcc.Camera, number: int, path: tuple, value: float) -> float:
+    """How far a parameter goes for the picture to change wholly."""
+    name = [step for step in path if isinstance(step, str)][-1]
+    if name in ("z", "length"):
+        return 1 * mm
+    if name in ("decentre", "offset", "middle"):
+        return 10 * min(camera.sensor.pitches) if number == len(camera.elements) else 0.2 * mm
+    if name in ("rotation", "phase"):
+        return 1.0
+    if name == "deflection":
+        return 0.01
+    return min(abs(value), 0.2 * mm) if "pattern" in path else abs(value)
+
+
+def differences(camera, grid, decisions, number, path, value):
+    """Central differences of all numbers for each step, times the scale; what refuses, where it does."""
+    unit, found = scale(camera, number, path, value), []
+    for step in STEPS:
+        try:
+            high, low = (
+                compile_best(
+                    moved(camera, number, path, value + side * step * unit), grid, None, decisions
+                ).numbers()
+                for side in (1, -1)
+            )
+        except vcc.InputError as error:
+            return None, str(error)
+        assert {name: one.shape for name, one in high.items()} == {name: one.shape for name, one in low.items()}
+        changed = {name: one for name, one in high.items() if one is not low[name]}
+        found.append({name: (_finite(one) - _finite(low[name])) / (2 * step) for name, one in changed.items()})
+    return found, {name: np.abs(_finite(one)).max(initial=1e-6) for name, one in high.items()}
+
+
+def _finite(values):
+    """What is without bounds stays so, and does not change."""
+    return np.where(np.isfinite(values), values, 0.0)
+
+
+EXPECTED = ("the order of the elements", "stand", "at the views", "views apart", "is round", "footprints or rays")
+"""Why an element that touches another, the entrance plane or the sensor cannot move along the axis."""
+FOOTPRINTS = [("prisms", 3), ("one mask", 3), ("two masks", 2), ("blur", 2)]
+RAYS = [("facets", 3), ("plate", 0), ("lenslets", 0), ("prism array", 1), ("coded diffuser", 2)]
+
+
+@pytest.mark.parametrize(("kind", "seed"), [*FOOTPRINTS, *RAYS])
+def test_numbers_follow_all_parameters_smoothly(kind, seed):
+    case = drawn(kind, seed, pixels=10, views=5)
+    grid, decisions = case.light_field.grid, Decisions()
+    with decisions.remembering():
+        compile_best(case.camera, grid, None, decisions)
+    followed = 0
+    for number, part in enumerate(parts(case.camera)):
+        for path, value in leaves(part):
+            found, sizes = differences(case.camera, grid, decisions, number, path, value)
+            if found is None:
+                assert path[-1] in ("z", "length"), sizes
+                assert any(words in sizes for words in EXPECTED), sizes
+                continue
+            followed += any(one.any() for one in found[-1].values())
+            for step, finer, coarser in zip(STEPS, found, found[1:], strict=False):
+                for name, one in finer.items():
+                    # Numbers are right to a few hundred units of their last place, which a step divides.
+                    rounding = 1e-12 * sizes[name] * np.sqrt(one.size) / step
+                    off = np.linalg.norm(one - coarser[name])
+                    assert off <= 1e-3 * np.linalg.norm(coarser[name]) + rounding, (path, name)
+    assert followed >= 5
+
+
+def camera_with_a_mask(pattern: Any, z: float = 40 * mm, **sensor: Any) -> vcc.Camera:
+    lens = vcc.Lens(50 * mm, diameter=8 * mm, z=5 * mm, name="main")
+    mask = vcc.Mask(pattern, z=z, name="code", width=4 * mm if isinstance(pattern, np.ndarray) else None)
+    return vcc.Camera([lens, mask], vcc.Sensor(**{"z": 58 * mm, "shape": (12, 14), "pitch": 50 * um, **sensor}))
+
+
+CELLS = np.random.default_rng(2).random((5, 4))
+GRID = vcc.LightField.from_views(np.ones((4, 5, 12, 14), np.float32), 2 * mm, 2e-3, disparity_range=(0, 0)).grid
+
+
+def test_textures_stand_still_on_the_mask_in_double_precision():
+    camera, decisions = camera_with_a_mask(CELLS), Decisions()
+    first = compile_best(camera, GRID, None, decisions).core.masks[1]
+    shifted = dataclasses.replace(camera.elements[1], decentre=(30 * um, 0.0))
+    other = compile_best(
+        vcc.Camera([camera.elements[0], shifted], camera.sensor), GRID, None, decisions
+    ).core.masks[1]
+    assert first.texture.dtype == np.float64
+    np.testing.assert_array_equal(other.texture, first.texture)
+    spacing = 30 * um / (first.column - other.column)
+    np.testing.assert_allclose(spacing, spacing[0, 0], rtol=1e-9)
+
+
+def test_what_is_remembered_is_not_made_again():
+    camera, decisions = camera_with_a_mask(CELLS), Decisions()
+    with decisions.remembering():
+        first = compile_best(camera, GRID, None, decisions).core.masks[1].texture
+    assert compile_best(camera, GRID, None, decisions).core.masks[1].texture is first
+    other = dataclasses.replace(camera.elements[1], z=41 * mm)  # samples meet it on other footprints
+    elsewhere = vcc.Camera([camera.elements[0], other], camera.sensor)
+    assert np.abs(compile_best(elsewhere, GRID, None, decisions).core.masks[1].texture - first).max() > 1e-4
+    assert compile_best(camera, GRID, None, decisions).core.masks[1].texture is first
+
+
+@pytest.mark.parametrize("method", ["footprints", "rays"])
+def test_pictures_are_those_of_plans_that_nobody_keeps(method):
+    """Textures have room around them and double precision, aims some room: nothing else differs."""
+    camera = camera_with_a_mask(CELLS)
+    light_field = vcc.LightField(np.random.default_rng(0).random((4, 5, 12, 14)).astype(np.float32), GRID.frame)
+    how = vcc.How(method=method, between_views="none", engine="reference")
+    plain, kept = (
+        drive(compile_best(camera, light_field.grid, how, decisions), light_field, how).values
+        for decisions in (None, Decisions())
+    )
+    np.testing.assert_allclose(kept, plain, atol=2e-6 * plain.max())
+
+
+def test_a_camera_that_moves_too_far_is_told_to_plan_again():
+    camera, decisions = camera_with_a_mask(CELLS), Decisions()
+    compile_best(camera, GRID, None, decisions)
+    wider = dataclasses.replace(camera.elements[0], diameter=19 * mm)
+    with pytest.raises(vcc.InputError, match=r"where samples meet a mask|give light.*Plan again"):
+        compile_best(vcc.Camera([wider, camera.elements[1]], camera.sensor), GRID, None, decisions)
+
+
+def test_an_element_that_passes_another_is_refused():
+    camera, decisions = camera_with_a_mask(CELLS), Decisions()
+    compile_best(camera, GRID, None, decisions)
+    before = dataclasses.replace(camera.elements[1], z=4 * mm)
+    with pytest.raises(vcc.InputError, match="order of the elements"):
+        compile_best(vcc.Camera([before, camera.elements[0]], camera.sensor), GRID, None, decisions)
+
+
+def test_what_would_be_decided_otherwise_is_named():
+    camera, decisions = camera_with_a_mask(CELLS), Decisions()
+    compile_best(camera, GRID, None, decisions)
+    near, coarse = Decisions(), Decisions()
+    compile_best(camera_with_a_mask(CELLS, 40.1 * mm), GRID, None, near)
+    compile_best(camera_with_a_mask(CELLS, pitch=5 * um), GRID, None, coarse)
+    assert decisions.differences(near) == ()
+    assert "weights of the filters that give sharpness back" in decisions.differences(coarse)
+
+
+# --- means
+
+
+def test_polygons_have_means_in_closed_form():
+    """The whole: n/2·R²·sin(2π/n); parts against points a thousand a side, right to their share of the border."""
+    hexagon = patterns.Polygon(6, 2.0, 0.3)
+    whole = polygon_mean(hexagon, np.zeros(1), np.zeros(1), 4.0, 4.0)
+    assert whole[0] * 16 == pytest.approx(3 * np.sin(np.pi / 3), rel=1e-12)
+    inside = (np.arange(1000) + 0.5) / 1000 - 0.5
+    for x, y in np.random.default_rng(0).uniform(-1, 1, (6, 2)):
+        points = hexagon(x + 0.5 * inside[None, :], y + 0.3 * inside[:, None]).mean()
+        assert polygon_mean(hexagon, np.array(x), np.array(y), 0.5, 0.3) == pytest.approx(points, abs=2e-3)
+
+
+def hill(x, y):
+    return 0.5 + 0.4 * np.cos(x / 0.3) * np.sin(y / 0.4)
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        patterns.as_pattern(hill),
+        Product((patterns.CosineSum(2.0), Shifted(patterns.Circle(1.5), (0.1, -0.2)))),
+        patterns.Bounded(patterns.as_pattern(hill), 1.2, 1.4),
+    ],
+    ids=["function", "product", "bounded"],
+)
+def test_means_on_a_raster_that_is_kept_are_those_of_the_pattern(pattern):
+    """Both look at 16 points across a rectangle; what is linear between them differs from what is even around them
+    by the curvature over a point."""
+    x, y = np.linspace(-0.5, 0.5, 7)[None, :], np.linspace(-0.4, 0.6, 6)[:, None]
+    decisions = Decisions()
+    kept, plain = (mean_over(pattern, x, y, 0.3, 0.2, each) for each in (decisions, ANEW))
+    np.testing.assert_allclose(kept, plain, atol=4e-3)
+    wide = mean_over(pattern, *np.broadcast_arrays(x, y), 0.3, 0.2, decisions)  # place by place, and along axes
+    np.testing.assert_allclose(wide, kept, rtol=1e-9, atol=1e-12)
+
+
+def test_rectangles_beyond_a_raster_that_is_kept_are_refused():
+    x, decisions = np.linspace(-0.5, 0.5, 7)[None, :], Decisions()
+    mean_over(patterns.as_pattern(hill), x, x.T, 0.3, 0.2, decisions)
+    with pytest.raises(vcc.InputError, match="where a pattern is looked at"):
+        mean_over(patterns.as_pattern(hill), x + 5.0, x.T, 0.3, 0.2, decisions)
