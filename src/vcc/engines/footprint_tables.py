@@ -170,6 +170,41 @@ class EntryMasks(NamedTuple):
     shares: NDArray[np.float32]
 
 
+# --- and backwards ---
+
+
+class Spread(NamedTuple):
+    """Which rows of the raster a row of samples falls on: ``shares`` of those from ``first`` on; columns likewise.
+
+    Args:
+        first: (taps, samples) int64.
+        shares: (taps, samples, width) float32, some of them zero, those beyond the raster always.
+    """
+
+    first: NDArray[np.int64]
+    shares: NDArray[np.float32]
+
+
+class Readers(NamedTuple):
+    """The view taps of one column, sorted by the view that they read.
+
+    Args:
+        taps: int64, rows of taps that are added; those that read the n-th view end before ``ends[n + 1]``.
+        ends: (views + 1,) int64.
+        begin: (views,) int64, where the samples of a view begin.
+        weights: (rows of taps,) float32.
+        columns: of samples in a view.
+        channels: values a sample.
+    """
+
+    taps: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    begin: NDArray[np.int64]
+    weights: NDArray[np.float32]
+    columns: int
+    channels: int
+
+
 # --- where they do not ---
 
 

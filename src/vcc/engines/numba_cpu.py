@@ -17,12 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.errors import InputError
 from vcc.base.progress import Progress, part_of, tell
 from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import ray_transpose, rays_compiled, sharpening_kernels
 from vcc.engines.footprint_samples import FineGrid, MaskColumns, textures
+from vcc.engines.footprints_back import samples_back
 from vcc.engines.ray_numbers import ray_numbers_back
 from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
 from vcc.plan import operators
@@ -56,6 +58,23 @@ def footprints(
         else:
             raster = _sheared(core, values, channels, pool, progress)
     return Partial(raster.reshape(*core.raster_shape, channels))
+
+
+def footprints_back(
+    core: Footprints,
+    values: NDArray[Any],
+    raster: NDArray[np.floating],
+    *,
+    samples: bool = True,
+    wanted: Collection[str] = (),
+    beside: int = 0,
+    threads: int,
+    progress: Progress | None = None,
+) -> Gradient:
+    """What a raster's weights say of samples, float32, and of numbers; see `vcc.plan.protocol.BackRunner`."""
+    if wanted:
+        raise InputError(f"there is no derivative to {', '.join(sorted(wanted))}")
+    return Gradient(samples_back(core, values.shape, raster, threads, progress) if samples else None)
 
 
 def rays(

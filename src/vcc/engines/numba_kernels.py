@@ -78,7 +78,7 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
                     low = lowest[q]
                     ranges[entry] = -1 if low < 0 else low * ROWS - low * (low + 1) // 2 + highest[q]
                     if masks is not None:  # noqa: SIM102  (by itself, so that it can be told apart when compiled)
-                        if not _masks_at(masks, b, l, entry, weighed):
+                        if not masks_at(masks, b, l, entry, weighed):
                             ranges[entry] = -1
                 listed += rows
                 for l in range(top + rows, top + rows + advance):
@@ -131,7 +131,7 @@ def _rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # ty
 
 
 @_inlined
-def _masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
+def masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
     """Look up the masks' three lines around row l of the samples of tap b; False if it is dark there.
 
     masks: `MaskLines`. weighed: `EntryMasks`, which is filled for the entry.
@@ -392,7 +392,7 @@ def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
 
 
 @_inlined
-def _share(footprint, offset, size):  # type: ignore[no-untyped-def]
+def share_at(footprint, offset, size):  # type: ignore[no-untyped-def]
     """What a pixel holds of a sample's light that falls so far from it, the samples so far apart."""
     interpolation, _, opening = footprint
     if interpolation == 0:
@@ -403,7 +403,7 @@ def _share(footprint, offset, size):  # type: ignore[no-untyped-def]
 
 
 @_inlined
-def _farthest(footprint, size):  # type: ignore[no-untyped-def]
+def farthest(footprint, size):  # type: ignore[no-untyped-def]
     """How far from a pixel a sample may fall that counts there, in pixels."""
     return 1e-6 + (max(size, 1.0) / 2 if footprint.interpolation == 0 else footprint.reach * size + 0.5)
 
@@ -440,7 +440,7 @@ def sheared_view(view, grid, footprint, band, raster):  # type: ignore[no-untype
     nt, ns, channels = samples.shape
     row_step, column_step = coarse_row_step / refine, coarse_column_step / refine
     height, width = abs(row_step), abs(column_step)
-    reach_y, reach_x = _farthest(footprint, height), _farthest(footprint, width)
+    reach_y, reach_x = farthest(footprint, height), farthest(footprint, width)
     line = np.empty((ns, channels))
     for y in range(band.start, band.stop):
         line[:] = 0
@@ -452,7 +452,7 @@ def sheared_view(view, grid, footprint, band, raster):  # type: ignore[no-untype
             low = max(int(np.ceil(middle - reach_y / height)), 0)
             high = min(int(np.floor(middle + reach_y / height)), nt - 1)
             for m in range(low, high + 1):
-                share = weight * _share(footprint, y - y_start - row_step * m, height)
+                share = weight * share_at(footprint, y - y_start - row_step * m, height)
                 if share != 0:
                     lit = True
                     for c in range(channels):
@@ -464,6 +464,6 @@ def sheared_view(view, grid, footprint, band, raster):  # type: ignore[no-untype
             low = max(int(np.ceil(x - reach_x)), 0)
             high = min(int(np.floor(x + reach_x)), raster.shape[1] - 1)
             for pixel in range(low, high + 1):
-                share = _share(footprint, pixel - x, width)
+                share = share_at(footprint, pixel - x, width)
                 for c in range(channels):
                     raster[y, pixel, c] += share * line[n, c]

@@ -163,6 +163,25 @@ class Taps(Brief):
             np.ascontiguousarray(self.weights[..., ::-1, :]),
         )
 
+    def by_sample(self, samples: int) -> Taps:
+        """The table by sample: sample n gives ``weights[..., n, m]`` of its light to pixel ``first[..., n] + m``.
+
+        Args:
+            samples: how many there are.
+        """
+        *tables, pixels, width = self.weights.shape
+        shares = self.weights.reshape(-1, pixels, width)
+        table, pixel, tap = np.nonzero(shares)
+        which = table * samples + self.first.reshape(-1, pixels)[table, pixel] + tap
+        first = np.full(len(shares) * samples, pixels)
+        last = np.full(len(shares) * samples, -1)
+        np.minimum.at(first, which, pixel)
+        np.maximum.at(last, which, pixel)
+        weights = np.zeros((len(first), max(int((last - first).max(initial=0)) + 1, 1)), dtype=np.float32)
+        weights[which, pixel - first[which]] = shares[table, pixel, tap]
+        shape = (*tables, samples)
+        return Taps(np.minimum(first, pixels - 1).reshape(shape), weights.reshape(*shape, -1))
+
 
 def taps(
     interpolation: str,

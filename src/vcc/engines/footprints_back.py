@@ -1,0 +1,212 @@
+"""The fast engine's sum backwards: what the weights of a raster say of each sample, in compiled loops that gather.
+
+    L̄(q) = scale · w(view) · Π T(m(q)) · Σ_y F(y; y(q)) Σ_x F(x; x(q)) G(x, y)
+
+For each column of view taps the raster's weights G are mixed across once, into the columns of the samples. A row
+of samples is then a sum of the few rows of that on which it falls, made where it belongs and written once, band by
+band, so that what is mixed stays in the second-level cache. Every row is summed in the same order whoever does it:
+the bytes do not depend on how many threads there are.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.progress import Progress, tell
+from vcc.base.workers import Workers
+from vcc.engines import footprint_back_kernels as kernels
+from vcc.engines import footprint_tables as tables
+from vcc.engines.footprint_samples import FineGrid, MaskColumns, textures
+from vcc.engines.vector_sums import EIGHT
+from vcc.plan.footprints.model import Footprints
+from vcc.plan.footprints.shares import REACH, Taps, taps
+
+BAND_BYTES = 2**19
+"""Of what is mixed for the rows of samples that are made at once: it stays in the second-level cache."""
+LEAST, MOST = 32, 256
+"""Rows of samples that are made at once: fewer are divided too often, more leave threads without work."""
+TASKS = 3
+"""Pieces of work for each thread, at least, where there is so much."""
+
+Weights = NDArray[np.float32]
+
+
+def samples_back(
+    core: Footprints,
+    shape: tuple[int, ...],
+    raster: NDArray[np.floating],
+    threads: int,
+    progress: Progress | None = None,
+) -> Weights:
+    """The derivative of ⟨raster, what footprints make of samples⟩ to the samples.
+
+    Args:
+        core: the footprints.
+        shape: of the samples, (v, u, t, s[, channels]).
+        raster: weights of the raster's values, (rows, columns, channels).
+        threads: how many work at once.
+        progress: called with (done, total).
+
+    Returns:
+        Float32 of this shape; zero of views that no tap reads.
+    """
+    # Fresh memory is zero already, and costs nothing more than memory that is not.
+    gradient = np.zeros(shape, dtype=np.float32)
+    weights = np.ascontiguousarray(raster, dtype=np.float32)
+    with Workers(threads) as pool:
+        back = _ByColumns if core.separable else _Sheared
+        back(core, gradient, weights, pool, threads).run(progress)
+    return gradient
+
+
+class _Back:
+    """What both ways have in common: the samples' gradient, their division, and bands of their rows."""
+
+    def __init__(self, core: Footprints, gradient: Weights, raster: Weights, pool: Workers, threads: int) -> None:
+        self.core, self.gradient, self.raster, self.pool, self.threads = core, gradient, raster, pool, threads
+        self.channels = raster.shape[2]
+        self.fine = fine = FineGrid(core)
+        self.n = fine.columns * self.channels
+        """Values in a row of finer samples."""
+        self.divided, self.across = _division(fine, self.n)
+
+        self.height = int(np.clip(BAND_BYTES // (4 * self.n), LEAST, MOST))
+        """Rows of samples that are made at once."""
+
+    def pieces(self, rows: int, parts: int = 1) -> list[tables.Band]:
+        """So many rows in bands: enough of them for all threads, where there are so many parts already."""
+        bands = -(-TASKS * self.threads // parts)
+        return _bands(rows, -(-rows // bands))
+
+
+class _ByColumns(_Back):
+    """Where rows and columns part: column by column of view taps."""
+
+    def run(self, progress: Progress | None) -> None:
+        """Fill the gradient."""
+        core, fine = self.core, self.fine
+        rows, columns = core.raster_shape
+        start_y = core.y[:, 0] + core.row_step * fine.first_row
+        start_x = core.x[0] + core.column_step * fine.first_column
+        row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
+        down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
+        across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
+        self.down, self.sideways = _spread(down, fine.rows), _spread(across, fine.columns)
+        self.tiles = _eight_side_by_side(self.raster, self.sideways.shares.shape[2])
+        self.mixed = np.empty((rows, self.n), dtype=np.float32)
+        self.masks = MaskColumns(core, fine, 1, 1, self.pool)
+        self.weights = (core.weights * core.scale).astype(np.float32)
+        done = 0
+        for a in map(int, np.flatnonzero((core.weights != 0).any(axis=0))):
+            tell(progress, done, core.taps_used)
+            self.column(a)
+            done += int(np.count_nonzero(core.weights[:, a]))
+        tell(progress, core.taps_used, core.taps_used)
+
+    def column(self, a: int) -> None:
+        """Add what a column of view taps reads."""
+        mix = partial(kernels.mix_back, self.tiles, self.sideways, a, self.channels)
+        list(self.pool.map(lambda band: mix(band, self.mixed), self.pieces(len(self.tiles))))
+        masks = self.masks.at(a, self.fine.columns) or _no_masks()
+        flat = self.gradient.reshape(-1)
+
+        def add(piece: tuple[tables.Readers, tables.Band]) -> None:
+            readers, rows = piece
+            fine = self.divided, self.across
+            kernels.add_rows_back(self.mixed, readers, self.down, masks, *fine, rows, self.height, flat)
+
+        # Whole views, if there are enough of them: two threads that meet in a fresh page of memory both clear it.
+        parts = self.readers(a)
+        bands = self.pieces(self.core.samples[0], len(parts))
+        list(self.pool.map(add, [(readers, band) for readers in parts for band in bands]))
+
+    def readers(self, a: int) -> list[tables.Readers]:
+        """The taps of a column by the views that they read, in parts."""
+        core = self.core
+        used = np.flatnonzero(core.weights[:, a])
+        views, which = np.unique(core.view_rows[used], return_inverse=True)
+        view = math.prod(self.gradient.shape[2:])
+        begin = (views * self.gradient.shape[1] + core.view_columns[a]) * view
+        in_order = np.argsort(which, kind="stable")
+        sizes = core.samples[1], self.channels
+        found = []
+        for some in np.array_split(np.arange(len(views)), min(TASKS * self.threads, len(views))):
+            chosen = in_order[(which[in_order] >= some[0]) & (which[in_order] <= some[-1])]
+            ends = np.searchsorted(which[chosen], np.arange(some[0], some[-1] + 2))
+            found.append(tables.Readers(used[chosen], ends, begin[some], self.weights[:, a].copy(), *sizes))
+        return found
+
+
+class _Sheared(_Back):
+    """Where rows and columns do not part: view tap by view tap."""
+
+    def run(self, progress: Progress | None) -> None:
+        """Fill the gradient."""
+        core, fine = self.core, self.fine
+        grid = tables.Grid(
+            core.step,
+            core.shear,
+            core.row_step,
+            core.column_step,
+            core.refine,
+            fine.first_column,
+            fine.first_row,
+        )
+        name = core.interpolation
+        footprint = tables.Footprint(list(REACH).index(name), REACH[name], core.opening)
+        masks = textures(core)
+        mixed = np.empty((len(self.raster), fine.columns, self.channels), dtype=np.float32)
+        lines = self.pieces(len(self.raster))
+        bands = _bands(core.samples[0], min(self.height, -(-core.samples[0] // (TASKS * self.threads))))
+        nothing = np.zeros((1, 1, 1), dtype=np.float32)
+        for done, (b, a) in enumerate(zip(*np.nonzero(core.weights), strict=True)):
+            tell(progress, done, core.taps_used)
+            place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
+            view = tables.View(nothing, core.weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
+            mix = partial(kernels.mix_sheared_back, self.raster, view, grid, footprint, fine.columns)
+            list(self.pool.map(lambda band, mix=mix: mix(band, mixed), lines))
+            flat = self.gradient[core.view_rows[b], core.view_columns[a]].reshape(-1)
+            add = partial(kernels.add_sheared_back, mixed, view, grid, footprint, masks, self.divided, self.across)
+            list(self.pool.map(lambda band, add=add, to=flat: add(band, to), bands))
+        tell(progress, core.taps_used, core.taps_used)
+
+
+def _bands(rows: int, height: int) -> list[tables.Band]:
+    """So many rows in bands so high."""
+    return [tables.Band(start, min(start + height, rows)) for start in range(0, rows, height)]
+
+
+def _spread(gathered: Taps, samples: int) -> tables.Spread:
+    """Where so many samples' light goes, of a table of what pixels gather."""
+    found = gathered.by_sample(samples)
+    return tables.Spread(found.first, found.weights)
+
+
+def _division(fine: FineGrid, pitch: int) -> tuple[tables.FineSamples, tables.Spread]:
+    """How samples are divided, and of which finer columns each is made; nothing where they are not."""
+    if fine.divided_as is None:
+        rows, nothing = np.arange(fine.rows), np.zeros((0, 1), dtype=np.float32)
+        none = np.zeros(0, dtype=np.int64)
+        whole = np.ones((fine.rows, 1), dtype=np.float32)
+        return tables.FineSamples(rows, whole, none, nothing, pitch), tables.Spread(none, nothing)
+    across = fine.divided_as[1]
+    shares = Taps(across.first, across.shares.astype(np.float32))
+    return fine.tables(pitch), _spread(shares, fine.samples[1])
+
+
+def _no_masks() -> tables.MaskLines:
+    whole, places = np.zeros(0, dtype=np.int64), np.zeros((0, 1))
+    lines = np.zeros((0, 1), dtype=np.float32)
+    return tables.MaskLines(lines, places.astype(np.int64), whole, places, places[:, 0], 1)
+
+
+def _eight_side_by_side(raster: Weights, beyond: int) -> Weights:
+    """A raster (rows, columns, channels) as (rows / 8, values, 8), with columns of zeros beyond its last."""
+    rows, columns, channels = raster.shape
+    tall = np.zeros((-(-rows // EIGHT) * EIGHT, (columns + beyond) * channels), dtype=np.float32)
+    tall[:rows, : columns * channels] = raster.reshape(rows, -1)
+    return np.ascontiguousarray(tall.reshape(-1, EIGHT, tall.shape[1]).swapaxes(1, 2))
