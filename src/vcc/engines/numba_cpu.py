@@ -121,6 +121,36 @@ def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: 
     return values
 
 
+def prepared_back(
+    before: Sequence[operators.Before], values: NDArray[np.floating], threads: int
+) -> NDArray[np.floating]:
+    """The transpose of `prepared`, float32; see `vcc.plan.protocol.Engine.prepared_back`."""
+    for operator in reversed(before):
+        match operator:
+            case operators.SharpenViews(weights):
+                values = sharpening_kernels.given_back(weights, values, threads)
+            case operators.BlurViews():
+                values = _blurred_back(operator, values, threads)
+            case _:
+                values = operator.transpose(values)
+    return values.astype(np.float32, copy=False)
+
+
+def _blurred_back(
+    operator: operators.BlurViews, values: NDArray[np.floating], threads: int
+) -> NDArray[np.float32]:
+    """The transpose of views blurred, several at a time."""
+    (high, wide), (nv, nu, nt, ns, *channels) = operator.kernel.shape, values.shape
+    found = np.empty((nv, nu, nt - high + 1, ns - wide + 1, *channels), dtype=np.float32)
+
+    def one(view: tuple[int, ...]) -> None:
+        found[view] = operator.transpose(values[view][None, None])[0, 0]
+
+    with Workers(threads) as pool:
+        list(pool.map(one, np.ndindex(nv, nu)))
+    return found
+
+
 def finished(after: Sequence[operators.After], raster: NDArray[Any], threads: int) -> NDArray[np.float32]:
     """The picture (rows, columns, channels), float32, of a raster (rows, columns, channels).
 

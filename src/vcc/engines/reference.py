@@ -95,6 +95,13 @@ def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: 
     return values
 
 
+def prepared_back(before: Sequence[operators.Before], values: Array, threads: int) -> Array:
+    """The transpose of `prepared`, float64; see `vcc.plan.protocol.Engine.prepared_back`."""
+    for operator in reversed(before):
+        values = operator.transpose(values)
+    return np.asarray(values, dtype=np.float64)
+
+
 def finished(after: Sequence[operators.After], raster: Array, threads: int) -> Array:
     """The picture (rows, columns, channels), float64, of a raster."""
     return np.asarray(operators.finished(after, raster), dtype=np.float64)

@@ -39,6 +39,25 @@ def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int |
     return kept
 
 
+def given_back(weights: tuple[int, int, int], values: NDArray[Any], threads: int) -> NDArray[np.float32]:
+    """The transpose of `filtered`, float32: what weights of filtered samples say of the samples as given.
+
+    Rounding is left out, and so is the unit of what 8 bits become: see `vcc.plan.protocol.Engine.prepared_back`.
+    """
+    found = np.empty(values.shape, dtype=np.float32)
+    factors = (np.array(weights) * 2.0**-DIGITS).astype(np.float32)
+    rows, channels = values.shape[2], values.shape[4] if values.ndim == 5 else 1
+
+    def give_row(row: int) -> None:
+        for column in range(values.shape[1]):
+            view = np.ascontiguousarray(values[row, column], dtype=np.float32).reshape(rows, -1)
+            give_back(view, found[row, column].reshape(rows, -1), channels, factors)
+
+    with Workers(threads) as pool:
+        list(pool.map(give_row, range(values.shape[0])))
+    return found
+
+
 @_compiled
 def sharpen_across(row, plain, line, channels, weights):  # type: ignore[no-untyped-def]
     """A row of pixels filtered along itself; ``plain`` is room for the row in the type of the sums."""
@@ -95,3 +114,43 @@ def sharpen(view, kept, channels, weights, whole, lines):  # type: ignore[no-unt
                 kept[r, q] = total
             else:
                 kept[r, q] = np.int32(total + half) >> SHIFT
+
+
+@_compiled
+def give_back(view, found, channels, weights):  # type: ignore[no-untyped-def]
+    """The transpose of `sharpen`, for real numbers.
+
+    The filter is even, so that it is its own transpose but at the border: there the last samples went on, and get
+    back what was taken from beyond them.
+    """
+    rows, length = view.shape
+    middle, near, far = weights[0], weights[1], weights[2]
+    # What lies beyond a border took nothing from anybody: zero, along rows and beyond the first and last of them.
+    lines, padded = np.zeros((5, length), view.dtype), np.zeros(length + 2 * REACH * channels, view.dtype)
+    left2, left, here = padded, padded[channels:], padded[2 * channels :]
+    right, right2 = padded[3 * channels :], padded[4 * channels :]
+    for r in range(-REACH, rows):
+        ahead = r + REACH
+        line = lines[ahead % 5]
+        if ahead < rows:
+            here[:length] = view[ahead]
+            for q in range(length):
+                line[q] = middle * here[q] + near * (left[q] + right[q]) + far * (left2[q] + right2[q])
+            for channel in range(channels):
+                last = length - channels + channel
+                line[channel] += (near + far) * here[channel] + far * right[channel]
+                line[last] += (near + far) * here[last] + far * left[last]
+        else:
+            line[:] = 0
+        if r < 0:
+            continue
+        above2, above, level = lines[(r - 2) % 5], lines[(r - 1) % 5], lines[r % 5]
+        below, below2 = lines[(r + 1) % 5], lines[(r + 2) % 5]
+        for q in range(length):
+            found[r, q] = middle * level[q] + near * (above[q] + below[q]) + far * (above2[q] + below2[q])
+        if r == 0:
+            for q in range(length):
+                found[r, q] += (near + far) * level[q] + far * below[q]
+        if r == rows - 1:
+            for q in range(length):
+                found[r, q] += (near + far) * level[q] + far * above[q]

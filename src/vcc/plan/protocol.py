@@ -159,6 +159,24 @@ class Engine(Protocol):
         """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it."""
         ...
 
+    def prepared_back(self, before: Sequence[Any], values: Any, threads: int) -> Any:
+        """The transpose of `prepared`: of weights of the samples that a core takes, those of the samples given.
+
+        The operators' ``transpose``, the last one first. Each is the adjoint of its operator on real numbers: what
+        whole numbers are rounded to is left out, and so is what one of them stands for. Where samples of 8 bits
+        are kept as whole numbers of 16, each of which stands for ``kept_as(kind)[1]`` of a sample's, who calls
+        divides by this: a step of one in a sample is so many of theirs.
+
+        Args:
+            before: the operators, in the order in which they are applied.
+            values: weights (v, u, t, s[, channels]) of what comes out of the last one.
+            threads: how many work at once.
+
+        Returns:
+            Of the shape of the samples that the first one takes: float32 (float64 by ``reference``).
+        """
+        ...
+
     def finished(self, after: Sequence[Any], raster: Any, threads: int) -> Any:
         """The picture (rows, columns, channels) of a raster after all operators, in the engine's precision."""
         ...

@@ -278,7 +278,7 @@ class Backwards:
             if n in self.of_before:
                 numbers |= _named(f"before[{n}].", operator.pull(given[n], weights, self.of_before[n]))
             if n or samples:
-                weights = operator.transpose(weights)
+                weights = self.drive.engine.prepared_back((operator,), weights, self.drive.threads)
         return grown, Gradient(weights.astype(self._kind, copy=False) if samples else None, numbers)
 
 
