@@ -6,6 +6,7 @@ one; and the matrix A itself, which the plain engine gives where each sample is 
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "physics"))
-from random_cameras import AFFINE, drawn
-
 import vcc
-from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.engines import engine
 from vcc.plan.choice import compile_best
@@ -25,6 +22,9 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import How
 from vcc.plan.operators import BlurViews, SharpenViews, SwapPixelAxes
 from vcc.shapes.patterns import CosineSum
+
+sys.path.append(str(Path(__file__).parents[1] / "physics"))
+from random_cameras import AFFINE, drawn
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
@@ -39,7 +39,7 @@ MASKS = (
     vcc.Mask(pattern=CosineSum((5 * mm, 7 * mm), 2, 0.3), z=20 * mm, decentre=(0.5 * mm, -0.3 * mm)),
     vcc.Mask(pattern=np.random.default_rng(1).random((5, 4)), width=6 * mm, z=40 * mm),  # dark beyond its border
 )
-BOARD = vcc.Mask(pattern=np.indices((24, 24)).sum(axis=0) % 2, width=9 * mm)
+BOARD = vcc.Mask(pattern=np.indices((7, 7)).sum(axis=0) % 2, width=9 * mm)  # finer than a view's cell
 FAR = vcc.Sensor(44 * mm, (14, 15), 90e-6)
 CAMERAS = {
     "plain": vcc.Camera([LENS], SENSOR),
@@ -68,6 +68,18 @@ def core_of(camera: vcc.Camera, lf: vcc.LightField, **options) -> Footprints:
     core = compile_best(camera, lf.grid, How(method="footprints", **options)).core
     assert isinstance(core, Footprints)
     return core
+
+
+def refined(core: Footprints, times: int) -> Footprints:
+    """The same with samples divided, and views as they are: a plan divides the one or the other."""
+    return replace(core, refine=times)
+
+
+def of_some_taps(core: Footprints) -> Footprints:
+    """Where views are divided: several taps for each, and none of them in some rows and columns."""
+    assert len(core.view_rows) > len(np.unique(core.view_rows))
+    kept = np.random.default_rng(4).random(core.weights.shape) < 50 / core.taps_used
+    return replace(core, weights=core.weights * kept)
 
 
 def back(core: Footprints, shape: tuple[int, ...], raster: np.ndarray, threads: int = 2, **options) -> np.ndarray:
@@ -100,12 +112,12 @@ def assert_transposed(core: Footprints, *channels: int) -> None:
 @pytest.mark.parametrize("interpolation", [None, "nearest", "linear", "cubic"])
 @pytest.mark.parametrize("kind", AFFINE)
 def test_random_cameras(kind, interpolation):
-    for seed in range(3):
-        case = drawn(kind, seed, pixels=12, views=5)
+    for seed in range(2):
+        case = drawn(kind, seed, pixels=10, views=4)
         options = {} if interpolation is None else {"interpolation": interpolation}
         core = core_of(case.camera, case.light_field, **options)
         assert core.separable
-        assert_transposed(core, *([], [1], [3])[seed])
+        assert_transposed(core, *([], [3])[seed])
 
 
 @pytest.mark.parametrize("kind", AFFINE)
@@ -117,23 +129,25 @@ def test_random_cameras_before_light_fields_that_are_turned_or_divided(kind):
     assert_transposed(core_of(case.camera, turned, refine=2), 3)
 
 
-@pytest.mark.parametrize("channels", [(), (1,), (3,), (4,)])
 @pytest.mark.parametrize(("refine", "roll"), [(1, 0.0), (3, 0.0), (1, -0.7), (2, -0.7)])
 @pytest.mark.parametrize("name", CAMERAS)
-def test_the_transpose_is_that_of_the_matrix(name, refine, roll, channels):
-    """Every number of it, and the same in every channel that is weighed alike."""
-    shape = (3, 2, 5, 6)
-    core = core_of(CAMERAS[name], field(shape, roll), refine=refine)
+def test_the_transpose_is_that_of_the_matrix(name, refine, roll):
+    """Every number of it, for any number of channels."""
+    shape = (3, 2, 4, 5)
+    core = refined(core_of(CAMERAS[name], field(shape, roll)), refine)
     assert core.separable == (roll == 0)
-    assert core.refine == refine
-    assert (len(core.view_rows) > shape[0]) == (name == "divided views")
-    count = np.prod(shape)
+    if name == "divided views":
+        core = of_some_taps(core)
+    count = math.prod(shape)
     matrix = REFERENCE.footprints(core, np.eye(count).reshape(*shape, count), threads=1).values
-    y = weights_for(core, (*shape, *channels))
-    expected = np.einsum("yxn,yxc->nc", matrix, y).reshape(*shape, *channels)
-    # Single precision rounds products of weights, shares and masks, and sums of at most as many as there are pixels.
-    rounding = 4e-6 * np.einsum("yxn,yxc->nc", abs(matrix), abs(y)).reshape(expected.shape)
-    assert (abs(back(core, (*shape, *channels), y) - expected) <= rounding + 1e-7 * abs(expected).max()).all()
+    for channels in ((), (1,), (3,), (4,)):
+        y = weights_for(core, (*shape, *channels))
+        expected, size = (
+            np.einsum("yxn,yxc->nc", a, b).reshape(*shape, *channels)
+            for a, b in ((matrix, y), (abs(matrix), abs(y)))
+        )
+        # Single precision rounds products of weights, shares and masks, and sums of as many as there are pixels.
+        assert (abs(back(core, expected.shape, y) - expected) <= 4e-6 * size + 1e-7 * size.max()).all()
 
 
 @pytest.mark.parametrize("shape", [(1, 1, 1, 1), (1, 3, 1, 9), (2, 1, 7, 1, 3), (1, 1, 2, 3, 4)])
@@ -147,7 +161,9 @@ def test_tiny_views(shape):
 @pytest.mark.parametrize("name", ["masks", "divided views"])
 def test_any_number_of_threads_gives_the_same_bytes(name, refine, roll):
     shape = (4, 3, 70, 9, 3)
-    core = core_of(CAMERAS[name], field(shape, roll), refine=refine)
+    core = refined(core_of(CAMERAS[name], field(shape, roll)), refine)
+    if name == "divided views":
+        core = of_some_taps(core)
     y = weights_for(core, shape)
     first = back(core, shape, y, threads=1)
     assert first.any()

@@ -48,6 +48,23 @@ def test_tables_hold_every_share(interpolation, step, origin):
 
 
 @pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+@given(step=STEPS, origins=st.lists(st.floats(-40, 60), min_size=1, max_size=3))
+def test_tables_by_sample_hold_the_same_shares(interpolation, step, origins):
+    samples, pixels = 17, 23
+    table = taps(interpolation, np.array(origins), step, samples, pixels)
+    turned = table.by_sample(samples)
+    by_pixel = np.zeros((len(origins), pixels, samples + table.weights.shape[2]), np.float32)
+    by_sample = np.zeros((len(origins), pixels + turned.weights.shape[2], samples), np.float32)
+    for o in range(len(origins)):
+        for m, n in np.ndindex(pixels, table.weights.shape[2]):
+            by_pixel[o, m, table.first[o, m] + n] += table.weights[o, m, n]
+        for k, n in np.ndindex(samples, turned.weights.shape[2]):
+            by_sample[o, turned.first[o, k] + n, k] += turned.weights[o, k, n]
+    assert (by_pixel[:, :, :samples] == by_sample[:, :pixels]).all()
+    assert not by_sample[:, pixels:].any()
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
 @pytest.mark.parametrize("refine", [2, 3, 8])
 def test_dividing_samples_only_spreads_their_light(interpolation, refine):
     division = Division.of(interpolation, 9, refine)

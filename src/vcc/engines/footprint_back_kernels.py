@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcc.engines.bilinear import dark_outside
 from vcc.engines.compiled import compiled
 from vcc.engines.footprint_tables import EntryMasks
-from vcc.engines.numba_kernels import LINES, farthest, masks_at, share_at
+from vcc.engines.numba_kernels import farthest, masks_at, share_at
+from vcc.engines.splines import dark_outside
 from vcc.engines.vector_sums import EIGHT, mix_eight
 
 # Sums may be reordered so that they vectorise; NaN and infinity keep their meaning.
@@ -60,7 +60,7 @@ def add_rows_back(mixed, readers, spread, masks, fine, across, rows, height, gra
     taps, ends, begin, weights, columns, channels = readers
     first_row, row_shares, divided = fine.first_row, fine.row_shares, fine.first_column.size > 0
     n, count = mixed.shape[1], masks.row_step.size
-    lines = EntryMasks(masks.lines, np.empty((1, count, LINES), np.int64), np.empty((1, count, LINES), np.float32))
+    lines = EntryMasks(masks.lines, np.empty((1, count, 3), np.int64), np.empty((1, count, 3), np.float32))
     through, seen, line = np.empty(n // channels, np.float32), np.empty(n, np.float32), np.empty(n, np.float32)
     sums = np.empty((height, n + across.shares.shape[1] * channels) if divided else (0, 0), np.float32)
     for start in range(rows.start, rows.stop, height):
@@ -131,10 +131,8 @@ def _mask_row(weighed, row):  # type: ignore[no-untyped-def]
     lines, places, shares = weighed
     flat, n = lines.reshape(-1), row.size
     for mask in range(places.shape[1]):
-        above, here, below = places[0, mask, 0], places[0, mask, 1], places[0, mask, LINES - 1]
-        a, b, c = shares[0, mask, 0], shares[0, mask, 1], shares[0, mask, LINES - 1]
-        if LINES == 2:
-            c = np.float32(0)
+        above, here, below = places[0, mask, 0], places[0, mask, 1], places[0, mask, 2]
+        a, b, c = shares[0, mask, 0], shares[0, mask, 1], shares[0, mask, 2]
         one, two, three = flat[above : above + n], flat[here : here + n], flat[below : below + n]
         if mask == 0:
             for k in range(n):
