@@ -1,0 +1,182 @@
+"""From weights of a picture back to what it was made of, beside the picture itself; everything in the same run.
+
+    pip install .
+    python benchmarks/backwards.py                   # some minutes; prints Markdown
+    python benchmarks/backwards.py --case samples    # only the cases whose names begin so
+
+The light field has 20×20 views of 500×500 pixels, RGB. All steps of a case take turns; ratios are medians over the
+rounds, and of the shortest times of all rounds. Compare ratios, not seconds, between machines.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numba
+import numpy as np
+
+import vcc
+from vcc.plan.how import How
+from vcc.plan.model import Plan
+from vcc.run.backwards import back
+from vcc.run.drive import drive
+from vcc.units import mm
+
+THREADS = 2
+HOW = How(threads=THREADS)
+SHAPE = (20, 20, 500, 500, 3)
+Step = Callable[[], object]
+
+
+@dataclass(frozen=True)
+class Case:
+    """Steps that take turns.
+
+    Args:
+        name: what is compared.
+        steps: by name.
+        under: the step whose time the others are divided by.
+    """
+
+    name: str
+    steps: dict[str, Step]
+    under: str
+
+
+# --- what is pictured ---
+
+
+@cache
+def light_field(kind: str) -> vcc.LightField:
+    """Random samples of a type: what one holds does not change the time."""
+    values = np.random.default_rng(0).integers(0, 256, SHAPE, dtype=np.uint8)
+    held = values if kind == "uint8" else values.astype(np.float32) / np.float32(255)
+    return vcc.LightField.from_views(held, 1 * mm, 24 * mm / (52 * mm) / 500, 1.3, disparity_range=(-0.5, 0.5))
+
+
+def camera(masked: bool) -> vcc.Camera:
+    """A lens, and a mask of 1000×1000 cells in mid-path."""
+    sensor = vcc.Sensor(z=52 * mm, shape=(500, 500), pitch=24 * mm / 500 * 0.93)
+    cells = np.random.default_rng(1).random((1000, 1000)).round()
+    return vcc.Camera([vcc.Lens(50 * mm), *[vcc.Mask(cells, width=30 * mm, z=40 * mm)] * masked], sensor)
+
+
+def weights(plan: Plan) -> np.ndarray:
+    """Of a picture."""
+    return np.random.default_rng(2).standard_normal((*plan.sensor_shape, 3))
+
+
+def writing() -> None:
+    """As much memory as a gradient to the samples takes, new and written once."""
+    fresh = np.zeros(SHAPE, np.float32).reshape(SHAPE[0], -1)
+    with ThreadPoolExecutor(THREADS) as pool:
+        list(pool.map(lambda some: some.fill(1.0), fresh))
+
+
+# --- the cases ---
+
+
+def samples_by_footprints(masked: bool) -> Case:
+    """The derivative to all samples, by footprints."""
+    field, eight = light_field("float32"), light_field("uint8")
+    plan, plan_of_eight = (camera(masked).compile(each) for each in (field, eight))
+    given = weights(plan)
+    return Case(
+        f"samples by footprints{', a mask in mid-path' if masked else ''}",
+        {
+            "picture, float32": lambda: drive(plan, field, HOW),
+            "picture, 8 bits": lambda: drive(plan_of_eight, eight, HOW),
+            "back to all samples": lambda: back(plan, field, given, HOW),
+            "merely writing 1.2 GB": writing,
+        },
+        "picture, float32",
+    )
+
+
+CASES: dict[str, Callable[[], Case]] = {
+    "samples": lambda: samples_by_footprints(masked=False),
+    "samples, mask": lambda: samples_by_footprints(masked=True),
+}
+"""By name, in the order in which they are timed."""
+
+
+# --- time and memory ---
+
+
+def timed(case: Case, rounds: int) -> None:
+    """A table of a case: the median time of each step, and by how much it is longer than another."""
+    times: dict[str, list[float]] = {name: [] for name in case.steps}
+    for turn in range(rounds + 1):  # compiled, loaded and warm before anything counts
+        for name, step in case.steps.items():
+            start = time.perf_counter()
+            step()
+            if turn:
+                times[name].append(time.perf_counter() - start)
+    under = times[case.under]
+    print(f"| {case.name} | time | × {case.under} | of the shortest times |")
+    print("|---|---|---|---|")
+    for name, taken in times.items():
+        ratio = statistics.median(a / b for a, b in zip(taken, under, strict=True))
+        print(
+            f"| {name} | {statistics.median(taken):.3f} s | {ratio:.2f} | {min(taken) / min(under):.2f} |",
+            flush=True,
+        )
+    print()
+
+
+_CHILD = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from backwards import HOW, back, camera, light_field, weights
+def peak():
+    with open("/proc/self/status") as status:  # Linux; counts from the start of this very process
+        return next(int(line.split()[1]) / 1024 for line in status if line.startswith("VmHWM"))
+field = light_field("uint8")
+plan = camera(sys.argv[2] == "mask").compile(field)
+given = weights(plan)
+part = field[:1, :1, :8, :8]
+back(camera(sys.argv[2] == "mask").compile(part), part, given, HOW)  # loads the libraries
+before = peak()
+found = back(plan, field, given, HOW).samples
+print(peak() - before - found.nbytes / 2**20)
+"""
+
+
+def memory() -> None:
+    """Memory beside samples and gradient, of the derivative to all samples by footprints."""
+    here = str(Path(__file__).resolve().parent)
+    for kind, words in (("plain", "conventional"), ("mask", "mask in mid-path")):
+        out = subprocess.run(
+            [sys.executable, "-c", _CHILD, here, kind], capture_output=True, text=True, check=True
+        )
+        print(f"Peak memory beside samples and their gradient, {words}: {float(out.stdout):.0f} MB.")
+
+
+def main() -> None:
+    """Print all tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=9, help="rounds of all steps (default 9)")
+    parser.add_argument("--case", default="", help="only cases whose names begin so")
+    given = parser.parse_args()
+    print(f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, ")
+    print(f"NumPy {np.__version__}, Numba {numba.__version__}\n")
+    for name, case in CASES.items():
+        if name.startswith(given.case):
+            timed(case(), given.rounds)
+    memory()
+
+
+if __name__ == "__main__":
+    main()
