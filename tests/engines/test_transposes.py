@@ -101,6 +101,8 @@ def assert_transposed(core: Footprints, *channels: int) -> None:
     assert gradient.shape == shape
     assert gradient.dtype == np.float32
     assert not gradient[-1].any()
+    plain = REFERENCE.footprints_back(core, x, y, threads=1).samples
+    assert np.abs(gradient - plain).max() <= 2 * ROUNDING * np.abs(plain).max()
     right = np.vdot(x.astype(float), gradient)
     for each in (NUMBA, REFERENCE):
         raster = each.footprints(core, x, threads=2).values.astype(float)

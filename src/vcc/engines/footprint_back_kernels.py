@@ -57,7 +57,7 @@ def add_rows_back(mixed, readers, spread, masks, fine, across, rows, height, gra
     Where samples are divided, mixed, spread and masks are of the finer ones. fine: `FineSamples`, without columns
     where they are not. across: `Spread` of the columns of samples over those of finer ones.
     """
-    taps, ends, begin, weights, columns, channels, fresh = readers
+    taps, ends, begin, weights, columns, channels = readers
     first_row, row_shares, divided = fine.first_row, fine.row_shares, fine.first_column.size > 0
     n, count = mixed.shape[1], masks.row_step.size
     lines = EntryMasks(masks.lines, np.empty((1, count, 3), np.int64), np.empty((1, count, 3), np.float32))
@@ -66,9 +66,6 @@ def add_rows_back(mixed, readers, spread, masks, fine, across, rows, height, gra
     for start in range(rows.start, rows.stop, height):
         stop = min(start + height, rows.stop)
         for view in range(begin.size):
-            if fresh:  # is zero already: but memory that is read before it is written is mapped twice
-                first, last = begin[view] + start * columns * channels, begin[view] + stop * columns * channels
-                gradient[first:last] = 0
             sums[:] = 0
             for l in range(first_row.size):
                 if first_row[l] >= stop or first_row[l] + row_shares.shape[1] <= start:

@@ -195,7 +195,6 @@ class Readers(NamedTuple):
         weights: (rows of taps,) float32.
         columns: of samples in a view.
         channels: values a sample.
-        fresh: whether no column of taps before has read these views.
     """
 
     taps: NDArray[np.int64]
@@ -204,7 +203,6 @@ class Readers(NamedTuple):
     weights: NDArray[np.float32]
     columns: int
     channels: int
-    fresh: bool
 
 
 # --- where they do not ---

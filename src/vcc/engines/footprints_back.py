@@ -100,12 +100,10 @@ class _ByColumns(_Back):
         self.mixed = np.empty((rows, self.n), dtype=np.float32)
         self.masks = MaskColumns(core, fine, 1, 1, self.pool)
         self.weights = (core.weights * core.scale).astype(np.float32)
-        self.read: set[int] = set()
         done = 0
         for a in map(int, np.flatnonzero((core.weights != 0).any(axis=0))):
             tell(progress, done, core.taps_used)
             self.column(a)
-            self.read.add(int(core.view_columns[a]))
             done += int(np.count_nonzero(core.weights[:, a]))
         tell(progress, core.taps_used, core.taps_used)
 
@@ -134,12 +132,12 @@ class _ByColumns(_Back):
         view = math.prod(self.gradient.shape[2:])
         begin = (views * self.gradient.shape[1] + core.view_columns[a]) * view
         in_order = np.argsort(which, kind="stable")
-        rest = core.samples[1], self.channels, int(core.view_columns[a]) not in self.read
+        sizes = core.samples[1], self.channels
         found = []
         for some in np.array_split(np.arange(len(views)), min(TASKS * self.threads, len(views))):
             chosen = in_order[(which[in_order] >= some[0]) & (which[in_order] <= some[-1])]
             ends = np.searchsorted(which[chosen], np.arange(some[0], some[-1] + 2))
-            found.append(tables.Readers(used[chosen], ends, begin[some], self.weights[:, a].copy(), *rest))
+            found.append(tables.Readers(used[chosen], ends, begin[some], self.weights[:, a].copy(), *sizes))
         return found
 
 

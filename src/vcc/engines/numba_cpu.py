@@ -73,7 +73,9 @@ def footprints_back(
 ) -> Gradient:
     """What a raster's weights say of samples, float32, and of numbers; see `vcc.plan.protocol.BackRunner`."""
     if wanted:
-        raise InputError(f"there is no derivative to {', '.join(sorted(wanted))}")
+        raise InputError(
+            f"engine 'numba' has no derivatives to {', '.join(sorted(wanted))}: use engine='reference'"
+        )
     return Gradient(samples_back(core, values.shape, raster, threads, progress) if samples else None)
 
 
