@@ -87,6 +87,7 @@ _MODULES = {
     "sources",
     "store",
     "surfaces",
+    "torch",
     "units",
 }
 

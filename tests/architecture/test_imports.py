@@ -60,6 +60,7 @@ FACES = {
     "operators",
     "patterns",
     "surfaces",
+    "torch",
     "units",
 }
 """Modules by which users import what stands in a folder: nothing of ours imports them."""
@@ -80,6 +81,9 @@ BY_NAME = {
 
 NEVER = {"torch", "jax", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""
+
+OF_TORCH = re.compile(r"torch|learn\.torch_\w+")
+"""But these: they are for programs that have imported PyTorch already, and nothing else of ours imports them."""
 
 LATE = {
     "numba",
@@ -231,7 +235,13 @@ def test_only_those_listed_load_modules_by_name():
 @pytest.mark.parametrize("module", INSIDE)
 def test_heavy_libraries_are_never_imported(module):
     heavy = {name.split(".")[0] for name, _ in imports(MODULES[module])} & NEVER
-    assert not heavy
+    assert not heavy - ({"torch"} if OF_TORCH.fullmatch(module) else set())
+
+
+def test_what_imports_torch_is_imported_by_its_face_only():
+    for module in INSIDE:
+        of_torch = {target for target in GRAPH[module] if OF_TORCH.fullmatch(target)}
+        assert not of_torch or OF_TORCH.fullmatch(module), module
 
 
 def test_importing_vcc_and_making_a_camera_loads_nothing_slow():

@@ -28,8 +28,8 @@ def test_what_is_put_is_read_again_and_saved(kind, tmp_path):
     own = [name for name in names(camera) if name.split(".")[0] == ELEMENTS[kind].name]
     assert {name.split(".")[1] for name in own} >= {"z", "decentre"}
     for name in own:
-        if name.endswith((".weights", ".profile", ".radii", ".kernel", ".matrix", ".stop_from_entrance")):
-            continue  # of which a numbers hang together
+        if name.endswith((".matrix", ".stop_from_entrance")):
+            continue  # whose determinant is 1
         numbers = read(camera, name)
         wanted = numbers - 1e-3 * scale(camera, name)
         made = put(camera, {name: wanted})
@@ -51,7 +51,7 @@ def test_every_number_of_an_element_is_a_parameter(kind):
         for field in dataclasses.fields(element)
         if isinstance(getattr(element, field.name), float | np.ndarray)
     }
-    assert numbers <= own
+    assert numbers - {"weights"} <= own  # which sum to 1
 
 
 def test_all_are_put_at_once():
@@ -111,6 +111,22 @@ def test_elements_that_cannot_be_told_apart_have_none():
     camera = vcc.Camera([vcc.Lens(1.0), vcc.Lens(2.0)], SENSOR)
     with pytest.raises(vcc.InputError, match=r"2 elements are a lens without a name.*\"first.focal_length\""):
         read(camera, "lens.focal_length")
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("measured diffuser", "kernel"),
+        ("radial diffuser", "kernel.radii"),
+        ("radial diffuser", "kernel.profile"),
+        ("mixed diffuser", "weights"),
+    ],
+)
+def test_numbers_of_which_none_can_change_alone_are_none(kind, name):
+    camera = camera_with(ELEMENTS[kind])
+    with pytest.raises(vcc.InputError, match=r"cannot be learned: it is .* 1, of which none can change alone"):
+        read(camera, f"frosted.{name}")
+    assert f"frosted.{name}" not in names(camera)
 
 
 def test_choices_and_functions_are_none():

@@ -21,10 +21,12 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.optics.diffuser import CodedDiffuser
 from vcc.optics.faces import Element
 from vcc.optics.mask import Mask
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
+from vcc.shapes.kernels import Radial, Samples
 from vcc.shapes.patterns import Cells
 
 Array = NDArray[np.float64]
@@ -34,6 +36,13 @@ SENSOR = "sensor"
 """The name under which the sensor's parameters stand."""
 FEW = 3
 """Parameters that an error still names one by one."""
+TOGETHER: dict[tuple[type, str], str] = {
+    (Samples, "values"): "shares that sum to 1",
+    (Radial, "profile"): "a density whose integral is 1",
+    (Radial, "radii"): "radii from 0 on of a density whose integral is 1",
+    (CodedDiffuser, "weights"): "shares that sum to 1",
+}
+"""Fields of numbers of which none can change alone, and what they are."""
 CONTENT = "values"
 """The field that holds what a thing is made of: its array goes by the name of the thing itself."""
 
@@ -134,6 +143,9 @@ def why_none(found: Parameter) -> str | None:
         return f"a whole number, {value}" if np.ndim(value) == 0 else f"whole numbers, {value}"
     if kind not in "iuf":
         return f"a {type(value).__name__}, and no number"
+    together = TOGETHER.get((type(found.holder), found.field))
+    if together is not None:
+        return f"{together}, of which none can change alone"
     if not np.isfinite(np.asarray(value, dtype=np.float64)).all():
         return f"{value}: it has no finite value to begin with"
     return None

@@ -30,7 +30,6 @@ import numpy as np
 from vcc.learn.parameters import Parameter, parameter
 from vcc.optics import (
     Biprism,
-    CodedDiffuser,
     Element,
     FirstOrder,
     LensArray,
@@ -42,7 +41,7 @@ from vcc.optics import (
 from vcc.optics.electronics import Electronics
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
-from vcc.shapes.kernels import Gaussian, Radial, Samples, TopHat
+from vcc.shapes.kernels import Gaussian, Samples, TopHat
 from vcc.shapes.patterns import Cells, CosineSum
 from vcc.shapes.surfaces import Axicon, Cubic, HeightMap, PathMap, Rough, Tilt, Zernike
 
@@ -157,9 +156,7 @@ OWN: Mapping[tuple[type, str], Callable[[_At], float]] = {
     (Axicon, "slope"): _slope,
     (Gaussian, "sigma"): _slope,
     (TopHat, "width"): _slope,
-    (Radial, "radii"): _slope,
     (Samples, "slope_pitch"): _of_itself,
-    (CodedDiffuser, "weights"): _one,
     (CosineSum, "phase"): _one,
     (Cells, "values"): _one,
     (Mask, "pattern"): _one,

@@ -262,7 +262,7 @@ def numbers_of(
         threads: how many work at once; None takes as many as this process may use cores.
     """
     rows = rate.shape[0]
-    height = max(1, _BLOCK // max(1, rate[0].size))
+    height = _rows_of_a_block(rate.shape)
     values = np.empty(rate.shape, np.uint8 if electronics.bit_depth <= 8 else np.uint16)
 
     def read_block(block: int) -> int:
@@ -276,6 +276,31 @@ def numbers_of(
     with Workers(threads or cores()) as pool:
         saturated = sum(pool.map(read_block, range(math.ceil(rows / height))))
     return values, saturated / (rate.shape[0] * rate.shape[1])
+
+
+def fixed_pattern(
+    shape: tuple[int, ...], electronics: Electronics
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What belongs to a sensor: by how much each pixel's sensitivity and offset differ, in units of PRNU and DSNU.
+
+    Args:
+        shape: of what it records, (rows, columns) or (rows, columns, channels).
+        electronics: of whose seed the pattern follows.
+
+    Returns:
+        Normal numbers, two arrays of that shape.
+    """
+    height = _rows_of_a_block(shape)
+    drawn = []
+    for block, first in enumerate(range(0, shape[0], height)):
+        pattern = _generator(electronics.pattern_seed, _PATTERN, block)
+        drawn.append([pattern.standard_normal((min(height, shape[0] - first), *shape[1:])) for _ in range(2)])
+    sensitivity, offset = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
+    return sensitivity, offset
+
+
+def _rows_of_a_block(shape: tuple[int, ...]) -> int:
+    return max(1, _BLOCK // max(1, math.prod(shape[1:])))
 
 
 def _generator(seed: int, stream: int, block: int) -> np.random.Generator:

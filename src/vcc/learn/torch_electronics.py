@@ -1,0 +1,181 @@
+"""What a sensor's electronics make of a picture, as a function that carries gradients.
+
+The physics is that of `vcc.run.expose` (EMVA 1288), with what has no derivative replaced:
+
+- the number of electrons is its mean and √mean times a normal number (drawn beforehand, so that the derivative
+  goes through both), where `vcc.Camera.expose` draws a Poisson number. Mean and variance are right at any number
+  of electrons; the distribution is from about 20 electrons on (its skewness, 1/√n, is then 0.2 and less).
+- rounding to whole numbers lets gradients straight through.
+- what clips has the derivative that it has: 0 below black and above the full well or the largest number.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from typing import Any
+
+import torch
+
+from vcc.base import checks
+from vcc.base.errors import InputError
+from vcc.optics.electronics import LIGHT_SPEED, PLANCK, Electronics
+from vcc.optics.sensor import Sensor
+from vcc.run.expose import electronics_of, fixed_pattern
+
+FEWEST = 1.0
+"""Electrons below which the derivative of √n is that at so many: at none at all it would be infinite."""
+NUMBERS = tuple(field.name for field in dataclasses.fields(Electronics) if str(field.type).startswith("float"))
+"""Of the electronics, what may be a tensor."""
+
+
+def expose(
+    picture: torch.Tensor,
+    sensor: Sensor,
+    exposure: float | torch.Tensor,
+    *,
+    radiance: float = 1.0,
+    noise: bool = True,
+    generator: torch.Generator | None = None,
+    **numbers: float | torch.Tensor,
+) -> torch.Tensor:
+    """What a sensor records of a picture, in digital numbers, with gradients to all that is a tensor.
+
+    Args:
+        picture: irradiance, radiance × steradian, (..., rows, columns) or (..., rows, columns, channels), as
+            `CameraModule` gives it. What is below 0 is dark.
+        sensor: with electronics.
+        exposure: seconds.
+        radiance: what a light field's sample value of 1 stands for, W/(m²·sr), in each channel's band.
+        noise: whether there is noise of light and of reading; PRNU and DSNU, which are the sensor's, are always.
+        generator: of the noise; None takes PyTorch's own.
+        numbers: of the electronics, those that are to be others, by name, tensors or numbers: ``gain``,
+            ``black_level``, ``read_noise``, ``dark_current``, ``full_well``, ``quantum_efficiency``,
+            ``wavelength``, ``prnu``, ``dsnu``; in their units (`vcc.Electronics`).
+
+    Returns:
+        Digital numbers, whole ones, of the picture's type: its shape, without the channels behind a colour filter.
+
+    Raises:
+        InputError: a picture of another shape than the sensor or not finite, channels that the sensor cannot
+            record, a sensor without electronics, no exposure above 0, numbers that do not exist.
+    """
+    return exposed(picture, sensor, exposure, numbers, radiance, sensor.sensitive_area, generator, noise)
+
+
+def exposed(
+    picture: torch.Tensor,
+    sensor: Sensor,
+    exposure: float | torch.Tensor,
+    numbers: dict[str, Any],
+    radiance: float,
+    area: float | torch.Tensor,
+    generator: torch.Generator | None,
+    noise: bool,
+) -> torch.Tensor:
+    """As `expose`, for pixels of any sensitive area, m², a tensor or a number."""
+    electronics = electronics_of(sensor)
+    seconds = _above_zero("exposure", exposure)
+    radiance = checks.above_zero("radiance", radiance, unit="W/(m²·sr)")
+    light, channel = _filtered(picture, sensor, electronics)
+    known = {name: _tensor(getattr(electronics, name), light) for name in NUMBERS}
+    known |= {name: _tensor(value, light) for name, value in _checked(numbers).items()}
+    per_joule = (
+        _of(known["quantum_efficiency"], channel) * _of(known["wavelength"], channel) / (PLANCK * LIGHT_SPEED)
+    )
+    mean = torch.clamp(light, min=0.0) * per_joule * (radiance * area * seconds)
+    offset: Any = 0.0
+    if any(getattr(electronics, name) or name in numbers for name in ("prnu", "dsnu")):
+        # The sensor's own, and so the same in all pictures of a batch.
+        shape = (*sensor.shape, *light.shape[light.ndim - channel.axes :])
+        sensitivity, unlike = (_tensor(part, light) for part in fixed_pattern(shape, electronics))
+        mean = mean * torch.clamp(1 + known["prnu"] * sensitivity, min=0.0)
+        offset = known["dsnu"] * unlike
+    charge = _charge(mean + known["dark_current"] * seconds, known, generator, noise)
+    return _numbers(charge + offset, known, electronics)
+
+
+def _charge(mean: Any, known: dict[str, Any], generator: torch.Generator | None, noise: bool) -> Any:
+    """Electrons of a mean, at most the full well, with the noise of reading them."""
+    if not noise:
+        return torch.minimum(mean, known["full_well"])
+    shot, read = (torch.randn(mean.shape, generator=generator, dtype=mean.dtype) for _ in range(2))
+    # Its value is √mean; its derivative that of the tangent at FEWEST where there are fewer.
+    root = torch.sqrt(torch.clamp(mean, min=FEWEST)) + torch.clamp(mean - FEWEST, max=0.0) / (2 * FEWEST**0.5)
+    root = root + (torch.sqrt(mean) - root).detach()
+    return torch.minimum(mean + root * shot, known["full_well"]) + known["read_noise"] * read
+
+
+def _numbers(charge: Any, known: dict[str, Any], electronics: Electronics) -> Any:
+    """Digital numbers of electrons: rounded, with the derivative of what is not, and clipped."""
+    numbers = known["black_level"] + known["gain"] * charge
+    rounded = numbers + (torch.round(numbers) - numbers).detach()
+    return torch.clamp(rounded, 0.0, float(electronics.largest_number))
+
+
+@dataclasses.dataclass(frozen=True)
+class _Channel:
+    """Which channel each pixel's light is of.
+
+    Args:
+        index: of the channel, a tensor that broadcasts against a picture's last axes; None for grey.
+        axes: how many axes of channels light has behind its filters, 0 or 1.
+    """
+
+    index: torch.Tensor | None
+    axes: int
+
+
+def _filtered(picture: torch.Tensor, sensor: Sensor, electronics: Electronics) -> tuple[torch.Tensor, _Channel]:
+    """Light as each pixel gets it behind its colour filter, (..., rows, columns[, channels])."""
+    _check_picture(picture, sensor)
+    channels = picture.shape[-1] if picture.shape[-3:-1] == sensor.shape else None
+    electronics.check_channels(channels)
+    if channels is None:
+        return picture, _Channel(None, 0)
+    if electronics.color_filter is None:
+        return picture, _Channel(torch.arange(channels), 1)
+    tile = torch.tensor(electronics.tile)
+    (rows, columns), (high, wide) = sensor.shape, tile.shape
+    index = tile.repeat(-(-rows // high), -(-columns // wide))[:rows, :columns]
+    chosen = index.expand(picture.shape[:-1])[..., None]
+    return torch.gather(picture, -1, chosen)[..., 0], _Channel(index, 0)
+
+
+def _check_picture(picture: Any, sensor: Sensor) -> None:
+    if not isinstance(picture, torch.Tensor) or not picture.is_floating_point():
+        kind = picture.dtype if isinstance(picture, torch.Tensor) else type(picture).__name__
+        raise InputError(f"picture is a tensor of floating point, as CameraModule gives it, not {kind}")
+    if sensor.shape not in (tuple(picture.shape[-2:]), tuple(picture.shape[-3:-1])):
+        raise InputError(
+            f"the sensor has {sensor.shape} pixels (rows, columns), and the picture the shape "
+            f"{tuple(picture.shape)}: it is (..., rows, columns) or (..., rows, columns, channels)"
+        )
+    if not torch.isfinite(picture).all():
+        raise InputError("the picture on the sensor has values that are not finite: no exposure can record them")
+
+
+def _checked(numbers: dict[str, Any]) -> dict[str, Any]:
+    """Numbers of the electronics that there are."""
+    for name in numbers:
+        if name not in NUMBERS:
+            near = difflib.get_close_matches(name, NUMBERS, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(NUMBERS)}"
+            raise InputError(f"electronics have no number {name}: {hint}")
+    return numbers
+
+
+def _above_zero(name: str, value: float | torch.Tensor) -> float | torch.Tensor:
+    """A number above 0, of which a tensor stays one."""
+    plain = value.detach().item() if isinstance(value, torch.Tensor) and value.ndim == 0 else value
+    checks.above_zero(name, plain, unit="s", way_out="give a time such as 10 * vcc.units.ms, or a tensor of one")
+    return value
+
+
+def _tensor(value: Any, like: torch.Tensor) -> torch.Tensor:
+    return torch.as_tensor(value, dtype=like.dtype)
+
+
+def _of(number: torch.Tensor, channel: _Channel) -> torch.Tensor:
+    """A number of the electronics for the light of each pixel."""
+    return number[channel.index] if number.ndim and channel.index is not None else number

@@ -1,0 +1,86 @@
+"""Derivatives to parameters that are called exact pass `torch.autograd.gradcheck`, by the reference in float64."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.learn.cameras import ELEMENTS
+from torch.func import functional_call
+
+import vcc
+from vcc.learn.parameters import names
+from vcc.learn.verdicts import verdict
+from vcc.torch import CameraModule
+from vcc.units import mm
+
+FIELD = vcc.LightField.from_views(
+    np.random.default_rng(0).random((4, 3, 5, 4)),
+    1.6 * mm,
+    12e-3,
+    1.0,
+    disparity_range=(-0.3, 0.4),
+    sample="point",
+)
+SENSOR = vcc.Sensor(60 * mm, (3, 4), (0.41 * mm, 0.37 * mm), decentre=(0.11 * mm, -0.07 * mm), fill_factor=0.8)
+LENS = vcc.Lens(57 * mm, 3.7 * mm, z=2.1 * mm, decentre=(0.13 * mm, 0.07 * mm), name="main")
+
+BY_FOOTPRINTS = [
+    "prism",
+    "mask of cells",
+    "mask of cosines",
+    "circle",
+    "gaussian diffuser",
+    "quadratic plate",
+    "first order",
+]
+BY_RAYS = ["mask of cosines", "gaussian diffuser", "cubic plate", "lens array of two", "prism"]
+
+
+def camera_with(kind):
+    element = ELEMENTS[kind]
+    lens = [] if element.name == "relay" else [LENS]
+    at_lens = kind == "cubic plate"
+    z = 58 * mm if isinstance(element, vcc.LensArray) else 2.1 * mm if at_lens else 10.3 * mm
+    return vcc.Camera([*lens, replace(element, z=z, decentre=(0.05 * mm, -0.08 * mm))], SENSOR)
+
+
+def check(camera, learn, **options):
+    """All parameters' derivatives of a weighted picture against differences of it.
+
+    A change of 1 moves light by some pixels. A step of 1e-5 leaves 1e-16/1e-5 = 1e-11 of the picture as rounding,
+    and where a slope has a corner (pieces of polynomials in the pixels, textures of rays) half a step: 1e-5 of it.
+    """
+    model = CameraModule(camera, FIELD, learn, engine="reference", **options)
+    keys, numbers = zip(*((name, number.detach()) for name, number in model.named_parameters()), strict=True)
+    weights = torch.randn(*SENSOR.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+    unit = 1 / model().detach().abs().mean()
+
+    def weighted(*moved):
+        return (functional_call(model, dict(zip(keys, moved, strict=True)), ()) * weights).sum() * unit
+
+    given = tuple(number.clone().requires_grad_() for number in numbers)
+    assert torch.autograd.gradcheck(weighted, given, eps=1e-5, atol=1e-5, rtol=1e-3, check_undefined_grad=False)
+
+
+@pytest.mark.parametrize("kind", BY_FOOTPRINTS)
+def test_by_footprints(kind):
+    camera, how = camera_with(kind), vcc.How(refine=1)
+    own = [name for name in names(camera) if name.split(".")[0] == ELEMENTS[kind].name]
+    check(camera, [name for name in own if verdict(camera, FIELD.grid, name, how).kind == "exact"], how=how)
+
+
+def test_by_footprints_lens_and_sensor():
+    camera = camera_with("prism")
+    check(camera, [name for name in names(camera) if name.split(".")[0] in ("main", "sensor")], refine=1)
+
+
+@pytest.mark.parametrize("kind", BY_RAYS)
+def test_by_rays(kind):
+    camera, how = camera_with(kind), vcc.How(method="rays", samples=8)
+    own = [name for name in names(camera) if name.split(".")[0] in (ELEMENTS[kind].name, "sensor")]
+    exact = [name for name in own if verdict(camera, FIELD.grid, name, how).kind == "exact"]
+    assert len(exact) >= 5
+    check(camera, exact, how=how)
