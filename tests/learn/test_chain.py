@@ -5,13 +5,26 @@ The oracle is what a lens does: places in closed form; and for random cameras di
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import vcc
 from vcc.learn.chain import Chain
+from vcc.learn.parameters import names as all_names
+from vcc.learn.parameters import read
+from vcc.learn.scales import scale
 from vcc.plan.how import How
+from vcc.plan.operators import finished
+from vcc.run.backwards import back
+from vcc.run.drive import Drive
 from vcc.units import mm, um
+
+sys.path.append(str(Path(__file__).parents[1] / "physics"))
+from random_cameras import drawn
 
 LIGHT_FIELD = vcc.LightField.from_views(
     np.random.default_rng(0).random((4, 5, 12, 14)).astype(np.float32), 2 * mm, 2e-3, disparity_range=(0, 0)
@@ -98,5 +111,72 @@ def test_rays_that_move_against_a_hard_edge_are_refused():
 # --- pictures
 
 
-def weights_of(plan, seed: int = 4) -> np.ndarray:
-    return np.random.default_rng(seed).standard_normal((*plan.sensor_shape, 1))
+def picture(plan, light_field, how) -> np.ndarray:
+    """In double precision, (rows, columns, channels)."""
+    drive = Drive(plan, light_field, how)
+    return np.asarray(finished(plan.after, drive.summed(drive.blocks).values), dtype=np.float64)
+
+
+def check_derivatives(camera: vcc.Camera, light_field: vcc.LightField, names: list[str], how: How) -> None:
+    """⟨G, picture⟩ by the chain and the way back of the reference, against its differences over two decades."""
+    chain = Chain(camera, light_field.grid, how, names)
+    plan = chain.plan()
+    weights = np.random.default_rng(4).standard_normal(picture(plan, light_field, how).shape)
+    numbers = {number for followed in chain.followed().values() for number in followed}
+    wanted = [number for number in numbers if not number.endswith("half_widths")]  # which say what tents are
+    given = weights if light_field.values.ndim == 5 else weights[..., 0]
+    back_to_numbers = back(plan, light_field, given, how, samples_wanted=False, wanted=wanted).numbers
+    pulled = chain.pull({}, back_to_numbers)
+    # What rounding leaves of a sum over the picture: 1e-16 of its terms, divided by the step.
+    rounding = 1e-14 * np.abs(weights * picture(plan, light_field, how)).sum()
+    for name in names:
+        here, unit = read(camera, name), scale(camera, name)
+        for index in np.ndindex(here.shape):
+            for step in (1e-6, 1e-5, 1e-4):
+                sides = []
+                for side in (1, -1):
+                    there = here.copy()
+                    there[index] += side * step * unit
+                    sides.append((weights * picture(chain.plan({name: there}), light_field, how)).sum())
+                slope = (sides[0] - sides[1]) / (2 * step)
+                found = pulled[name][index] * unit
+                assert found == pytest.approx(slope, rel=1e-3, abs=rounding / step), (name, index, step)
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "kinds_of_names"),
+    [
+        ("one mask", 0, ("decentre", "focal_length", "diameter", "pitch")),
+        ("blur", 3, ("sigma", "width", "sensor.z")),
+        ("prisms", 3, ("deflection", "sensor.z")),
+    ],
+)
+def test_derivatives_of_pictures_by_footprints_are_those_of_their_differences(kind, seed, kinds_of_names):
+    case = drawn(kind, seed, pixels=8, views=4)
+    named = [replace(element, name=f"e{n}") for n, element in enumerate(case.camera.elements)]
+    camera = vcc.Camera(named, case.camera.sensor)
+    values = case.light_field.values.astype(np.float64)
+    light_field = vcc.LightField(values, case.light_field.frame, case.disparities, case.sample)
+    names = [
+        name
+        for name in all_names(camera)
+        if any(part in name for part in kinds_of_names) and read(camera, name).size <= 2
+    ]
+    assert len(names) >= 2
+    check_derivatives(camera, light_field, names, How(engine="reference"))
+
+
+def test_derivatives_of_pictures_by_rays_are_those_of_their_differences():
+    """A plate in the plane of the stop that rays are aimed at: no edge cuts them. In the light field's linear
+    stretches, so that no ray comes over a bend of what is interpolated."""
+    plate = vcc.PhasePlate(
+        vcc.surfaces.Zernike((0.0, 0.0, 0.0, 2e-6, 0.0, 0.0, 1e-6), 12 * mm), z=5 * mm, name="plate"
+    )
+    lens = vcc.Lens(50 * mm, diameter=6 * mm, z=5 * mm, name="main")
+    camera = vcc.Camera([lens, plate], vcc.Sensor(56 * mm, shape=(6, 6), pitch=60 * um))
+    v, u, t, s = np.meshgrid(*(np.arange(n) - (n - 1) / 2 for n in (8, 8, 30, 30)), indexing="ij", sparse=True)
+    values = 5 + 0.02 * u - 0.03 * v + 0.05 * s + 0.04 * t
+    light_field = vcc.LightField(values, vcc.LightField.from_views(values, 2 * mm, 2e-3).frame, (0.0, 0.0))
+    how = How(engine="reference", samples=16, interpolation="linear")
+    names = ["plate.surface.coefficients", "main.focal_length", "main.diameter", "sensor.z"]
+    check_derivatives(camera, light_field, names, how)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.values import content
 from vcc.fields.grid import Grid, Sample
 from vcc.optics.train import Stage, Train
 from vcc.plan.decisions import ANEW, Decisions, plan_again
@@ -116,7 +117,11 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisio
     index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
     shift = np.stack(np.broadcast_arrays(column_shift[None, :], row_shift[:, None]), axis=-1)
 
-    parts = open_parts(view_planes, index, shift, between.motion, samples, divide, decisions)
+    parts = decisions.made(
+        "what is open of views",
+        lambda: tuple(content((plane.pattern, plane.at_index, plane.offset)) for plane in view_planes),
+        lambda: open_parts(view_planes, index, shift, between.motion, samples, divide, decisions),
+    )
     weights = row_share[:, None] * column_share[None, :] * parts.weights
     used_rows, used_columns = _used(weights, decisions)
     keep = np.ix_(used_rows, used_columns)
