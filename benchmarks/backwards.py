@@ -20,11 +20,12 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numba
 import numpy as np
+import rays
 
 import vcc
 from vcc.plan.how import How
@@ -104,9 +105,25 @@ def samples_by_footprints(masked: bool) -> Case:
     )
 
 
+def samples_by_rays(name: str) -> Case:
+    """The derivative to all samples, by rays through one of the cameras of ``benchmarks/rays.py``."""
+    field = rays.light_field()
+    plan = rays.cameras()[name].compile(field, method="rays")
+    given = weights(plan)
+    return Case(
+        f"samples by rays, 8 bits: {name}",
+        {
+            "picture": lambda: drive(plan, field, HOW),
+            "back to all samples": lambda: back(plan, field, given, HOW),
+        },
+        "picture",
+    )
+
+
 CASES: dict[str, Callable[[], Case]] = {
     "samples": lambda: samples_by_footprints(masked=False),
     "samples, mask": lambda: samples_by_footprints(masked=True),
+    **{f"rays: {name}": partial(samples_by_rays, name) for name in rays.cameras()},
 }
 """By name, in the order in which they are timed."""
 
