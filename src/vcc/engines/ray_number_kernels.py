@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from vcc.engines.bilinear import around
 from vcc.engines.compiled import compiled
 from vcc.engines.ray_kernels import (
     DIGITS_BELOW,
@@ -37,6 +38,9 @@ from vcc.engines.ray_tables import Drawn, Packet, Steps
 
 _compiled = compiled(fastmath={"contract", "nsz", "reassoc"})
 _inlined = compiled(fastmath={"contract", "nsz", "reassoc"}, inline="always")
+
+take_step = _compiled(take_steps.py_func)
+"""Not inlined, as only one step is taken at a time: that would take longer to compile than all else here."""
 
 
 @_inlined
@@ -63,7 +67,7 @@ def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyp
             column, row = math.floor((before[0, p] - f[0]) * f[2]), math.floor((before[1, p] - f[1]) * f[3])
             lit[p] *= (column >= 0) & (column < a[1]) & (row >= 0) & (row < a[0])
     one = Steps(codes[number : number + 1], whole[number : number + 1], real[number : number + 1], shares, slopes)
-    take_steps(one, drawn, packet_of(behind))
+    take_step(one, drawn, packet_of(behind))
     if hole:
         for p in range(n):
             lit[p] *= behind[4, p]
@@ -96,82 +100,70 @@ def moved_back(m, n, before, bar, own):  # type: ignore[no-untyped-def]
         bar[3, p] = m[3] * x + m[8] * y + m[13] * s + m[18] * t
 
 
-@_inlined
-def slopes_at(table, start, width, number, at, place, end, axis):  # type: ignore[no-untyped-def]
-    """How one of ``width`` numbers of a texture changes from point to point along an axis, at what `corner` found.
-
-    0 beyond the ends and where there is one point.
-    """
-    columns, r, r1, c, c1, down, right = at
-    above, below, start = r * columns, r1 * columns, start + number
-    steep = 0.0
-    if place >= 0.0 and place <= end - 1.0:
-        upper, upper_next = table[start + (above + c) * width], table[start + (above + c1) * width]
-        lower, lower_next = table[start + (below + c) * width], table[start + (below + c1) * width]
-        if axis == 0:
-            steep = (upper_next - upper) * (1 - down) + (lower_next - lower) * down
-        else:
-            steep = (lower - upper) * (1 - right) + (lower_next - upper_next) * right
-    return np.float64(steep)
-
-
-@_inlined
-def add_corners(out, start, width, number, at, value):  # type: ignore[no-untyped-def]
-    """Give a value to the four points of a texture that `mixed` takes it from."""
-    columns, r, r1, c, c1, down, right = at
-    above, below, start = r * columns, r1 * columns, start + number
-    out[start + (above + c) * width] += value * (1 - down) * (1 - right)
-    out[start + (above + c1) * width] += value * (1 - down) * right
-    out[start + (below + c) * width] += value * down * (1 - right)
-    out[start + (below + c1) * width] += value * down * right
-
-
-@_inlined
-def texture_back(table, sizes, real, x, y, values, numbers, out, own):  # type: ignore[no-untyped-def]
-    """What one or two numbers looked up in a texture say of the place (x, y), and, added up, of the texture.
+@_compiled
+def texture_back(table, sizes, real, rays, values, out, own):  # type: ignore[no-untyped-def]
+    """What numbers that a packet looks up in a texture say of its places, and, added up, of the texture.
 
     Args:
         table: of all textures.
-        sizes: (rows, columns, start, numbers a point).
+        sizes: (rays, rows, columns, start in the table, numbers a point).
         real: see `vcc.plan.rays.steps.Texture.real`.
-        x: where.
-        y: likewise.
-        values: cotangents of two numbers.
-        numbers: how many of them there are.
+        rays: (x, y, cotangents of x, of y), to the latter of which is added.
+        values: cotangents of the numbers found, (numbers a point or fewer, rays).
         out: like the table, or empty.
         own: four sums: of start and spacing, but for factors.
     """
-    rows, columns, start, width = sizes
-    at = corner(x, y, rows, columns, real)
-    across, down = (x - real[0]) * real[2], (y - real[1]) * real[3]
-    gx = gy = 0.0
-    for number in range(numbers):
-        gx += values[number] * slopes_at(table, start, width, number, at, across, columns, 0)
-        gy += values[number] * slopes_at(table, start, width, number, at, down, rows, 1)
-        if len(out) > 0:
-            add_corners(out, start, width, number, at, values[number])
-    gx, gy = gx * real[2], gy * real[3]
-    own[0] += gx
-    own[1] += gy
-    own[2] += gx * across
-    own[3] += gy * down
-    return gx, gy
+    n, rows, columns, start, width = sizes
+    x, y, gx, gy = rays
+    s0 = s1 = s2 = s3 = 0.0
+    for p in range(n):
+        across, below = (x[p] - real[0]) * real[2], (y[p] - real[1]) * real[3]
+        c, c1, right = around(across, columns)
+        r, r1, down = around(below, rows)
+        p00, p01 = start + (r * columns + c) * width, start + (r * columns + c1) * width
+        p10, p11 = start + (r1 * columns + c) * width, start + (r1 * columns + c1) * width
+        to_x = to_y = 0.0
+        for number in range(len(values)):
+            value = values[number, p]
+            upper, upper_next = table[p00 + number], table[p01 + number]
+            lower, lower_next = table[p10 + number], table[p11 + number]
+            to_x += value * ((upper_next - upper) * (1.0 - down) + (lower_next - lower) * down)
+            to_y += value * ((lower - upper) * (1.0 - right) + (lower_next - upper_next) * right)
+            if len(out) > 0:
+                out[p00 + number] += value * (1.0 - down) * (1.0 - right)
+                out[p01 + number] += value * (1.0 - down) * right
+                out[p10 + number] += value * down * (1.0 - right)
+                out[p11 + number] += value * down * right
+        # Beyond its ends a texture is even.
+        to_x = to_x * real[2] if across >= 0.0 and across <= columns - 1.0 else 0.0
+        to_y = to_y * real[3] if below >= 0.0 and below <= rows - 1.0 else 0.0
+        gx[p] += to_x
+        gy[p] += to_y
+        s0 += to_x
+        s1 += to_y
+        s2 += to_x * across
+        s3 += to_y * below
+    own[0] += s0
+    own[1] += s1
+    own[2] += s2
+    own[3] += s3
 
 
 @_compiled
-def step_back(steps, number, drawn, before, bar, told):  # type: ignore[no-untyped-def]
+def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[no-untyped-def]
     """Cotangents ``bar`` (5, rays) of a packet behind a step become those before it.
 
-    ``told``: `vcc.engines.ray_tables.Told`, to which is added what they say of the step's numbers.
+    ``sums``: (steps, matrices, shares, slopes, points) of `vcc.engines.ray_tables.Told`, to which is added what
+    they say of the step's numbers. ``found``: room for two numbers a ray.
     """
     codes, whole, real, shares, slopes = steps
     points, first, n, _ = drawn
-    code, a, f, own = codes[number], whole[number], real[number], told.steps[number]
-    out_shares, out_slopes = told.shares, told.slopes
+    of_steps, matrices, out_shares, out_slopes, out_points = sums
+    code, a, f, own = codes[number], whole[number], real[number], of_steps[number]
     x, y, share = before[0], before[1], before[4]
     gx, gy, gs, gt, gw = bar[0], bar[1], bar[2], bar[3], bar[4]
     if code == 0 or code == 1:
-        moved_back(told.matrices[number], n, before, bar, own)
+        moved_back(matrices[number], n, before, bar, own)
     elif code == 2:
         s0 = s1 = s2 = s3 = 0.0
         for p in range(n):
@@ -205,12 +197,9 @@ def step_back(steps, number, drawn, before, bar, told):  # type: ignore[no-untyp
                 out_slopes[at + 2] -= gs[p]
                 out_slopes[at + 3] -= gt[p]
     elif code == 5:
-        sizes = a[0], a[1], a[2], 2
         for p in range(n):
-            both = -gs[p], -gt[p]
-            across, down = texture_back(slopes, sizes, f, x[p], y[p], both, 2, out_slopes, own)
-            gx[p] += across
-            gy[p] += down
+            found[0, p], found[1, p] = -gs[p], -gt[p]
+        texture_back(slopes, (n, a[0], a[1], a[2], 2), f, (x, y, gx, gy), found, out_slopes, own)
     elif code == 8:
         for p in range(n):
             column, row = math.floor((x[p] - f[0]) * f[2]), math.floor((y[p] - f[1]) * f[3])
@@ -220,14 +209,10 @@ def step_back(steps, number, drawn, before, bar, told):  # type: ignore[no-untyp
                 out_shares[at] += gw[p] * share[p]  # of rays beside all cells gw is 0
             gw[p] *= shares[at]
     elif code == 9:
-        sizes = a[0], a[1], a[2], 1
         for p in range(n):
-            weight = mixed(shares, a[2], 1, 0, corner(x[p], y[p], a[0], a[1], f))
-            carried = gw[p] * share[p]
-            across, down = texture_back(shares, sizes, f, x[p], y[p], (carried, 0.0), 1, out_shares, own)
-            gx[p] += across
-            gy[p] += down
-            gw[p] *= weight
+            found[0, p] = gw[p] * share[p]
+            gw[p] *= mixed(shares, a[2], 1, 0, corner(x[p], y[p], a[0], a[1], f))
+        texture_back(shares, (n, a[0], a[1], a[2], 1), f, (x, y, gx, gy), found[:1], out_shares, own)
     elif code == 12:
         for p in range(n):
             cosines_x, steep_x = cosines(f[2], f[0], f[4], a[0], x[p])
@@ -241,7 +226,6 @@ def step_back(steps, number, drawn, before, bar, told):  # type: ignore[no-untyp
             gy[p] += f[3] * turned_y
             gw[p] *= cosines_x * cosines_y
     elif code == 10:
-        sizes = a[6], a[7], a[8], 1
         for p in range(n):
             kernel = 0
             if a[3] > 0:
@@ -253,13 +237,12 @@ def step_back(steps, number, drawn, before, bar, told):  # type: ignore[no-untyp
             stretch = 1.0
             if a[6] > 0:
                 stretch = mixed(shares, a[8], 1, 0, corner(x[p], y[p], a[6], a[7], f[4:]))
-                wider = -(gs[p] * points[column, first + p] + gt[p] * points[column + 1, first + p])
-                across, down = texture_back(shares, sizes, f[4:], x[p], y[p], (wider, 0.0), 1, out_shares, own)
-                gx[p] += across
-                gy[p] += down
-            if len(told.points) > 0:
-                told.points[column, first + p] -= stretch * gs[p]
-                told.points[column + 1, first + p] -= stretch * gt[p]
+            found[0, p] = -(gs[p] * points[column, first + p] + gt[p] * points[column + 1, first + p])
+            if len(out_points) > 0:
+                out_points[column, first + p] -= stretch * gs[p]
+                out_points[column + 1, first + p] -= stretch * gt[p]
+        if a[6] > 0:
+            texture_back(shares, (n, a[6], a[7], a[8], 1), f[4:], (x, y, gx, gy), found[:1], out_shares, own)
 
 
 @_compiled
@@ -280,11 +263,10 @@ def cosines(frequency, middle, phase, harmonics, place):  # type: ignore[no-unty
 
 
 @_compiled
-def window_back(drawn, window, rays, bar, told):  # type: ignore[no-untyped-def]
+def window_back(drawn, window, rays, bar, own, of_scatter, out_points):  # type: ignore[no-untyped-def]
     """What slopes and weights of rays through a window say of places, of what was drawn, and of its numbers."""
     points, start, n, flipped = drawn
     _, from_sensor, _, _, disc, scatter = window
-    own = told.window
     turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
     cosine, sine = math.cos(turn), math.sin(turn)
     across, down = np.int32(flipped[2]), np.int32(flipped[3])
@@ -319,21 +301,22 @@ def window_back(drawn, window, rays, bar, told):  # type: ignore[no-untyped-def]
         for p in range(n):
             s, t = bar[2, p], bar[3, p]
             a, b = points[column, start + p], points[column + 1, start + p]
-            told.scatter[term, 0] += s * a
-            told.scatter[term, 1] += s * b
-            told.scatter[term, 2] += t * a
-            told.scatter[term, 3] += t * b
-            if len(told.points) > 0:
-                told.points[column, start + p] += f0 * s + g0 * t
-                told.points[column + 1, start + p] += f1 * s + g1 * t
+            of_scatter[term, 0] += s * a
+            of_scatter[term, 1] += s * b
+            of_scatter[term, 2] += t * a
+            of_scatter[term, 3] += t * b
+            if len(out_points) > 0:
+                out_points[column, start + p] += f0 * s + g0 * t
+                out_points[column + 1, start + p] += f1 * s + g1 * t
 
 
 @_compiled
-def cell_back(drawn, images, cells, cell, rays, bar, told):  # type: ignore[no-untyped-def]
+def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[no-untyped-def]
     """What slopes and weights of rays through a cell say of places, of the stop's image there and of the cell.
 
     Line by line what `vcc.plan.rays.aim_backwards` says of `CellWindows.aimed`. Sums: of cotangents of an image's
-    middle, of these times the place, of its half size, of the cell's centre.
+    middle, of these times the place, of its half size, of the cell's centre. ``of_cells``: (cells, kinds, borders)
+    of `vcc.engines.ray_tables.Told`, and room for the sums, (2, 4).
     """
     points, start, n, flipped = drawn
     middle, along, half, centre, reach = images[0, 0], images[0, 1], images[0, 2], images[0, 3], images[0, 4]
@@ -343,8 +326,8 @@ def cell_back(drawn, images, cells, cell, rays, bar, told):  # type: ignore[no-u
     per_x, per_y = 1 / cells.place_from_slope[0], 1 / cells.place_from_slope[1]
     per_area = abs(per_x * per_y)
     from_x, from_y = cells.place_from_sensor
-    own = told.cells
-    sums = np.zeros((2, 4))
+    own, kinds, of_borders, sums = of_cells
+    sums[:] = 0.0
     for p in range(n):
         x, y = rays[0, p], rays[1, p]
         if rays[4, p] == 0.0:
@@ -392,8 +375,8 @@ def cell_back(drawn, images, cells, cell, rays, bar, told):  # type: ignore[no-u
             elif by > 0:
                 cell_bar += end_bar
                 away_bar += borders[by - 1, 0] * end_bar
-                told.borders[by - 1, 0] += away * end_bar
-                told.borders[by - 1, 1] += sign * end_bar
+                of_borders[by - 1, 0] += away * end_bar
+                of_borders[by - 1, 1] += sign * end_bar
             else:
                 cell_bar += end_bar
                 if chord > 0.0:
@@ -428,15 +411,14 @@ def cell_back(drawn, images, cells, cell, rays, bar, told):  # type: ignore[no-u
         sums[0, 2] += half_bar
         sums[0, 3] += cell_bar
         bar[0, p] += image_bar * along
-    image_back(images, cells, cell, sums, told)
+    image_back(images, cells, cell, sums, own, kinds)
 
 
-@_inlined
-def image_back(images, cells, cell, sums, told):  # type: ignore[no-untyped-def]
+@_compiled
+def image_back(images, cells, cell, sums, own, kinds):  # type: ignore[no-untyped-def]
     """What the sums of `cell_back` say of the numbers by which `set_image` finds a cell's image."""
-    own = told.cells
     power, slope_x, slope_y = kind_of(cells.kinds, cell[0], cell[1])
-    kind = told.kinds[cell[0] % told.kinds.shape[0], cell[1] % told.kinds.shape[1]]
+    kind = kinds[cell[0] % kinds.shape[0], cell[1] % kinds.shape[1]]
     for axis in range(2):
         slope = slope_x if axis == 0 else slope_y
         from_slope, centre = cells.beyond_from_slope[axis], images[axis, 3]
@@ -466,61 +448,13 @@ def image_back(images, cells, cell, sums, told):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def view_back(samples, base, k, l, weights):  # type: ignore[no-untyped-def]
-    """(value, to k, to l): what a view holds at pixel (k, l), dark outside, times weights, and its derivatives.
-
-    ``base`` is where the view's samples begin.
-    """
-    values, (_, _, rows, columns), channels = samples
-    k0, l0 = math.floor(k), math.floor(l)
-    fk, fl = k - k0, l - l0
-    c, r = int(k0), int(l0)
-    u00 = u01 = u10 = u11 = 0.0
-    at = base + (r * columns + c) * channels
-    below = at + columns * channels
-    if c >= 0 and c < columns - 1 and r >= 0 and r < rows - 1:
-        if channels == 3:
-            g0, g1, g2 = weights[0], weights[1], weights[2]
-            at, below = np.uint64(at), np.uint64(below)
-            one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-            four, five = np.uint64(4), np.uint64(5)
-            u00 = g0 * values[at] + g1 * values[at + one] + g2 * values[at + two]
-            u01 = g0 * values[at + three] + g1 * values[at + four] + g2 * values[at + five]
-            u10 = g0 * values[below] + g1 * values[below + one] + g2 * values[below + two]
-            u11 = g0 * values[below + three] + g1 * values[below + four] + g2 * values[below + five]
-        else:
-            for channel in range(channels):
-                g = weights[channel]
-                u00 += g * values[at + channel]
-                u01 += g * values[at + channels + channel]
-                u10 += g * values[below + channel]
-                u11 += g * values[below + channels + channel]
-    else:
-        left, right = c >= 0 and c < columns, c >= -1 and c < columns - 1
-        up, down = r >= 0 and r < rows, r >= -1 and r < rows - 1
-        for channel in range(channels):
-            g = weights[channel]
-            if up and left:
-                u00 += g * values[at + channel]
-            if up and right:
-                u01 += g * values[at + channels + channel]
-            if down and left:
-                u10 += g * values[below + channel]
-            if down and right:
-                u11 += g * values[below + channels + channel]
-    upper, lower = u00 + (u01 - u00) * fk, u10 + (u11 - u10) * fk
-    steep = (u01 - u00) * (1 - fl) + (u11 - u10) * fl
-    return upper + (lower - upper) * fl, steep, lower - upper
-
-
-@_compiled
-def field_back(field, weights, n, index, lit, bar, told):  # type: ignore[no-untyped-def]
+def field_back(field, weights, n, index, lit, bar, to_motion, to_scale):  # type: ignore[no-untyped-def]
     """Fill cotangents ``bar`` (5, rays) of indices and shares of rays, by what they find in the light field."""
-    samples, _, _, motion, between, _ = field
-    nv, nu, nt, ns = samples.views
-    picture = nt * ns * samples.channels
+    (values, (nv, nu, nt, ns), channels), _, _, motion, between, _ = field
+    line, picture = ns * channels, nt * ns * channels
     m00, m01, m10, m11 = motion[0, 0], motion[0, 1], motion[1, 0], motion[1, 1]
     dark_k, dark_l = 1.0 + 1.5 * (abs(m00) + abs(m01)), 1.0 + 1.5 * (abs(m10) + abs(m11))
+    along_i, along_j = (min(nu, 2), min(nv, 2)) if between else (1, 1)
     t00 = t01 = t10 = t11 = total = 0.0
     for p in range(n):
         i, j, k, l, share = index[0, p], index[1, p], index[2, p], index[3, p], index[4, p]
@@ -531,52 +465,76 @@ def field_back(field, weights, n, index, lit, bar, told):  # type: ignore[no-unt
         if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
             continue
         ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
-        if not between:
-            base = (int(cj + 0.5) * nu + int(ci + 0.5)) * picture
-            value, of_k, of_l = view_back(samples, base, k, l, weights)
-            bar[2, p], bar[3, p], bar[4, p] = share * of_k, share * of_l, value
-            total += share * value
-            continue
-        i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
-        fi, fj = ci - i0, cj - j0
-        steep_i = 1.0 if i >= 0.0 and i <= nu - 1.0 and nu > 1 else 0.0
-        steep_j = 1.0 if j >= 0.0 and j <= nv - 1.0 and nv > 1 else 0.0
+        if between:
+            i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
+            fi, fj = ci - i0, cj - j0
+        else:  # one view, in place
+            i0, j0 = int(ci + 0.5), int(cj + 0.5)
+            fi = fj = 0.0
         value = of_i = of_j = of_k = of_l = 0.0
-        for dj in range(min(nv, 2)):
-            wj, sj, away_j = (fj, steep_j, j - j0 - 1) if dj else (1.0 - fj, -steep_j, j - j0)
-            for di in range(min(nu, 2)):
-                wi, si, away_i = (fi, steep_i, i - i0 - 1) if di else (1.0 - fi, -steep_i, i - i0)
-                base = ((j0 + dj) * nu + i0 + di) * picture
-                view_k, view_l = k + m00 * away_i + m01 * away_j, l + m10 * away_i + m11 * away_j
-                here, to_k, to_l = view_back(samples, base, view_k, view_l, weights)
-                w = wi * wj
-                value += w * here
-                of_i += si * wj * here
-                of_j += wi * sj * here
-                to_k, to_l = w * to_k, w * to_l
+        for dj in range(along_j):
+            wj, sj, away_j = (fj, 1.0, j - j0 - 1) if dj else (1.0 - fj, -1.0, j - j0)
+            for di in range(along_i):
+                wi, si, away_i = (fi, 1.0, i - i0 - 1) if di else (1.0 - fi, -1.0, i - i0)
+                view_k, view_l = k, l
+                if between:
+                    view_k, view_l = k + m00 * away_i + m01 * away_j, l + m10 * away_i + m11 * away_j
+                k0, l0 = math.floor(view_k), math.floor(view_l)
+                fk, fl = view_k - k0, view_l - l0
+                c, r = int(k0), int(l0)
+                at = ((j0 + dj) * nu + i0 + di) * picture + r * line + c * channels
+                u00 = u01 = u10 = u11 = 0.0
+                if c >= 0 and c < ns - 1 and r >= 0 and r < nt - 1:
+                    for channel in range(channels):
+                        g, here = weights[channel], np.uint64(at + channel)
+                        u00 += g * values[here]
+                        u01 += g * values[here + np.uint64(channels)]
+                        u10 += g * values[here + np.uint64(line)]
+                        u11 += g * values[here + np.uint64(line + channels)]
+                else:
+                    left, right = c >= 0 and c < ns, c >= -1 and c < ns - 1
+                    up, down = r >= 0 and r < nt, r >= -1 and r < nt - 1
+                    for channel in range(channels):
+                        g, here = weights[channel], at + channel
+                        u00 += g * values[here] if up and left else 0.0
+                        u01 += g * values[here + channels] if up and right else 0.0
+                        u10 += g * values[here + line] if down and left else 0.0
+                        u11 += g * values[here + line + channels] if down and right else 0.0
+                upper, lower = u00 + (u01 - u00) * fk, u10 + (u11 - u10) * fk
+                found, w = upper + (lower - upper) * fl, wi * wj
+                to_k = w * ((u01 - u00) * (1.0 - fl) + (u11 - u10) * fl)
+                to_l = w * (lower - upper)
+                value += w * found
+                of_i += si * wj * found
+                of_j += wi * sj * found
                 of_k += to_k
                 of_l += to_l
                 t00 += share * to_k * away_i
                 t01 += share * to_k * away_j
                 t10 += share * to_l * away_i
                 t11 += share * to_l * away_j
-        bar[0, p] = share * (of_i + m00 * of_k + m10 * of_l)
-        bar[1, p] = share * (of_j + m01 * of_k + m11 * of_l)
-        bar[2, p], bar[3, p], bar[4, p] = share * of_k, share * of_l, value
+        # Beyond the outermost views, and where there is one, weights are even.
+        of_i = of_i if along_i == 2 and i >= 0.0 and i <= nu - 1.0 else 0.0
+        of_j = of_j if along_j == 2 and j >= 0.0 and j <= nv - 1.0 else 0.0
+        if between:
+            of_i, of_j = of_i + m00 * of_k + m10 * of_l, of_j + m01 * of_k + m11 * of_l
+        bar[0, p], bar[1, p], bar[2, p], bar[3, p] = share * of_i, share * of_j, share * of_k, share * of_l
+        bar[4, p] = value
         total += share * value
-    told.motion[0] += t00
-    told.motion[1] += t01
-    told.motion[2] += t10
-    told.motion[3] += t11
-    told.scale[0] += total
+    if between:
+        to_motion[0] += t00
+        to_motion[1] += t01
+        to_motion[2] += t10
+        to_motion[3] += t11
+    to_scale[0] += total
 
 
 @_compiled
-def pixel_back(drawn, row, column, bar, own):  # type: ignore[no-untyped-def]
+def pixel_back(drawn, place, bar, own):  # type: ignore[no-untyped-def]
     """What places of a pixel's rays on the sensor say of its first pixel, pitch and sensitive area."""
     points, start, n, flipped = drawn
     for q in range(2):
-        digits, number = np.int32(flipped[q]), column if q == 0 else row
+        digits, number = np.int32(flipped[q]), place[1 - q]
         total = of_area = 0.0
         for p in range(n):
             total += bar[q, p]
@@ -586,37 +544,44 @@ def pixel_back(drawn, row, column, bar, own):  # type: ignore[no-untyped-def]
         own[4 + q] += of_area
 
 
-@_compiled
-def packet_back(field, drawn, aim, images, cell, steps, pixel_weights, ways, told):  # type: ignore[no-untyped-def]
+@_inlined
+def lit_by(share, n, lit):  # type: ignore[no-untyped-def]
+    """Set ``lit`` to 1 for rays that carry light, else to 0; returns how many do."""
+    number = 0
+    for p in range(n):
+        carries = share[p] > 0.0
+        lit[p] = 1.0 if carries else 0.0
+        number += carries
+    return number
+
+
+@_inlined
+def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, told):  # type: ignore[no-untyped-def]
     """Trace a packet of rays, which ``ways[0][0]`` holds at the sensor, and go back with what they find.
 
     ``ways``: (what rays are before each step and behind all, and their indices (steps + 2, 5, rays); which are not
-    stopped; cotangents (5, rays)).
+    stopped; cotangents (5, rays); room for two numbers a ray, and for the sums of `cell_back`).
     """
-    kept, lit, bar = ways
+    kept, lit, bar, found, sums = ways
     n, number = drawn.rays, len(steps.codes)
-    for p in range(n):
-        lit[p] = 1.0 if kept[0, 4, p] > 0.0 else 0.0
-    for step in range(number):
-        step_on(steps, step, drawn, kept[step], kept[step + 1], lit)
-    found = 0.0
-    for p in range(n):
-        found += lit[p]
-    if found == 0.0:
-        return False
-    for q in range(5):
-        for p in range(n):
-            kept[number + 1, q, p] = kept[number, q, p]
-    to_indices(field.index_from_ray, packet_of(kept[number + 1]), n)
-    field_back(field, pixel_weights, n, kept[number + 1], lit, bar, told)
-    moved_back(field.index_from_ray.reshape(-1), n, kept[number], bar, told.indices)
-    for step in range(number - 1, -1, -1):
-        step_back(steps, step, drawn, kept[step], bar, told)
-    if aim.by_cell:
-        cell_back(drawn, images, aim.cells, cell, kept[0], bar, told)
-    else:
-        window_back(drawn, aim.window, kept[0], bar, told)
-    return True
+    if lit_by(kept[0, 4], n, lit) > 0:
+        for step in range(number):
+            step_on(steps, step, drawn, kept[step], kept[step + 1], lit)
+        for q in range(5):
+            for p in range(n):
+                kept[number + 1, q, p] = kept[number, q, p]
+        to_indices(field.index_from_ray, packet_of(kept[number + 1]), n)
+        field_back(field, weights[place[0], place[1]], n, kept[number + 1], lit, bar, told.motion, told.scale)
+        moved_back(field.index_from_ray.reshape(-1), n, kept[number], bar, told.indices)
+        of_steps = told.steps, told.matrices, told.shares, told.slopes, told.points
+        for step in range(number - 1, -1, -1):
+            step_back(steps, step, drawn, kept[step], bar, found, of_steps)
+        if aim.by_cell:
+            of_cells = told.cells, told.kinds, told.borders, sums
+            cell_back(drawn, images, aim.cells, cell, kept[0], bar, of_cells)
+        else:
+            window_back(drawn, aim.window, kept[0], bar, told.window, told.scatter, told.points)
+        pixel_back(drawn, place, bar, told.sensor)
 
 
 @_compiled
@@ -630,7 +595,8 @@ def numbers_of_tiles(field, sensor, points, aim, steps, weights, ended, told, ti
     cells, blocks = aim.cells, table.shape[1] // samples
     _, near, images, flipped = room()
     kept = np.empty((len(steps.codes) + 2, 5, PACKET))
-    at_sensor, ways = packet_of(kept[0]), (kept, np.empty(PACKET), np.empty((5, PACKET)))
+    ways = kept, np.empty(PACKET), np.empty((5, PACKET)), np.empty((2, PACKET)), np.empty((2, 4))
+    at_sensor = packet_of(kept[0])
     for tile in range(len(tiles)):
         for row in range(tiles[tile, 0], min(tiles[tile, 1], sensor.rows)):
             for column in range(tiles[tile, 2], min(tiles[tile, 3], sensor.columns)):
@@ -647,7 +613,4 @@ def numbers_of_tiles(field, sensor, points, aim, steps, weights, ended, told, ti
                             through_cell(drawn, images, cells, at_sensor)
                         else:
                             through_window(drawn, aim.window, at_sensor)
-                        if packet_back(
-                            field, drawn, aim, images, near[q], steps, weights[row, column], ways, told
-                        ):
-                            pixel_back(drawn, row, column, ways[2], told.sensor)
+                        packet_back(field, drawn, aim, images, near[q], steps, (row, column), weights, ways, told)
