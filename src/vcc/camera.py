@@ -29,6 +29,7 @@ from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
 from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
+from vcc.run.operator import Operator
 from vcc.run.operators import carried_to
 
 Field = TypeVar("Field", bound=InMemory)
@@ -198,13 +199,7 @@ class Camera(Train):
         if absurd and light_share(self, light_field.grid) < FAINT:  # said before what may take minutes
             warn_of_result(f"hardly any light will reach the sensor. {absurd}")
             absurd = ""
-        if plan is None:
-            plan = self.compile(light_field, chosen, progress=progress)
-        else:
-            plan.check_fits(self, light_field.grid)
-            _check_of_the_run(options)
-        for caution in plan.cautions:
-            warn_of_result(caution)
+        plan = self._planned(light_field, chosen, plan, options, progress)
         found = drive(plan, light_field, chosen, progress)
         if caution := _caution(plan, light_field, found, absurd):
             warn_of_result(caution)
@@ -215,6 +210,50 @@ class Camera(Train):
             sampling_error=found.sampling_error,
             camera=self,
         )
+
+    def operator(
+        self,
+        light_field: Samples,
+        how: How | None = None,
+        *,
+        plan: Plan | None = None,
+        progress: Progress | None = None,
+        **options: Unpack[Options],
+    ) -> Operator:
+        """The linear map from samples of a light field to the picture, with its adjoint: for what inverts cameras.
+
+        ``op(samples)`` is the picture of any samples on the light field's grid, ``op.T(picture)`` the adjoint.
+
+        Args:
+            light_field: whose grid counts; in memory, or on disk and then in pieces.
+            how: as in `capture`.
+            plan: as in `capture`.
+            progress: called with (done, total) while disparities are found, where they are needed.
+            options: as in `capture`.
+
+        Raises:
+            InputError: what `capture` refuses; a tolerance, views in between by depth, and arrays of other
+                libraries than NumPy, with what to pass instead.
+
+        Warns:
+            ResultWarning: what the plan cautions of.
+        """
+        check_is_light_field(light_field)
+        chosen = How.of(how, options)
+        return Operator(self._planned(light_field, chosen, plan, options, progress), light_field, chosen)
+
+    def _planned(
+        self, light_field: Samples, how: How, plan: Plan | None, options: Options, progress: Progress | None
+    ) -> Plan:
+        """A plan that was given, if it fits, or a new one; what it cautions of is said."""
+        if plan is None:
+            plan = self.compile(light_field, how, progress=progress)
+        else:
+            plan.check_fits(self, light_field.grid)
+            _check_of_the_run(options)
+        for caution in plan.cautions:
+            warn_of_result(caution)
+        return plan
 
     def expose(
         self,

@@ -12,9 +12,12 @@ from vcc.base.units import mm
 from vcc.fields.grid import Block
 from vcc.plan.how import How
 from vcc.plan.numbers import numbers, with_numbers
+from vcc.run import backwards
 from vcc.run.backwards import Backwards, back
+from vcc.run.blocks import Blocks
 from vcc.run.drive import Drive
 from vcc.shapes.patterns import CosineSum
+from vcc.store import save_store
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
@@ -29,8 +32,8 @@ MASKS = [
 LENSLETS = vcc.LensArray(focal_length=2 * mm, pitch=1 * mm, z=FOCUS - 3 * mm)
 
 
-def light_field(seed: int = 0, *, frame=None) -> vcc.LightField:
-    values = np.random.default_rng(seed).random(SHAPE).astype(np.float32)
+def light_field(seed: int = 0, *, frame=None, kind: str = "float32") -> vcc.LightField:
+    values = (np.random.default_rng(seed).random(SHAPE) * (255 if kind == "uint8" else 1)).astype(kind)
     given = vcc.LightField.from_views(values, 2 * mm, 2e-3, 1.0, disparity_range=(-0.3, 0.2))
     return given if frame is None else given.transformed(vcc.Affine(frame))
 
@@ -41,6 +44,121 @@ def turned(angle: float) -> np.ndarray:
     frame = np.eye(5)
     frame[:4, :4] = np.kron(np.eye(2), [[c, -s], [s, c]])
     return frame
+
+
+# --- the whole plan ---
+
+BLURRED = vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.004))
+BEFORE_SENSOR = vcc.Mask(pattern=CosineSum((1 * mm, 2 * mm), 1, 0.3), z=FOCUS)
+PLANS = {
+    "filters on both sides": ([LENS, BLURRED, MASKS[1], BEFORE_SENSOR], {"method": "footprints"}),
+    "refined": ([LENS, MASKS[0]], {"refine": 2}),
+    "rays": ([LENS, LENSLETS], {"samples": 4}),
+}
+
+
+def weights_of(shape: tuple[int, ...], seed: int = 5) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(shape)
+
+
+@pytest.mark.parametrize("kind", ["float32", "uint8"])
+@pytest.mark.parametrize("name", list(PLANS))
+def test_derivatives_through_the_whole_plan(name, kind):
+    """Against what a change does to the picture, in double precision.
+
+    A picture is linear in samples, in filters, in the transmission before the sensor and in the scale: there any
+    change is as good as a small one. In places it is not: central differences, whose error is of second order.
+    """
+    elements, options = PLANS[name]
+    given, rng = light_field(kind=kind), np.random.default_rng(6)
+    plan = vcc.Camera(elements, SENSOR).compile(given, **options)
+    how, weights = How(engine="reference"), weights_of(SENSOR.shape)
+    own = plan.numbers()
+    linear = [each for each in own if each.startswith(("before", "after")) or each == "core.scale"]
+    small = {"core.x": 1e-5, "core.step": 1e-6} if not plan.by_rays else {}
+    found = back(plan, given, weights, how, wanted=[*linear, *small])
+    assert set(found.numbers) == {*linear, *small}
+
+    def seen(changed, samples=given) -> float:
+        drive = Drive(changed, samples, how)
+        return float((drive.picture(drive.rounds()) * weights).sum())
+
+    for number in [*linear, *small]:
+        step = rng.standard_normal(own[number].shape) * small.get(number, 1.0)
+        ahead, behind = (plan.with_numbers({number: own[number] + sign * step}) for sign in (1, -1))
+        expected = (seen(ahead) - seen(behind)) / 2
+        rounding = 1e-12 * np.abs(weights).sum() * np.abs(own[number]).max() * 10
+        assert float((found.numbers[number] * step).sum()) == pytest.approx(expected, rel=1e-5, abs=rounding), (
+            number
+        )
+    # A step of one in each number as it is given: what 8 bits are rounded to on their way is left out.
+    if kind == "float32" or not plan.by_rays:
+        assert float((found.samples * given.values).sum()) == pytest.approx(seen(plan), rel=1e-12)
+    else:
+        radiance = light_field().replaced(given.values / 255.0)
+        assert float((found.samples * given.values).sum()) == pytest.approx(seen(plan, radiance), rel=1e-12)
+
+
+CUTS = {"rows of views": (2, 5, 14), "blocks of views": (1, 2, 14), "rows of pixels": (1, 1, 5)}
+
+
+@pytest.mark.parametrize("engine", ["numba", "reference"])
+@pytest.mark.parametrize("name", list(PLANS))
+def test_blocks_add_up_to_the_whole(tmp_path, monkeypatch, name, engine):
+    elements, options = PLANS[name]
+    given = light_field(kind="uint8")
+    stored = save_store(given, tmp_path / "a.zarr", chunks=4)
+    plan = vcc.Camera(elements, SENSOR).compile(stored, **options)
+    how, weights = How(engine=engine), weights_of(SENSOR.shape)
+    wanted = [each for each in plan.numbers() if each.startswith(("before", "after"))]
+    if engine == "reference":
+        wanted += ["core.scale"]
+    if engine == "reference" and not plan.by_rays:
+        wanted += ["core.x", "core.step", "core.weights", "core.masks[0].step", "core.masks[0].texture"]
+    whole = back(plan, given, weights, how, wanted=wanted)
+    # Samples of a block are kept in single precision; what 8 bits are blurred to is rounded to it, 6e-8.
+    largest = 1e-6 if engine == "reference" else 2e-5
+    for sizes in CUTS.values():
+        monkeypatch.setattr(backwards, "cut", lambda *_, sizes=sizes: Blocks((0, 4), (0, 5), *SHAPE[2:], *sizes))
+        found = back(plan, stored, weights, how, wanted=wanted)
+        assert found.samples.dtype == whole.samples.dtype
+        np.testing.assert_allclose(
+            found.samples, whole.samples, rtol=0, atol=largest * np.abs(whole.samples).max(), err_msg=f"{sizes}"
+        )
+        for number in wanted:
+            expected = whole.numbers[number]
+            atol = largest * max(np.abs(expected).max(), 1e-300)
+            np.testing.assert_allclose(
+                found.numbers[number], expected, rtol=0, atol=atol, err_msg=f"{sizes} {number}"
+            )
+
+
+def test_a_raster_at_hand_is_not_made_again(monkeypatch):
+    given = light_field()
+    plan = vcc.Camera(PLANS["filters on both sides"][0], SENSOR).compile(given, method="footprints")
+    drive, weights = Drive.of_linear(plan, given, How(engine="reference")), weights_of(SENSOR.shape)
+    wanted = [each for each in plan.numbers() if each.startswith("after")]
+    assert "after[1].transmission" in wanted
+    found = drive.rounds()
+    expected = Backwards(drive, wanted).gradient(weights, samples_wanted=False)
+    assert expected.samples is None
+    monkeypatch.setattr(Drive, "rounds", None)
+    again = Backwards(drive, wanted).gradient(weights, samples_wanted=False, found=found)
+    for name in wanted:
+        np.testing.assert_array_equal(again.numbers[name], expected.numbers[name])
+
+
+def test_samples_are_looked_at_only_where_numbers_follow_from_them(monkeypatch, tmp_path):
+    stored = save_store(light_field(), tmp_path / "a.zarr")
+    plan = vcc.Camera([LENS, MASKS[1]], SENSOR).compile(stored)
+    monkeypatch.setattr(type(stored), "read", None)
+    weights = weights_of(SENSOR.shape)
+    calls = []
+    found = back(plan, stored, weights, How(engine="reference"), progress=lambda *call: calls.append(call))
+    assert found.samples.any()
+    assert calls[-1][0] == calls[-1][1] > 0
+    with pytest.raises(TypeError):
+        back(plan, stored, weights, How(engine="reference"), wanted=["core.scale"])
 
 
 # --- the numbers of a part ---

@@ -80,7 +80,12 @@ class Backwards:
     """
 
     def __init__(self, drive: Drive, wanted: Collection[str] = ()) -> None:
-        self.drive, self.plan = drive, drive.plan
+        self.plan = drive.plan
+        # Closed taps of views, too, would add to the picture if they were opened: their views are looked at.
+        self.opened = self.plan
+        if "core.weights" in wanted:
+            self.opened = self.plan.with_numbers({"core.weights": self.plan.numbers()["core.weights"] * 0 + 1})
+        self.drive = drive if self.opened is self.plan else drive.looking_as(self.opened)
         if wanted and (unknown := sorted(set(wanted) - set(self.plan.numbers()))):
             raise InputError(f"the plan has no number {unknown[0]!r}: plan.numbers() names those that there are")
         parted = [_parted(name) for name in wanted]
@@ -187,7 +192,7 @@ class Backwards:
         need, each = drive.need, self._kind.itemsize / drive.kind.itemsize
         times = (need.times if self._reads else 0.0) + each * (3 if self.plan.before else 1)
         fixed = need.fixed + 8 * math.prod(self.plan.core.raster_shape) * drive.channels
-        return cut(self.plan, drive.samples.grid, replace(need, fixed=fixed, times=times), drive.limit)
+        return cut(self.opened, drive.samples.grid, replace(need, fixed=fixed, times=times), drive.limit)
 
     def _room(self) -> NDArray[Any] | None:
         """Where the derivative to samples is gathered; None where it comes as a whole."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -251,6 +252,12 @@ class Drive:
     def used(self) -> NDArray[np.bool_]:
         """Which views are looked at, (v, u)."""
         return self.plan.core.used_views(self.samples.grid.shape)
+
+    def looking_as(self, plan: Plan) -> Drive:
+        """The same with all views read that another plan looks at."""
+        made = copy(self)
+        made.used = plan.core.used_views(self.samples.grid.shape)
+        return made
 
     def used_in(self, block: Block) -> int:
         """How many views of a block are looked at."""
