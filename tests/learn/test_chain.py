@@ -64,6 +64,22 @@ def test_a_lens_at_the_entrance_plane_moves_away_from_it():
     assert chain.pull({}, {"core.y": weights})["main.z"] == pytest.approx(expected, rel=1e-7)
 
 
+def test_a_rim_at_the_views_may_leave_them():
+    """By footprints it is a mask in mid-path from the first, and the picture is the same within its texture."""
+    lens = vcc.Lens(50 * mm, diameter=7 * mm, name="main")
+    train = vcc.Camera([lens], camera().sensor)
+    how = How(engine="reference", refine=1, between_views="none")
+    still, chain = Chain(train, LIGHT_FIELD.grid, how), Chain(train, LIGHT_FIELD.grid, how, ["main.z"])
+    assert [mask.label for mask in chain.plan().core.masks] == ['lens "main"']
+    one, other = (picture(each.plan(), LIGHT_FIELD, how) for each in (still, chain))
+    np.testing.assert_allclose(other, one, atol=0.01 * one.max())
+    weights = np.random.default_rng(4).standard_normal(one.shape)
+    found = back(chain.plan(), LIGHT_FIELD, weights[..., 0], how, wanted=chain.followed()["main.z"]).numbers
+    near, far = ((weights * picture(chain.plan({"main.z": z}), LIGHT_FIELD, how)).sum() for z in (1e-7, 2e-7))
+    slope = (-3 * (weights * other).sum() + 4 * near - far) / 2e-7
+    assert chain.pull({}, found)["main.z"] == pytest.approx(slope, rel=1e-3)
+
+
 def test_only_what_follows_a_parameter_is_named():
     chain = Chain(camera(code()), LIGHT_FIELD.grid, None, ["code.decentre", "main.focal_length", "code.pattern"])
     followed = chain.followed()

@@ -50,7 +50,8 @@ class Chain:
         grid: as given.
         how: as given.
         names: as given.
-        decisions: by which all plans are made.
+        decisions: by which all plans are made. A mask or a rim whose z is among the names counts as one in
+            mid-path, at the views too, so that it may leave them.
 
     Raises:
         InputError: a parameter that there is not, or one that has no derivative here, named with the reason: it
@@ -60,7 +61,7 @@ class Chain:
     def __init__(self, train: Train, grid: Grid, how: How | None = None, names: Iterable[str] = ()) -> None:
         self.train, self.grid, self.how = train, grid, how or How()
         self.names = tuple(names)
-        self.decisions = Decisions()
+        self.decisions = self._undecided()
         self._steps = {name: STEP * scale(train, name) for name in self.names}
         self._made: tuple[dict[str, bytes], Plan, Numbers] | None = None
         self._form: tuple[tuple[str, tuple[int, ...]], ...] | None = None
@@ -125,11 +126,16 @@ class Chain:
         Args:
             values: as for `plan`.
         """
-        fresh = Decisions()
+        fresh = self._undecided()
         compile_best(put(self.train, dict(values or {})), self.grid, self.how, fresh)
         return self.decisions.differences(fresh)
 
     # --- plans and their differences
+
+    def _undecided(self) -> Decisions:
+        """Decisions that are not taken yet; what moves along the axis may leave the plane of the views."""
+        moving = (parameter(self.train, name) for name in self.names if name.endswith(".z"))
+        return Decisions([found.owned_by for found in moving])
 
     def _at(self, values: Values) -> tuple[Plan, Numbers]:
         """The plan for some values, and its numbers; what costs is kept for plans nearby."""

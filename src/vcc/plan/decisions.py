@@ -6,7 +6,7 @@ and what was decided on the way (how many taps, how fine a texture, which filter
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Collection, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeVar
@@ -55,17 +55,21 @@ class Decisions:
     """Decisions by name: taken once, and the same ever after.
 
     A plan that is made with decisions keeps its textures in double precision.
+
+    Args:
+        leaving: labels of elements that may leave the plane of the views. What stands there is otherwise taken for
+            one weight a view, and must stay.
     """
 
     lasting: ClassVar[bool] = True
     """Whether decisions are kept, and numbers must follow smoothly."""
 
-    def __init__(self) -> None:
-        self._book, self._about = _Book(), ""
+    def __init__(self, leaving: Collection[str] = ()) -> None:
+        self._book, self._about, self.leaving = _Book(), "", frozenset(leaving)
 
     def of(self, what: str) -> Decisions:
         """The same decisions, but that names of those taken through it begin with what they are about."""
-        part = type(self)()
+        part = type(self)(self.leaving)
         part._book, part._about = self._book, f"{self._about}{what}, "
         return part
 

@@ -96,10 +96,7 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisio
 
     between = between_views_of(grid, frame, on_sensor, how, decisions)
     planes, against_sensor = _absorbing_planes(train, frame, metres, decisions)
-    at_views = decisions.hold(
-        "which masks tell views apart only",
-        tuple(depends_on_view_only(plane, samples, between.motion) for plane in planes),
-    )
+    at_views = _at_views(planes, samples, between.motion, decisions)
     view_planes = [plane for plane, so in zip(planes, at_views, strict=True) if so]
     path_planes = [plane for plane, so in zip(planes, at_views, strict=True) if not so]
 
@@ -342,6 +339,20 @@ def _absorbing_planes(
 
 def _same_place(one: Array, other: Array) -> bool:
     return np.allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+
+
+def _at_views(
+    planes: list[Plane], samples: tuple[int, int], motion: Array, decisions: Decisions
+) -> tuple[bool, ...]:
+    """Which planes tell views apart only, and stay where they do."""
+    now = tuple(depends_on_view_only(plane, samples, motion) for plane in planes)
+    kept = decisions.keep(
+        "which masks tell views apart only",
+        lambda: tuple(so and plane.label not in decisions.leaving for so, plane in zip(now, planes, strict=True)),
+    )
+    if any(was and not so for was, so in zip(kept, now, strict=True)):
+        raise plan_again("which masks tell views apart only")
+    return kept
 
 
 def _used(weights: Array, decisions: Decisions) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
