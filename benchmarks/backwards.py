@@ -123,9 +123,36 @@ def samples_by_rays(name: str) -> Case:
     )
 
 
+def numbers_by_footprints(kind: str) -> Case:
+    """The derivatives to a mask's texture, and to all that says where samples fall and meet the mask."""
+    field = light_field(kind)
+    plan = camera(masked=True).compile(field)
+    given = weights(plan)
+    texture = "core.masks[0].texture"
+    geometry = ["core.scale", "core.weights", "core.x", "core.y", "core.step"]
+    geometry += [f"core.masks[0].{name}" for name in ("column", "row", "step")]
+
+    def to(*wanted: str) -> Step:
+        return lambda: back(plan, field, given, HOW, samples_wanted=False, wanted=wanted)
+
+    return Case(
+        f"numbers by footprints, a mask in mid-path, {kind}",
+        {
+            "picture": lambda: drive(plan, field, HOW),
+            "to the mask's texture": to(texture),
+            "to the weights": to("core.weights"),
+            "to all geometry": to(*geometry),
+            "to all of these": to(*geometry, texture),
+        },
+        "picture",
+    )
+
+
 CASES: dict[str, Callable[[], Case]] = {
     "samples": lambda: samples_by_footprints(masked=False),
     "samples, mask": lambda: samples_by_footprints(masked=True),
+    "numbers, float32": lambda: numbers_by_footprints("float32"),
+    "numbers, 8 bits": lambda: numbers_by_footprints("uint8"),
     **{f"rays: {name}": partial(samples_by_rays, name) for name in rays.cameras()},
 }
 """By name, in the order in which they are timed."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
+from vcc.engines.vector_sums import LANES, SHORTEST
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import TIE, Division
 
@@ -59,6 +61,24 @@ class FineGrid:
         return np.ascontiguousarray(fine, dtype=np.float32)
 
 
+class MaskPiece(NamedTuple):
+    """Some rows of a mask's texture, as a group of taps looks them up.
+
+    Args:
+        mask: which.
+        start: the first row.
+        stop: after the last.
+        columns: where in the rows, for each column of samples.
+        to: which of the lines the first row makes.
+    """
+
+    mask: int
+    start: int
+    stop: int
+    columns: NDArray[np.float64]
+    to: int
+
+
 class MaskColumns:
     """The masks of a plan in which rows and columns part, as each column of view taps meets them.
 
@@ -72,9 +92,11 @@ class MaskColumns:
 
     def __init__(self, core: Footprints, fine: FineGrid, repeated: int, shared: int, pool: Workers) -> None:
         self.core, self.fine, self.repeated, self.shared, self.pool = core, fine, repeated, shared, pool
+        self.textures = [mask.texture.astype(np.float32, copy=False) for mask in core.masks]
         self.rows = np.array([len(mask.texture) for mask in core.masks], dtype=np.int64)
         self.row_step = np.array([mask.step[1, 1] / core.refine for mask in core.masks], dtype=np.float64)
         self.lines = np.zeros((0, 0), dtype=np.float32)
+        self.pieces: list[MaskPiece] = []
 
     def at(self, a: int, pitch: int) -> tables.MaskLines | None:
         """The masks' lines that taps of column ``a`` look up, at the columns of their samples; see the kernels.
@@ -93,25 +115,24 @@ class MaskColumns:
         begin = np.zeros((len(core.masks), len(core.view_rows)), dtype=np.int64)
         row = np.zeros(begin.shape)
         total = 0
-        pieces: list[tuple[NDArray[np.float32], NDArray[np.float64], int]] = []
+        self.pieces = []
         for number, mask in enumerate(core.masks):
             step = self.row_step[number]
             row[number] = mask.row[:, a] + mask.step[1, 1] * fine.first_row
             ends = np.sort([row[number], row[number] + step * (fine.rows - 1)], axis=0)
-            texture = mask.texture.astype(np.float32, copy=False)
             places, group = np.unique(np.round(mask.column[used, a], 7), return_inverse=True)
             for one in range(len(places)):
                 taps = used[group == one]
                 # With the three lines around each row of samples, wherever rounding puts it.
                 low = max(math.floor(ends[0, taps].min() - 0.5 - TIE), 0)
-                high = min(math.floor(ends[1, taps].max() + 0.5 + TIE) + 2, len(texture))
+                high = min(math.floor(ends[1, taps].max() + 0.5 + TIE) + 2, len(mask.texture))
                 if low >= high:  # all of it lies beyond the mask's border, where it is dark
                     continue
                 begin[number, taps] = total - low
                 first = mask.column[taps[0], a]
                 columns = first + mask.step[0, 0] * (fine.first_column + np.arange(fine.columns) / core.refine)
-                pieces += [
-                    (texture[n : min(n + MASK_LINES, high)], columns, total + n - low)
+                self.pieces += [
+                    MaskPiece(number, n, min(n + MASK_LINES, high), columns, total + n - low)
                     for n in range(low, high, MASK_LINES)
                 ]
                 total += high - low
@@ -119,12 +140,44 @@ class MaskColumns:
         if self.lines.shape[0] < total:
             self.lines = np.zeros((total, line), dtype=np.float32)  # and zero beyond the samples' last column
 
-        def sample(piece: tuple[NDArray[np.float32], NDArray[np.float64], int]) -> None:
-            texture, columns, to = piece
-            kernels.sample_mask_columns(texture, columns, self.repeated, self.lines[to : to + len(texture)])
+        def sample(piece: MaskPiece) -> None:
+            texture = self.textures[piece.mask][piece.start : piece.stop]
+            out = self.lines[piece.to : piece.to + len(texture)]
+            kernels.sample_mask_columns(texture, piece.columns, self.repeated, out)
 
-        list(self.pool.map(sample, pieces))
+        list(self.pool.map(sample, self.pieces))
         return tables.MaskLines(self.lines, begin, self.rows, row, self.row_step, self.shared)
+
+
+def blocks(
+    core: Footprints, values: NDArray[Any], by_column: bool
+) -> Iterator[tuple[tables.Samples, tuple[int, int]]]:
+    """The samples in pieces that kernels can read, without ever copying more than a column of views.
+
+    With each, (first, end) of the columns of view taps that read it.
+    """
+    nv, nu, nt, ns = values.shape[:4]
+    channels = values.shape[4] if values.ndim == 5 else 1
+    taps = len(core.view_columns)
+    n = ns * channels
+    shortest = max(math.ceil(SHORTEST / channels), LANES)
+    if values.flags.c_contiguous and values.dtype != np.float16 and ns >= shortest:
+        view = nt * n
+        flat = values.reshape(-1)
+        samples = tables.Samples(flat, core.view_rows * (nu * view), core.view_columns * view, n, channels)
+        for a in range(taps) if by_column else (0,):
+            yield samples, (a, a + 1) if by_column else (0, taps)
+        return
+    kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
+    missing = max(shortest - ns, 0)
+    for a in map(int, np.flatnonzero((core.weights != 0).any(axis=0))):
+        column = values[:, core.view_columns[a]]
+        if missing:
+            column = np.pad(column, [(0, 0), (0, 0), (0, missing), *[(0, 0)] * (values.ndim - 4)])
+        column = np.ascontiguousarray(column, dtype=kind).reshape(nv, nt, -1)
+        pitch = column.shape[2]
+        begin, none = core.view_rows * (nt * pitch), np.zeros(taps, dtype=np.int64)
+        yield tables.Samples(column.reshape(-1), begin, none, pitch, channels), (a, a + 1)
 
 
 def textures(core: Footprints) -> tables.Textures:

@@ -295,3 +295,109 @@ class Finish(NamedTuple):
     channels: int
     guard: int
     transmission: NDArray[Any]
+
+
+# --- backwards, to a plan's numbers ---
+
+
+class Reached(NamedTuple):
+    """Which rows of the raster a row of samples reaches, from ``first`` on, and how much by each kind of share.
+
+    Args:
+        first: (rows of taps, rows of samples) int64.
+        shares: (rows of taps, rows of samples, kinds, width), zero where there is none; the width a multiple of
+            four.
+        plain: float32, those of the first kind.
+        indices: (rows of samples,), of each: fractions where samples are divided.
+        parts: (parts, rows of taps, 2) int64, the rows of samples, from and to before, whose first row lies in
+            each
+            part of the raster.
+    """
+
+    first: NDArray[np.int64]
+    shares: Array
+    plain: NDArray[np.float32]
+    indices: Array
+    parts: NDArray[np.int64]
+
+
+class Pairs(NamedTuple):
+    """Which share of rows and which of columns make up each sum over the samples.
+
+    Args:
+        row: int64, the kind in `Reached`.
+        column: int64, the kind in `Gathered`, ascending.
+        total: int64, to which sum each pair adds.
+    """
+
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    total: NDArray[np.int64]
+
+
+class Gathered(NamedTuple):
+    """Which columns of the raster a column of samples gathers its weight from, by each kind of share.
+
+    Args:
+        first: (columns of samples,) int64.
+        shares: (kinds, columns of samples, width) float32.
+    """
+
+    first: NDArray[np.int64]
+    shares: NDArray[np.float32]
+
+
+class Span(NamedTuple):
+    """Columns of samples that a thread works on: from ``start`` to before ``stop``, a multiple of ``LANES``.
+
+    Args:
+        start: the first.
+        stop: after the last.
+        fresh: the first that no span before it has.
+        to: where in lines of `Sought` they begin.
+        indices: float32, of all columns of samples.
+    """
+
+    start: int
+    stop: int
+    fresh: int
+    to: int
+    indices: NDArray[np.float32]
+
+
+class Meetings(NamedTuple):
+    """Where the rows of samples of one column of view taps meet masks: three lines of each.
+
+    Args:
+        lines: (lines, columns of samples) float32, masks' weights at the columns of the samples.
+        line: (masks, taps, rows of samples, 3) int64, which lines.
+        shares: likewise, float32, what each counts.
+        slopes: likewise, by how much that grows from a row of the mask to the next.
+        reached: (taps, rows of samples) int64, how many rows of the raster each reaches, where it is not dark.
+    """
+
+    lines: NDArray[np.float32]
+    line: NDArray[np.int64]
+    shares: NDArray[np.float32]
+    slopes: NDArray[np.float32]
+    reached: NDArray[np.int64]
+
+
+class Sought(NamedTuple):
+    """What is wanted of masks, and where it goes.
+
+    Args:
+        lines: (lines, columns of all spans) float32, to which is added what masks' lines say; see `MaskLines`.
+        slopes: like the masks' lines, by how much they grow from a column of theirs to the next.
+        texture: (masks,) whether lines are wanted.
+        place: (masks,) whether places are.
+        places: (taps, masks, 6) sums that places follow from: of the slope along columns, times k, times l, and
+            the
+            same of the slope along rows.
+    """
+
+    lines: NDArray[np.float32]
+    slopes: NDArray[np.float32]
+    texture: NDArray[np.bool_]
+    place: NDArray[np.bool_]
+    places: Array

@@ -10,20 +10,20 @@ bands of rows.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.errors import InputError
 from vcc.base.progress import Progress, part_of, tell
 from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import ray_transpose, rays_compiled, sharpening_kernels
-from vcc.engines.footprint_samples import FineGrid, MaskColumns, textures
+from vcc.engines.footprint_numbers import numbers_back
+from vcc.engines.footprint_samples import FineGrid, MaskColumns, blocks, textures
 from vcc.engines.footprints_back import samples_back
 from vcc.engines.ray_numbers import ray_numbers_back
 from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
@@ -72,11 +72,12 @@ def footprints_back(
     progress: Progress | None = None,
 ) -> Gradient:
     """What a raster's weights say of samples, float32, and of numbers; see `vcc.plan.protocol.BackRunner`."""
-    if wanted:
-        raise InputError(
-            f"engine 'numba' has no derivatives to {', '.join(sorted(wanted))}: use engine='reference'"
-        )
-    return Gradient(samples_back(core, values.shape, raster, threads, progress) if samples else None)
+    parts = int(samples) + bool(wanted)
+    core.check_wanted(wanted)
+    return Gradient(
+        samples_back(core, values.shape, raster, threads, part_of(progress, 0, parts)) if samples else None,
+        numbers_back(core, values, raster, wanted, threads, part_of(progress, parts - 1, parts)) if wanted else {},
+    )
 
 
 def rays(
@@ -211,36 +212,6 @@ def _band(line: int) -> int:
     return int(np.clip(BAND_BYTES // line, EIGHT, BAND)) // EIGHT * EIGHT
 
 
-def _blocks(
-    core: Footprints, values: NDArray[Any], by_column: bool
-) -> Iterator[tuple[tables.Samples, tuple[int, int]]]:
-    """The samples in pieces that kernels can read, without ever copying more than a column of views.
-
-    With each, (first, end) of the columns of view taps that read it.
-    """
-    nv, nu, nt, ns = values.shape[:4]
-    channels = values.shape[4] if values.ndim == 5 else 1
-    taps = len(core.view_columns)
-    n = ns * channels
-    if values.flags.c_contiguous and values.dtype != np.float16 and n >= SHORTEST:
-        view = nt * n
-        flat = values.reshape(-1)
-        samples = tables.Samples(flat, core.view_rows * (nu * view), core.view_columns * view, n, channels)
-        for a in range(taps) if by_column else (0,):
-            yield samples, (a, a + 1) if by_column else (0, taps)
-        return
-    kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
-    missing = max(math.ceil(SHORTEST / channels) - ns, 0)
-    for a in map(int, np.flatnonzero((core.weights != 0).any(axis=0))):
-        column = values[:, core.view_columns[a]]
-        if missing:
-            column = np.pad(column, [(0, 0), (0, 0), (0, missing), *[(0, 0)] * (values.ndim - 4)])
-        column = np.ascontiguousarray(column, dtype=kind).reshape(nv, nt, -1)
-        pitch = column.shape[2]
-        begin, none = core.view_rows * (nt * pitch), np.zeros(taps, dtype=np.int64)
-        yield tables.Samples(column.reshape(-1), begin, none, pitch, channels), (a, a + 1)
-
-
 class _ByColumns:
     """Tables for plans in which rows and columns part, and the loop over columns of views and bands."""
 
@@ -279,7 +250,7 @@ class _ByColumns:
         pitch = max(fine.columns, -(-SHORTEST // self.channels)) * self.channels
         divided = fine.tables(pitch) if core.refine > 1 else None
         weights = self.footprints.weights
-        for samples, taken in _blocks(core, values, bool(core.masks) or core.refine > 1 or progress is not None):
+        for samples, taken in blocks(core, values, bool(core.masks) or core.refine > 1 or progress is not None):
             used = int(np.count_nonzero(weights[:, slice(*taken)]))
             if used == 0:
                 continue

@@ -211,7 +211,7 @@ def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # typ
             continue
         if high - low > len(divided):
             divided = np.zeros((high - low, fine.pitch), np.float32)
-        _divide(samples, begin[b] + samples.further[a], fine, low, high, divided)
+        divide(samples, begin[b] + samples.further[a], fine, low, high, divided)
         here[b] = -low * fine.pitch
         lines = Lines(divided.reshape(-1), here, fine.pitch, 0)
         sum_rows(lines, np.array([b]), weights[:, a], rows, masks, band, sums)
@@ -238,7 +238,7 @@ def _room(band, pitch, width, channels):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def _divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untyped-def]
+def divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untyped-def]
     """divided[l − low] = row l of a view's finer samples, from ``low`` to before ``high``; begin: of the view."""
     values, _, _, pitch, channels = samples
     first_row, row_shares, first_column, column_shares, _ = fine

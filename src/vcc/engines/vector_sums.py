@@ -39,40 +39,42 @@ RUN_OF_THREES = 3 * LANES
 SHORTEST = max(RUN, RUN_OF_THREES)
 """Rows are at least so long; what is shorter is continued by zeros."""
 
-_WIDE = ir.VectorType(ir.FloatType(), LANES)
-_PLACE, _NUMBER = ir.IntType(64), ir.IntType(32)
-_FLAGS = ["contract"]
+WIDE = ir.VectorType(ir.FloatType(), LANES)
+PLACE, NUMBER = ir.IntType(64), ir.IntType(32)
+FLAGS = ["contract"]
 
 
-def _constant(number: int) -> Any:
-    return ir.Constant(_PLACE, number)
+def constant(number: int) -> Any:
+    """A place or a number of them."""
+    return ir.Constant(PLACE, number)
 
 
-def _everywhere(builder: Any, scalar: Any, lanes: int = LANES) -> Any:
+def everywhere(builder: Any, scalar: Any, lanes: int = LANES) -> Any:
     """A scalar in all lanes of a vector."""
     empty = ir.Constant(ir.VectorType(scalar.type, lanes), ir.Undefined)
-    first = builder.insert_element(empty, scalar, ir.Constant(_NUMBER, 0))
-    return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(_NUMBER, lanes), [0] * lanes))
+    first = builder.insert_element(empty, scalar, ir.Constant(NUMBER, 0))
+    return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(NUMBER, lanes), [0] * lanes))
 
 
-def _floats(builder: Any, pointer: Any, lanes: int = LANES) -> Any:
+def floats(builder: Any, pointer: Any, lanes: int = LANES) -> Any:
     """A vector of float32 from memory."""
     return builder.load(builder.bitcast(pointer, ir.VectorType(ir.FloatType(), lanes).as_pointer()), align=4)
 
 
-def _samples(context: Any, builder: Any, pointer: Any, kind: Any) -> Any:
+def samples_at(context: Any, builder: Any, pointer: Any, kind: Any) -> Any:
     """A vector of samples of any type from memory, as float32."""
     run = ir.VectorType(context.get_value_type(kind), LANES).as_pointer()
     samples = builder.load(builder.bitcast(pointer, run), align=kind.bitwidth // 8)
     if isinstance(kind, types.Integer):
         if kind.bitwidth < 32:  # with the sign bit clear: the cheap conversion
-            return builder.sitofp(builder.zext(samples, ir.VectorType(_NUMBER, LANES)), _WIDE)
-        return builder.uitofp(samples, _WIDE)
-    return builder.fptrunc(samples, _WIDE) if kind.bitwidth == 64 else samples
+            return builder.sitofp(builder.zext(samples, ir.VectorType(NUMBER, LANES)), WIDE)
+        return builder.uitofp(samples, WIDE)
+    return builder.fptrunc(samples, WIDE) if kind.bitwidth == 64 else samples
 
 
-def _plus(builder: Any, total: Any, weight: Any, values: Any) -> Any:
-    return builder.fadd(total, builder.fmul(weight, values, flags=_FLAGS), flags=_FLAGS)
+def plus(builder: Any, total: Any, weight: Any, values: Any) -> Any:
+    """total + weight · values."""
+    return builder.fadd(total, builder.fmul(weight, values, flags=FLAGS), flags=FLAGS)
 
 
 class _Masks:
@@ -87,36 +89,34 @@ class _Masks:
         self.lines, self.places, self.shares = lines.data, places.data, shares.data
         self.count = cgutils.unpack_tuple(builder, shares.shape)[1]
         self.narrow = 1 if repeat == 3 else VECTORS
-        self.weights = [cgutils.alloca_once(builder, _WIDE) for _ in range(self.narrow)]
+        self.weights = [cgutils.alloca_once(builder, WIDE) for _ in range(self.narrow)]
 
     def along(self, entry: Any, x: Any) -> list[Any]:
         """The weights of row ``entry`` of the list from sample value ``x`` on, a vector for each of samples."""
         builder = self.builder
         if self.repeat == 3:
-            x = builder.udiv(x, _constant(3))
+            x = builder.udiv(x, constant(3))
         for weight in self.weights:
-            builder.store(ir.Constant(_WIDE, [1.0] * LANES), weight)
+            builder.store(ir.Constant(WIDE, [1.0] * LANES), weight)
         first = builder.mul(entry, self.count)
-        with cgutils.for_range(builder, self.count, intp=_PLACE) as loop:
-            at = builder.mul(builder.add(first, loop.index), _constant(3))
+        with cgutils.for_range(builder, self.count, intp=PLACE) as loop:
+            at = builder.mul(builder.add(first, loop.index), constant(3))
             shares, lines = [], []
             for n in range(3):
-                here = builder.add(at, _constant(n))
-                shares.append(_everywhere(builder, builder.load(builder.gep(self.shares, [here]))))
+                here = builder.add(at, constant(n))
+                shares.append(everywhere(builder, builder.load(builder.gep(self.shares, [here]))))
                 begin = builder.load(builder.gep(self.places, [here]))
                 lines.append(builder.gep(self.lines, [builder.add(begin, x)]))
             for k, weight in enumerate(self.weights):
-                above, level, below = (
-                    _floats(builder, builder.gep(line, [_constant(k * LANES)])) for line in lines
-                )
-                mean = builder.fmul(shares[0], above, flags=_FLAGS)
-                mean = _plus(builder, _plus(builder, mean, shares[1], level), shares[2], below)
-                builder.store(builder.fmul(builder.load(weight), mean, flags=_FLAGS), weight)
+                above, level, below = (floats(builder, builder.gep(line, [constant(k * LANES)])) for line in lines)
+                mean = builder.fmul(shares[0], above, flags=FLAGS)
+                mean = plus(builder, plus(builder, mean, shares[1], level), shares[2], below)
+                builder.store(builder.fmul(builder.load(weight), mean, flags=FLAGS), weight)
         weights = [builder.load(weight) for weight in self.weights]
         if self.repeat == 3:  # one weight for the three channels of a pixel
             one = weights[0]
             indices = [[(k * LANES + lane) // 3 for lane in range(LANES)] for k in range(3)]
-            threes = [ir.Constant(ir.VectorType(_NUMBER, LANES), index) for index in indices]
+            threes = [ir.Constant(ir.VectorType(NUMBER, LANES), index) for index in indices]
             weights = [builder.shuffle_vector(one, one, three) for three in threes]
         return weights
 
@@ -170,39 +170,39 @@ def _add_rows(
     )
     x, skip, line = arguments[3], arguments[4], arguments[6]
     values, sums, pitch = values.data, total_sums.data, cgutils.unpack_tuple(builder, total_sums.shape)[1]
-    dark = ir.Constant(_WIDE, [0.0] * LANES)
-    totals = [[cgutils.alloca_once(builder, _WIDE) for _ in range(vectors)] for _ in range(ROWS)]
+    dark = ir.Constant(WIDE, [0.0] * LANES)
+    totals = [[cgutils.alloca_once(builder, WIDE) for _ in range(vectors)] for _ in range(ROWS)]
     for total in (total for row in totals for total in row):
         builder.store(dark, total)
-    start = _constant(0)
+    start = constant(0)
     for number, (upper, lower) in enumerate(RANGES):
-        stop = builder.load(builder.gep(ends, [_constant(number)]))
-        with cgutils.for_range_slice(builder, start, stop, _constant(1), _PLACE) as (index, _):
+        stop = builder.load(builder.gep(ends, [constant(number)]))
+        with cgutils.for_range_slice(builder, start, stop, constant(1), PLACE) as (index, _):
             entry = builder.load(builder.gep(order, [index]))
             begin = builder.add(builder.load(builder.gep(places, [entry])), x)
             weights = None if masks is None else masks.along(entry, x)
             share = {}
             for row in range(upper, lower + 1):
-                at = builder.add(builder.mul(entry, _constant(ROWS)), _constant(row))
-                share[row] = _everywhere(builder, builder.load(builder.gep(shares, [at])))
+                at = builder.add(builder.mul(entry, constant(ROWS)), constant(row))
+                share[row] = everywhere(builder, builder.load(builder.gep(shares, [at])))
             for k in range(vectors):
-                pointer = builder.gep(values, [builder.add(begin, _constant(k * LANES))])
-                samples = _samples(context, builder, pointer, signature.args[0].dtype)
+                pointer = builder.gep(values, [builder.add(begin, constant(k * LANES))])
+                samples = samples_at(context, builder, pointer, signature.args[0].dtype)
                 if weights is not None:
-                    samples = builder.fmul(samples, weights[k], flags=_FLAGS)
+                    samples = builder.fmul(samples, weights[k], flags=FLAGS)
                 for row, each in share.items():
                     total = totals[row][k]
-                    builder.store(_plus(builder, builder.load(total), each, samples), total)
+                    builder.store(plus(builder, builder.load(total), each, samples), total)
         start = stop
-    skipped = _everywhere(builder, skip)
+    skipped = everywhere(builder, skip)
     for row in range(ROWS):
-        begin = builder.add(builder.mul(builder.add(line, _constant(row)), pitch), x)
+        begin = builder.add(builder.mul(builder.add(line, constant(row)), pitch), x)
         for k in range(vectors):
-            pointer = builder.gep(sums, [builder.add(begin, _constant(k * LANES))])
-            lanes = ir.Constant(ir.VectorType(_PLACE, LANES), [k * LANES + lane for lane in range(LANES)])
+            pointer = builder.gep(sums, [builder.add(begin, constant(k * LANES))])
+            lanes = ir.Constant(ir.VectorType(PLACE, LANES), [k * LANES + lane for lane in range(LANES)])
             fresh = builder.select(builder.icmp_signed(">=", lanes, skipped), builder.load(totals[row][k]), dark)
-            here = builder.bitcast(pointer, _WIDE.as_pointer())
-            builder.store(builder.fadd(builder.load(here, align=4), fresh, flags=_FLAGS), here, align=4)
+            here = builder.bitcast(pointer, WIDE.as_pointer())
+            builder.store(builder.fadd(builder.load(here, align=4), fresh, flags=FLAGS), here, align=4)
     return context.get_dummy_value()
 
 
@@ -219,10 +219,10 @@ def fetch(typing_context, values, place):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
         byte = ir.IntType(8).as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [byte, _NUMBER, _NUMBER, _NUMBER])
+        kind = ir.FunctionType(ir.VoidType(), [byte, NUMBER, NUMBER, NUMBER])
         prefetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
         # to be read, into the second-level cache, as data
-        hints = [ir.Constant(_NUMBER, hint) for hint in (0, 2, 1)]
+        hints = [ir.Constant(NUMBER, hint) for hint in (0, 2, 1)]
         builder.call(prefetch, [builder.bitcast(builder.gep(data, [arguments[1]]), byte), *hints])
         return context.get_dummy_value()
 
@@ -260,11 +260,11 @@ def mix_eight(typing_context, sums, place, step, shares, row, out, to):  # type:
         total = cgutils.alloca_once(builder, wide)
         builder.store(builder.load(here, align=4), total)
         first = builder.gep(shares.data, [builder.mul(row, width)])
-        with cgutils.for_range(builder, width, intp=_PLACE) as loop:
-            share = _everywhere(builder, builder.load(builder.gep(first, [loop.index])), EIGHT)
+        with cgutils.for_range(builder, width, intp=PLACE) as loop:
+            share = everywhere(builder, builder.load(builder.gep(first, [loop.index])), EIGHT)
             begin = builder.add(place, builder.mul(loop.index, step))
-            run = _floats(builder, builder.gep(sums.data, [begin]), EIGHT)
-            builder.store(_plus(builder, builder.load(total), share, run), total)
+            run = floats(builder, builder.gep(sums.data, [begin]), EIGHT)
+            builder.store(plus(builder, builder.load(total), share, run), total)
         builder.store(builder.load(total), here, align=4)
         return context.get_dummy_value()
 

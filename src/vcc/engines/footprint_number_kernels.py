@@ -1,0 +1,499 @@
+"""Compiled loops from the weights of a raster back to the numbers of footprints: places, steps, weights, masks.
+
+A column of view taps and a span of columns of samples at a time. The raster's weights are first mixed into the
+columns of the samples; then each row of samples is read once, while the few rows of weights that it falls on and
+the mask's lines that it meets lie in the first-level cache. What is summed along a row is so in single precision,
+everything else in double, always in the same order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vcc.engines.compiled import compiled
+from vcc.engines.numba_kernels import divide, farthest, share_at
+from vcc.engines.vector_rows import (
+    first_four_rows,
+    four_dots,
+    last_four_rows,
+    more_four_rows,
+    only_four_rows,
+    to_three_rows,
+    weigh_ones,
+    weigh_threes,
+)
+from vcc.engines.vector_sums import EIGHT, fetch, mix_eight
+
+DIVIDED = 32
+"""Rows of finer samples that are made at once."""
+AHEAD = 2
+"""Rows of samples from what is read to what is asked for beforehand."""
+
+_FAST = {"contract", "reassoc", "nsz"}
+_compiled = compiled(fastmath=_FAST)
+_inlined = compiled(fastmath=_FAST, inline="always")
+
+
+@_compiled
+def turned(raster, tile, tiles):  # type: ignore[no-untyped-def]
+    """tiles[tile, x, y] = raster[8 · tile + y, x]: eight rows side by side, zero beyond the last."""
+    start = EIGHT * tile
+    for y in range(min(EIGHT, raster.shape[0] - start)):
+        for x in range(raster.shape[1]):
+            tiles[tile, x, y] = raster[start + y, x]
+
+
+@_compiled
+def mix(tiles, gathered, span, channels, mixed):  # type: ignore[no-untyped-def]
+    """mixed[s, y, (k − start) · channels + c] = Σ share · raster[y, x · channels + c] over x that sample k
+    reaches.
+
+    tiles: the raster as `turned` has it. gathered: `Gathered`. span: `Span`. mixed: (kinds, rows, values), rows a
+    multiple of eight, and more.
+    """
+    first, shares = gathered
+    step = np.int64(EIGHT * channels)
+    eight = np.empty(EIGHT, np.float32)
+    for kind in range(len(shares)):
+        for tile in range(len(tiles)):
+            line = tiles[tile].reshape(-1)
+            out = mixed[kind, EIGHT * tile : EIGHT * (tile + 1)]
+            for k in range(span.fresh, min(span.stop, first.size)):
+                for c in range(channels):
+                    eight[:] = 0
+                    mix_eight(line, step * first[k] + EIGHT * c, step, shares[kind], k, eight, 0)
+                    for y in range(EIGHT):
+                        out[y, (k - span.start) * channels + c] = eight[y]
+
+
+@_compiled
+def add_numbers(samples, a, used, fine, tables, masks, sought, channels, span, totals):  # type: ignore[no-untyped-def]
+    """Add what the samples of a column of view taps say, those of a span of their columns.
+
+    Args:
+        samples: `Samples`.
+        a: the column of view taps.
+        used: the taps in it that are looked at.
+        fine: `FineSamples`, or None.
+        tables: the raster as `mix` has it, `Reached`, `Pairs`, and the weight of each tap in what lines of masks
+            say.
+        masks: `Meetings`.
+        sought: `Sought`.
+        channels: values a sample.
+        span: `Span`.
+        totals: (taps, sums) the sums over the samples of each tap.
+    """
+    mixed, reached, pairs, weights = tables
+    values = (span.stop - span.start) * channels
+    divided = np.zeros((DIVIDED if fine is not None else 0, values), np.float32)
+    # All taps that fall on some rows of the raster, before the next rows: their weights stay in the cache.
+    for part in range(reached.parts.shape[0]):
+        for b in used:
+            first, last = reached.parts[part, b, 0], reached.parts[part, b, 1]
+            begin = samples.begin[b] + samples.further[a]
+            if fine is None:
+                begin += span.start * channels
+                add_rows(samples.values, begin, samples.pitch, b, first, last, mixed, reached, pairs,
+                         weights[b], masks, sought, channels, span, totals)  # fmt: skip
+            else:
+                for low in range(first, last, DIVIDED):
+                    high = min(low + DIVIDED, last)
+                    divide(samples, begin, fine, low, high, divided)
+                    add_rows(divided.reshape(-1), -low * values, values, b, low, high, mixed, reached, pairs,
+                             weights[b], masks, sought, channels, span, totals)  # fmt: skip
+
+
+@_compiled
+def add_rows(  # type: ignore[no-untyped-def]
+    values, start, pitch, b, low, high, mixed, reached, pairs, weight, masks, sought, channels, span, totals
+):
+    """As `add_numbers`, for rows ``low`` to before ``high`` of tap b; row 0 would begin at ``start``."""
+    n = span.stop - span.start
+    wide = n * channels
+    looks, sums = sought.texture.any() or sought.place.any(), pairs.row.size
+    # Arrays of one dimension and places in them, and no tuples: parts would have their references counted in every
+    # row, by all threads at once.
+    firsts, shares, plain, index = reached.first, reached.shares, reached.plain.reshape(-1), reached.indices
+    row_kind, column_kind, total_of = pairs.row, pairs.column, pairs.total
+    line, share, slope, counts = masks.line, masks.shares, masks.slopes, masks.reached
+    texture, place, places = sought.texture, sought.place, sought.places
+    lines, to_lines, slopes = masks.lines.reshape(-1), sought.lines.reshape(-1), sought.slopes.reshape(-1)
+    line_pitch, to_pitch, first_k, to, index_k = (
+        masks.lines.shape[1],
+        sought.lines.shape[1],
+        span.start,
+        span.to,
+        span.indices,
+    )
+    planes, plane = mixed.reshape(-1), mixed.shape[1] * wide
+    count, width = len(line), shares.shape[3]
+    product, seen, rest, lit = (
+        np.empty(wide, np.float32),
+        np.empty(n, np.float32),
+        np.empty(n, np.float32),
+        np.ones(n, np.float32),
+    )
+    through, dots = np.empty(max(count, 1) * n, np.float32), np.empty(width, np.float32)
+    per_line = 64 // values.itemsize
+    for l in range(low, high):
+        at = start + l * pitch
+        for x in range(at + AHEAD * pitch, at + AHEAD * pitch + wide, per_line):
+            fetch(values, x)
+        rows = counts[b, l]
+        if rows == 0:
+            continue
+        y = firsts[b, l] * wide
+        if count > 1 or sums > 0:
+            for mask in range(count):
+                _through(lines, line, line_pitch, first_k, share, mask, b, l, n, through)
+        if looks:
+            _seen(planes, y, wide, plain, (b * firsts.shape[1] + l) * width, rows, values, at, product)
+            _over_channels(product, channels, n, seen)
+            for mask in range(count):
+                if texture[mask] or place[mask]:
+                    _without(seen, through, mask, count, n, rest)
+                    if texture[mask]:
+                        _to_lines(rest, weight, line, share, mask, b, l, n, to, to_pitch, to_lines)
+                    if place[mask]:
+                        _to_places(rest, lines, line_pitch, slopes, line, share, slope, b, l, mask, first_k, n,
+                                   index_k, index[l], places)  # fmt: skip
+        if sums > 0:
+            _lit(through, count, n, lit)
+            _weighed(values, at, lit, channels, n, product)
+            column = -1
+            for pair in range(sums):
+                if column_kind[pair] != column:
+                    column = column_kind[pair]
+                    for t in range(0, rows, 4):
+                        dots[t], dots[t + 1], dots[t + 2], dots[t + 3] = four_dots(
+                            product, planes, column * plane + y + t * wide, wide, wide
+                        )
+                total = 0.0
+                for t in range(rows):
+                    total += shares[b, l, row_kind[pair], t] * dots[t]
+                totals[b, total_of[pair]] += total
+
+
+@_inlined
+def _through(lines, line, pitch, start, share, mask, b, l, n, out):  # type: ignore[no-untyped-def]
+    """out[mask · n + k]: the weights of a mask along a row of samples."""
+    first, second, third = _places(line, mask, b, l, pitch, start)
+    above, level, below = share[mask, b, l, 0], share[mask, b, l, 1], share[mask, b, l, 2]
+    to = np.uint64(mask * n)
+    for k in range(np.uint64(n)):
+        out[to + k] = above * lines[first + k] + level * lines[second + k] + below * lines[third + k]
+
+
+@_inlined
+def _places(line, mask, b, l, pitch, start):  # type: ignore[no-untyped-def]
+    """Where three lines of a mask begin."""
+    return (
+        np.uint64(line[mask, b, l, 0] * pitch + start),
+        np.uint64(line[mask, b, l, 1] * pitch + start),
+        np.uint64(line[mask, b, l, 2] * pitch + start),
+    )
+
+
+@_inlined
+def _seen(planes, y, wide, plain, first, rows, values, at, out):  # type: ignore[no-untyped-def]
+    """out[x] = values[at + x] · Σ plain[first + t] · planes[y + t · wide + x], the rows taken in fours."""
+    for t in range(0, rows, 4):
+        four = plain[first + t], plain[first + t + 1], plain[first + t + 2], plain[first + t + 3]
+        place = y + t * wide
+        if rows <= 4:
+            only_four_rows(planes, place, wide, four, values, at, wide, out)
+        elif t == 0:
+            first_four_rows(planes, place, wide, four, values, at, wide, out)
+        elif t + 4 < rows:
+            more_four_rows(planes, place, wide, four, values, at, wide, out)
+        else:
+            last_four_rows(planes, place, wide, four, values, at, wide, out)
+
+
+@_inlined
+def _over_channels(product, channels, n, seen):  # type: ignore[no-untyped-def]
+    """The sums over the channels of samples."""
+    if channels == 1:
+        for k in range(np.uint64(n)):
+            seen[k] = product[k]
+    elif channels == 3:
+        for k in range(np.uint64(n)):
+            at = k * np.uint64(3)
+            seen[k] = product[at] + product[at + np.uint64(1)] + product[at + np.uint64(2)]
+    else:
+        for k in range(n):
+            total = np.float32(0)
+            for c in range(channels):
+                total += product[k * channels + c]
+            seen[k] = total
+
+
+@_inlined
+def _without(seen, through, mask, count, n, out):  # type: ignore[no-untyped-def]
+    """out[k] = seen[k] times the weights of all masks but one."""
+    for k in range(np.uint64(n)):
+        out[k] = seen[k]
+    for other in range(count):
+        if other != mask:
+            at = np.uint64(other * n)
+            for k in range(np.uint64(n)):
+                out[k] *= through[at + k]
+
+
+@_inlined
+def _lit(through, count, n, out):  # type: ignore[no-untyped-def]
+    """out[k]: the weights of all masks; one where there is none."""
+    for mask in range(count):
+        at = np.uint64(mask * n)
+        if mask == 0:
+            for k in range(np.uint64(n)):
+                out[k] = through[k]
+        else:
+            for k in range(np.uint64(n)):
+                out[k] *= through[at + k]
+
+
+@_inlined
+def _weighed(values, at, lit, channels, n, out):  # type: ignore[no-untyped-def]
+    """out[k · channels + c] = a sample's value times the weights of all masks."""
+    if channels == 1:
+        weigh_ones(values, at, lit, n, out)
+    elif channels == 3:
+        weigh_threes(values, at, lit, n, out)
+    else:
+        for k in range(n):
+            for c in range(channels):
+                out[k * channels + c] = lit[k] * np.float32(values[at + k * channels + c])
+
+
+@_inlined
+def _to_lines(seen, weight, line, share, mask, b, l, n, start, pitch, lines):  # type: ignore[no-untyped-def]
+    """What a row of samples says of the three lines that it meets."""
+    parts = (
+        np.float32(weight * share[mask, b, l, 0]),
+        np.float32(weight * share[mask, b, l, 1]),
+        np.float32(weight * share[mask, b, l, 2]),
+    )
+    first, second, third = _places(line, mask, b, l, pitch, start)
+    to_three_rows(seen, parts, (np.int64(first), np.int64(second), np.int64(third)), n, lines)
+
+
+@_inlined
+def _to_places(  # type: ignore[no-untyped-def]
+    seen, lines, pitch, slopes, line, share, slope, b, l, mask, first_k, n, indices, row, places
+):
+    """What a row of samples says of where it meets a mask, added to the six sums of `Sought`."""
+    first, second, third = _places(line, mask, b, l, pitch, first_k)
+    at_first, at_second, at_third = share[mask, b, l, 0], share[mask, b, l, 1], share[mask, b, l, 2]
+    to_first, to_second, to_third = slope[mask, b, l, 0], slope[mask, b, l, 1], slope[mask, b, l, 2]
+    start = np.uint64(first_k)
+    across, across_k, down, down_k = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
+    for k in range(np.uint64(n)):
+        light, index = seen[k], indices[start + k]
+        slanted = at_first * slopes[first + k] + at_second * slopes[second + k] + at_third * slopes[third + k]
+        steep = to_first * lines[first + k] + to_second * lines[second + k] + to_third * lines[third + k]
+        across += light * slanted
+        across_k += light * slanted * index
+        down += light * steep
+        down_k += light * steep * index
+    places[b, mask, 0] += across
+    places[b, mask, 1] += across_k
+    places[b, mask, 2] += np.float64(across) * row
+    places[b, mask, 3] += down
+    places[b, mask, 4] += down_k
+    places[b, mask, 5] += np.float64(down) * row
+
+
+@_compiled
+def look_up_columns(texture, points, counts, out):  # type: ignore[no-untyped-def]
+    """out[r, k] = Σ counts[n, k] · texture[r, points[n, k]], three points each."""
+    for r in range(len(texture)):
+        line, to = texture[r], out[r]
+        for k in range(points.shape[1]):
+            to[k] = (
+                counts[0, k] * line[points[0, k]]
+                + counts[1, k] * line[points[1, k]]
+                + counts[2, k] * line[points[2, k]]
+            )
+
+
+@_compiled
+def give_back_columns(lines, points, counts, texture):  # type: ignore[no-untyped-def]
+    """texture[r, points[n, k]] += counts[n, k] · lines[r, k]: the transpose of `look_up_columns`."""
+    for r in range(len(lines)):
+        line, to = lines[r], texture[r]
+        for k in range(points.shape[1]):
+            value = line[k]
+            to[points[0, k]] += counts[0, k] * value
+            to[points[1, k]] += counts[1, k] * value
+            to[points[2, k]] += counts[2, k] * value
+
+
+# --- where rows and columns do not part ---
+
+SHEARED = 10
+"""Sums of a tap: see `add_sheared`."""
+
+
+@_compiled
+def _height(interpolation, a):  # type: ignore[no-untyped-def]
+    """φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 a spline."""
+    r = abs(a)
+    if interpolation == 1:
+        return max(1 - r, 0.0)
+    if interpolation == 3:
+        return 2.0 / 3.0 - r * r + r**3 / 2 if r < 1 else max(2 - r, 0.0) ** 3 / 6
+    if r < 1:
+        return (1.5 * r - 2.5) * r * r + 1
+    return ((-0.5 * r + 2.5) * r - 4) * r + 2 if r < 2 else 0.0
+
+
+@_compiled
+def _slopes(footprint, offset, size):  # type: ignore[no-untyped-def]
+    """A share, and how it grows with a sample's place, the size and the opening (`shares.share_slopes`)."""
+    interpolation, _, opening = footprint
+    share = share_at(footprint, offset, size)
+    if interpolation == 0:
+        return share, 0.0, 0.0, 0.0
+    a, c = (offset + opening / 2) / size, (offset - opening / 2) / size
+    upper, lower = _height(interpolation, a), _height(interpolation, c)
+    across = opening * size
+    return (
+        share,
+        (lower - upper) / across,
+        (c * lower - a * upper) / across,
+        (upper + lower) / (2 * across) - share / opening,
+    )
+
+
+@_compiled
+def add_sheared(view, grid, footprint, masks, raster, band, sums, places, gradient):  # type: ignore[no-untyped-def]
+    """Add what one view says by a band's raster rows, where rows and columns of samples shear.
+
+    With f = ΠT·F_y·L and the weights G mixed by F_x or its slopes: sums of f·G by the share along x, by its slope
+    to x alone, times k, times the rows from the view's place, and by its slope to the size; of the share along x
+    by the slope of F_y to y alone, times k, times l, and by the slope to the size; and by the openings of both.
+
+    Args:
+        view: `View`.
+        grid: `Grid`.
+        footprint: `Footprint`.
+        masks: `Textures`.
+        raster: weights (rows, columns, channels).
+        band: `Band`.
+        sums: (SHEARED,) where they are added.
+        places: (masks, 6), see `Sought`.
+        gradient: of the textures, like them.
+    """
+    samples, weight, x0, y0, place = view
+    textures, size, mask_step = masks
+    step, shear, coarse_row_step, coarse_column_step, refine, first_k, first_l = grid
+    nt, ns, channels = samples.shape
+    row_step, column_step = coarse_row_step / refine, coarse_column_step / refine
+    height, width = abs(row_step), abs(column_step)
+    reach_y, reach_x = farthest(footprint, height), farthest(footprint, width)
+    count = len(place)
+    mixed = np.empty((4, channels))
+    values, along, down = np.empty(count), np.empty(count), np.empty(count)
+    for y in range(band.start, band.stop):
+        for n in range(ns):
+            k = first_k + n / refine
+            y_start = y0 + step[1, 0] * k + coarse_row_step * first_l
+            middle = (y - y_start) / row_step
+            first = max(int(np.ceil(middle - reach_y / height)), 0)
+            last = min(int(np.floor(middle + reach_y / height)), nt - 1)
+            x = x0 + shear * (y - y0) + coarse_column_step * k
+            left = max(int(np.ceil(x - reach_x)), 0)
+            right = min(int(np.floor(x + reach_x)), raster.shape[1] - 1)
+            if first > last or left > right:
+                continue
+            mixed[:] = 0
+            for pixel in range(left, right + 1):
+                share, to_x, to_width, to_opening_x = _slopes(footprint, pixel - x, width)
+                for c in range(channels):
+                    weigh = raster[y, pixel, c]
+                    mixed[0, c] += share * weigh
+                    mixed[1, c] += to_x * weigh
+                    mixed[2, c] += to_width * weigh
+                    mixed[3, c] += to_opening_x * weigh
+            for m in range(first, last + 1):
+                l = first_l + m / refine
+                share, to_y, to_height, to_opening = _slopes(footprint, y - y_start - row_step * m, height)
+                light = 1.0
+                for mask in range(count):
+                    column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
+                    row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
+                    values[mask], along[mask], down[mask] = _looked_up(
+                        textures, mask, size[mask, 0], size[mask, 1], row, column
+                    )
+                    light *= values[mask]
+                seen, to_x, to_width, to_opening_x = 0.0, 0.0, 0.0, 0.0
+                for c in range(channels):
+                    sample = samples[m, n, c]
+                    seen += sample * mixed[0, c]
+                    to_x += sample * mixed[1, c]
+                    to_width += sample * mixed[2, c]
+                    to_opening_x += sample * mixed[3, c]
+                sums[0] += light * share * seen
+                sums[1] += light * share * to_x
+                sums[2] += light * share * to_x * k
+                sums[3] += light * share * to_x * (y - y0)
+                sums[4] += light * share * to_width
+                sums[5] += light * to_y * seen
+                sums[6] += light * to_y * seen * k
+                sums[7] += light * to_y * seen * l
+                sums[8] += light * to_height * seen
+                sums[9] += light * (to_opening * seen + share * to_opening_x)
+                for mask in range(count):
+                    rest = share * seen
+                    for other in range(count):
+                        if other != mask:
+                            rest *= values[other]
+                    places[mask, 0] += rest * along[mask]
+                    places[mask, 1] += rest * along[mask] * k
+                    places[mask, 2] += rest * along[mask] * l
+                    places[mask, 3] += rest * down[mask]
+                    places[mask, 4] += rest * down[mask] * k
+                    places[mask, 5] += rest * down[mask] * l
+                    if gradient.size > 0 and rest != 0:
+                        column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
+                        row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
+                        _given_back(gradient, mask, size[mask, 0], size[mask, 1], row, column, weight * rest)
+
+
+@_compiled
+def _three(place):  # type: ignore[no-untyped-def]
+    """As `three_around`, with how much each counts more at the next place, in double precision."""
+    middle = int(np.floor(place + 0.5))
+    off = place - middle
+    shares = 0.5 * (0.5 - off) ** 2, 0.75 - off * off, 0.5 * (0.5 + off) ** 2
+    return middle, shares, (off - 0.5, -2 * off, off + 0.5)
+
+
+@_inlined
+def _looked_up(textures, mask, rows, columns, row, column):  # type: ignore[no-untyped-def]
+    """A mask at a place, and how it grows along its columns and along its rows; zeros around it."""
+    value, along, down = 0.0, 0.0, 0.0
+    if -1.5 < row < rows + 0.5 and -1.5 < column < columns + 0.5:
+        r, by_row, row_slopes = _three(row)
+        c, by_column, column_slopes = _three(column)
+        for m in range(3):
+            for n in range(3):
+                if 0 <= r + m - 1 < rows and 0 <= c + n - 1 < columns:
+                    point = textures[mask, r + m - 1, c + n - 1]
+                    value += by_row[m] * by_column[n] * point
+                    along += by_row[m] * column_slopes[n] * point
+                    down += row_slopes[m] * by_column[n] * point
+    return value, along, down
+
+
+@_inlined
+def _given_back(gradient, mask, rows, columns, row, column, light):  # type: ignore[no-untyped-def]
+    """Add light to the points that are looked up at a place."""
+    if -1.5 < row < rows + 0.5 and -1.5 < column < columns + 0.5:
+        r, by_row, _ = _three(row)
+        c, by_column, _ = _three(column)
+        for m in range(3):
+            for n in range(3):
+                if 0 <= r + m - 1 < rows and 0 <= c + n - 1 < columns:
+                    gradient[mask, r + m - 1, c + n - 1] += by_row[m] * by_column[n] * light

@@ -1,0 +1,473 @@
+"""From the weights of a raster back to the numbers of footprints, by compiled loops: see `numbers_back`.
+
+With I(y, x) = scale · Σ L · w · Π T · F_y · F_x and weights G of I, the weights are first mixed into the columns
+of the samples of one column of view taps, H(y, k) = Σ_x F_x · G, and by the slopes of F_x, if places along x are
+wanted. A row of samples then meets the few rows y that it falls on. Everything that is wanted follows from two
+things:
+
+- for weights, places and steps: sums of L · ΠT · H along a row, one for each y, times F_y or its slopes;
+- for masks: Σ_c L · Σ_y F_y · H at each sample, which is given to the three lines of a mask that the row meets,
+  and from those to the texture once for a column of view taps.
+
+Threads take spans of columns of samples, always the same ones, so that the result does not depend on how many
+there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+from vcc.base.lookup import three_around
+from vcc.base.progress import Progress, tell
+from vcc.base.workers import Workers
+from vcc.engines import footprint_number_kernels as kernels
+from vcc.engines import footprint_tables as tables
+from vcc.engines.footprint_samples import FineGrid, MaskColumns, MaskPiece, blocks, textures
+from vcc.engines.vector_sums import EIGHT, LANES
+from vcc.plan.footprints.model import Footprints
+from vcc.plan.footprints.shares import REACH, reach_in_pixels, share_slopes, shares
+
+Array = NDArray[np.float64]
+
+SPAN = 128
+"""Columns of samples that a thread works on at once, about."""
+
+PART = 64
+"""Rows of the raster that are looked at by all taps before the next."""
+
+TEXTURE_BYTES = 2**26
+"""Of textures for pieces of the raster, where rows and columns do not part."""
+PIECES = 8
+"""How many at most."""
+
+SUMS: dict[str, tuple[tuple[str, str], ...]] = {
+    "weights": (("share", "share"),),
+    "y": (("place", "share"),),
+    "x": (("share", "place"),),
+    "opening": (("opening", "share"), ("share", "opening")),
+    "x/k": (("share", "step"),),
+    "x/l": (("sheared", "place"),),
+    "y/k": (("place", "along"),),
+    "y/l": (("step", "share"),),
+}
+"""Sums over the samples: of which shares along (y, x), by the product rule where a number changes both."""
+NEEDED = {
+    "scale": ("weights",),
+    "weights": ("weights",),
+    "x": ("x",),
+    "y": ("y",),
+    "step": ("x/k", "x/l", "y/k", "y/l"),
+    "opening": ("opening",),
+}
+"""Which of them each number takes."""
+
+
+def numbers_back(
+    core: Footprints,
+    values: NDArray[Any],
+    raster: NDArray[np.floating],
+    wanted: Collection[str],
+    threads: int,
+    progress: Progress | None = None,
+) -> dict[str, Array]:
+    """The derivative of ⟨raster, the raster of the samples⟩ to numbers of the core, by name, each of its shape.
+
+    Places and steps are held to be independent of each other: the derivative to ``x`` is that of each tap alone,
+    to ``weights`` also that of taps which let no light through.
+
+    Args:
+        core: what is computed.
+        values: the samples, (v, u, t, s[, channels]).
+        raster: weights of the raster's values, (rows, columns, channels).
+        wanted: names of the core's numbers (`vcc.plan.numbers.numbers`).
+        threads: how many work at once. The same bytes for any number.
+        progress: called with (done, total).
+
+    Raises:
+        InputError: a number to which there is no derivative.
+    """
+    core.check_wanted(wanted)
+    channels = values.shape[4] if values.ndim == 5 else 1
+    if "weights" in wanted:  # taps without light, too
+        core, weights = replace(core, weights=np.ones_like(core.weights)), core.weights
+    else:
+        weights = core.weights
+    masks = _of_masks(core, wanted)
+    with Workers(threads) as pool:
+        if core.separable:
+            back = _ByColumns(core, weights, raster.reshape(len(raster), -1), channels, wanted, pool)
+            sums = back.sums_over(values, progress)
+        else:
+            sums = _sheared(core, weights, values, np.asarray(raster, dtype=np.float64), masks[0], pool, progress)
+    return _named(core, weights, wanted, sums)
+
+
+def _of_masks(core: Footprints, wanted: Collection[str]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Of which masks the texture is wanted, and of which any place or step."""
+    found = [
+        [any(f"masks[{n}].{part}" in wanted for part in parts) for n in range(len(core.masks))]
+        for parts in (("texture",), ("column", "row", "step"))
+    ]
+    return np.array(found[0], dtype=bool), np.array(found[1], dtype=bool)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Axis(Brief):
+    """Samples along one axis, and the pixels that they reach.
+
+    Args:
+        origin: pixel coordinate of sample 0 of each tap, (taps,).
+        step: pixels from a sample to the next, before division.
+        index: of the samples, (samples,): fractions where they are divided.
+        refine: finer samples for each one.
+        pixels: how many there are.
+        opening: see `Footprints`.
+        interpolation: see `Footprints`.
+    """
+
+    origin: Array
+    step: float
+    index: Array
+    refine: int
+    pixels: int
+    opening: float
+    interpolation: str
+
+    def table(self, kinds: Sequence[str]) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """First pixel and count (taps, samples), and shares (taps, samples, kinds, width) of each kind."""
+        step = self.step / self.refine
+        position = self.origin[:, None] + self.step * self.index
+        reach = reach_in_pixels(self.interpolation, abs(step))
+        low = np.clip(np.ceil(position - reach), 0, self.pixels).astype(np.int64)
+        high = np.clip(np.floor(position + reach), -1, self.pixels - 1).astype(np.int64)
+        count = np.maximum(high - low + 1, 0)
+        first = np.minimum(low, self.pixels - 1)
+        width = -(-max(int(count.max(initial=0)), 1) // 4) * 4
+        pixel = (first[..., None] + np.arange(width)).astype(np.float64)
+        there = np.arange(width) < count[..., None]
+        made = np.zeros((*first.shape, len(kinds), width))
+        for number, share in enumerate(self.shares(kinds, pixel, position[..., None])):
+            made[..., number, :] = np.where(there, share, 0.0)
+        return first, count, made
+
+    def shares(self, kinds: Sequence[str], pixel: Array, position: Array) -> list[Array]:
+        """F of samples at positions in pixels, or how it grows with a number, by kind."""
+        given = self.interpolation, pixel, position, self.step / self.refine, self.opening
+        share, index = shares(*given), self.index[:, None]
+        place = size = opening = np.zeros(())
+        if set(kinds) - {"share", "along"}:
+            place, size, opening = share_slopes(*given)
+        found: dict[str, Callable[[], Array]] = {
+            "share": lambda: share,
+            "along": lambda: index * share,
+            "place": lambda: place,
+            "step": lambda: index * place + np.sign(self.step) / self.refine * size,
+            "opening": lambda: opening,
+            "sheared": lambda: share * (pixel - self.origin[:, None, None]) / self.step,
+        }
+        return [found[kind]() for kind in kinds]
+
+
+def _parts(first: NDArray[np.int64], rows: int) -> NDArray[np.int64]:
+    """(parts, taps, 2): which rows of samples begin in each part of the raster; first ascends or descends."""
+    part = first // PART
+    parts = np.zeros((-(-rows // PART), len(first), 2), dtype=np.int64)
+    for n, tap in np.ndindex(parts.shape[:2]):
+        inside = np.flatnonzero(part[tap] == n)
+        if inside.size:
+            parts[n, tap] = inside[0], inside[-1] + 1
+    return parts
+
+
+def _spans(index: Array) -> list[tables.Span]:
+    """Columns of samples of these indices in spans; the last begins within the one before it, to be as long."""
+    columns = max(index.size, LANES)
+    number = -(-columns // SPAN)
+    length = min(-(-columns // (number * LANES)), columns // LANES) * LANES
+    padded = np.pad(index, (0, columns - index.size)).astype(np.float32)
+    return [
+        tables.Span(min(low, columns - length), min(low, columns - length) + length, low, n * length, padded)
+        for n, low in enumerate(range(0, columns, length))
+    ]
+
+
+class _ByColumns:
+    """Plans in which rows and columns part: the tables, and the loop over columns of views and spans."""
+
+    def __init__(
+        self,
+        core: Footprints,
+        weights: Array,
+        raster: NDArray[np.floating],
+        channels: int,
+        wanted: Collection[str],
+        pool: Workers,
+    ) -> None:
+        self.core, self.weights, self.channels, self.wanted, self.pool = core, weights, channels, wanted, pool
+        self.fine = fine = FineGrid(core)
+        self.sums = [each for each in SUMS if any(each in NEEDED.get(name, ()) for name in wanted)]
+        pairs = [(*pair, number) for number, each in enumerate(self.sums) for pair in SUMS[each]]
+        # "share" comes first, which masks take.
+        down = list(dict.fromkeys(["share", *(y for y, _, _ in pairs)]))
+        across = list(dict.fromkeys(["share", *(x for _, x, _ in pairs)]))
+        ordered = sorted((across.index(x), down.index(y), number) for y, x, number in pairs)
+        columns, rows, totals = np.array(ordered, dtype=np.int64).reshape(-1, 3).T
+        self.pairs = tables.Pairs(*map(np.ascontiguousarray, (rows, columns, totals)))
+        common = core.refine, core.opening, core.interpolation
+        self.index = [
+            first + np.arange(n) / core.refine
+            for first, n in ((fine.first_row, fine.rows), (fine.first_column, fine.columns))
+        ]
+        along_y = _Axis(core.y[:, 0], core.row_step, self.index[0], common[0], core.raster_shape[0], *common[1:])
+        along_x = _Axis(core.x[0], core.column_step, self.index[1], common[0], core.raster_shape[1], *common[1:])
+        first, self.count, shares = along_y.table(down)
+        plain, parts = np.ascontiguousarray(shares[:, :, 0], dtype=np.float32), _parts(first, core.raster_shape[0])
+        self.reached = tables.Reached(first, shares, plain, self.index[0], parts)
+        self.first, _, self.gathered = along_x.table(across)
+        self.tiles = self.turned(np.asarray(raster, dtype=np.float32), self.gathered.shape[-1])
+        self.masks = MaskColumns(core, fine, 1, 1, pool)
+        self.texture, self.place = _of_masks(core, wanted)
+        self.textures: list[Array | None] = [
+            np.zeros(mask.texture.shape) if self.texture[n] else None for n, mask in enumerate(core.masks)
+        ]
+        self.lines, self.slopes = (np.zeros((0, 0), dtype=np.float32) for _ in range(2))
+        self.spans = _spans(self.index[1])
+        # Which columns of samples the spans hold, one span after the other.
+        held = np.concatenate([np.arange(span.start, span.stop) for span in self.spans])
+        self.held = np.minimum(held, fine.columns - 1)
+
+    def turned(self, raster: NDArray[np.float32], width: int) -> NDArray[np.float32]:
+        """The raster, eight rows side by side, with zeros beyond the last column."""
+        tiles = np.zeros(
+            (-(-len(raster) // EIGHT), raster.shape[1] + width * self.channels, EIGHT), dtype=np.float32
+        )
+        list(self.pool.map(lambda tile: kernels.turned(raster, tile, tiles), range(len(tiles))))
+        return tiles
+
+    def sums_over(self, values: NDArray[Any], progress: Progress | None) -> _Sums:
+        """The sums over all samples."""
+        core = self.core
+        totals = np.zeros((*core.weights.shape, len(self.sums)))
+        places = np.zeros((*core.weights.shape, len(core.masks), 6))
+        done, total = 0, int(np.count_nonzero(self.weights))
+        for samples, (a, _) in blocks(core, values, True):
+            used = np.flatnonzero(core.weights[:, a])
+            if used.size == 0:
+                continue
+            masks, sought = self.masks_at(a)
+            add = partial(self.add, samples, a, used, masks, sought)
+            for of_span, place in self.pool.map(add, self.spans):
+                totals[:, a] += of_span
+                places[:, a] += place
+            self.give_back()
+            done += int(np.count_nonzero(self.weights[:, a]))
+            tell(progress, done, total)
+        tell(progress, total, total)
+        return _Sums({each: totals[..., number] for number, each in enumerate(self.sums)}, places, self.textures)
+
+    def add(
+        self,
+        samples: tables.Samples,
+        a: int,
+        used: NDArray[np.intp],
+        masks: tables.Meetings,
+        sought: tables.Sought,
+        span: tables.Span,
+    ) -> tuple[Array, Array]:
+        """What a span of the columns of samples says: the sums, and those of the masks' places."""
+        taps = len(self.core.view_rows)
+        totals, places = np.zeros((taps, len(self.sums))), np.zeros((taps, len(self.core.masks), 6))
+        some = slice(span.start, span.stop)
+        fine = None
+        if self.core.refine > 1:
+            whole = self.fine.tables((span.stop - span.start) * self.channels)
+            fine = whole._replace(first_column=whole.first_column[some], column_shares=whole.column_shares[some])
+        shares = np.ascontiguousarray(np.moveaxis(self.gathered[a], 0, 1), dtype=np.float32)
+        length = (span.stop - span.start) * self.channels
+        height = EIGHT * len(self.tiles) + self.reached.shares.shape[3]
+        mixed = np.zeros((shares.shape[0], height, length), dtype=np.float32)
+        kernels.mix(self.tiles, tables.Gathered(self.first[a], shares), span, self.channels, mixed)
+        given = mixed, self.reached, self.pairs, self.weights[:, a] * self.core.scale
+        kernels.add_numbers(
+            samples, a, used, fine, given, masks, sought._replace(places=places), self.channels, span, totals
+        )
+        return totals, places
+
+    def masks_at(self, a: int) -> tuple[tables.Meetings, tables.Sought]:
+        """Where a column of view taps meets masks, and room for what is sought of them."""
+        found = self.masks.at(a, max(self.fine.columns, LANES))
+        lines = np.zeros((0, 0), dtype=np.float32) if found is None else found.lines
+        shape = (len(self.core.masks), *self.count.shape, 3)
+        line = np.zeros(shape, dtype=np.int64)
+        shares, slopes = np.zeros((2, *shape), dtype=np.float32)
+        count = self.count
+        for n in range(len(self.core.masks)):
+            assert found is not None
+            place = found.row[n][:, None] + found.row_step[n] * np.arange(self.fine.rows)
+            three = three_around(place, int(found.rows[n]))
+            line[n] = np.moveaxis(three[0], 0, -1) + found.begin[n][:, None, None]
+            shares[n], slopes[n] = (np.moveaxis(each, 0, -1) for each in three[1:])
+            count = np.where((place > -1.5) & (place < found.rows[n] + 0.5), count, 0)
+        if self.texture.any():
+            if len(self.lines) < len(lines):
+                self.lines = np.zeros((len(lines), self.held.size), dtype=np.float32)
+            self.lines[:] = 0
+        if self.place.any():
+            if self.slopes.shape != lines.shape:
+                self.slopes = np.zeros(lines.shape, dtype=np.float32)
+            list(self.pool.map(self.look_up, self.masks.pieces))
+        sought = tables.Sought(self.lines, self.slopes, self.texture, self.place, np.zeros((0, 0, 6)))
+        return tables.Meetings(lines, line, shares, slopes, count), sought
+
+    def look_up(self, piece: MaskPiece) -> None:
+        """The slopes of some lines of a mask."""
+        texture = self.masks.textures[piece.mask]
+        points, _, slopes = three_around(piece.columns, texture.shape[1])
+        out = self.slopes[piece.to : piece.to + piece.stop - piece.start]
+        kernels.look_up_columns(texture[piece.start : piece.stop], points, slopes.astype(np.float32), out)
+
+    def give_back(self) -> None:
+        """Add what was said of the masks' lines to their textures."""
+        groups: dict[tuple[int, int], list[MaskPiece]] = {}
+        for piece in self.masks.pieces:
+            if self.texture[piece.mask]:
+                groups.setdefault((piece.mask, piece.to - piece.start), []).append(piece)
+        for group in groups.values():  # whose pieces are rows of their own
+            list(self.pool.map(self.give_back_piece, group))
+
+    def give_back_piece(self, piece: MaskPiece) -> None:
+        """Add what was said of some lines to the texture."""
+        texture = self.textures[piece.mask]
+        assert texture is not None
+        points, counts, _ = three_around(piece.columns[self.held], texture.shape[1])
+        lines = self.lines[piece.to : piece.to + piece.stop - piece.start]
+        kernels.give_back_columns(lines, points, counts, texture[piece.start : piece.stop])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Sums(Brief):
+    """What all samples of each tap say, before its weight.
+
+    Args:
+        of: by the names of `SUMS`, each (rows of taps, columns of taps).
+        places: (rows of taps, columns of taps, masks, 6), see `vcc.engines.footprint_tables.Sought`.
+        textures: of each mask, with all weights; None where it is not wanted.
+    """
+
+    of: Mapping[str, Array]
+    places: Array
+    textures: Sequence[Array | None]
+
+
+def _named(core: Footprints, weights: Array, wanted: Collection[str], sums: _Sums) -> dict[str, Array]:
+    """What the sums over each tap's samples make of the numbers."""
+    of, light = sums.of, weights * core.scale
+
+    def number(name: str) -> Any:
+        if name.startswith("masks["):
+            n = int(name[len("masks[") : name.index("]")])
+            column, column_k, column_l, row, row_k, row_l = light * np.moveaxis(sums.places[..., n, :], -1, 0)
+            return {
+                "texture": sums.textures[n],
+                "column": column,
+                "row": row,
+                "step": [[column_k.sum(), column_l.sum()], [row_k.sum(), row_l.sum()]],
+            }[name.rpartition(".")[2]]
+        if name == "step":
+            return [[np.sum(light * of[f"{i}/{j}"]) for j in "kl"] for i in "xy"]
+        if name == "weights":
+            return core.scale * of["weights"]
+        if name == "scale":
+            return np.sum(weights * of["weights"])
+        return np.sum(light * of[name]) if name == "opening" else light * of[name]
+
+    return {name: np.asarray(number(name), dtype=np.float64) for name in wanted}
+
+
+def _sheared(
+    core: Footprints,
+    weights: Array,
+    values: NDArray[Any],
+    raster: Array,
+    texture: NDArray[np.bool_],
+    pool: Workers,
+    progress: Progress | None,
+) -> _Sums:
+    """The sums where rows and columns do not part, view tap by view tap."""
+    fine = FineGrid(core)
+    grid = tables.Grid(
+        core.step, core.shear, core.row_step, core.column_step, core.refine, fine.first_column, fine.first_row
+    )
+    name = core.interpolation
+    footprint = tables.Footprint(list(REACH).index(name), REACH[name], core.opening)
+    masks = textures(core)
+    # Each piece of the raster has textures of its own, as many as there is room for.
+    pieces = int(np.clip(TEXTURE_BYTES // (8 * max(masks.values.size, 1)), 1, PIECES))
+    ends = np.linspace(0, len(raster), pieces + 1).astype(int)
+    bands = [tables.Band(int(low), int(high)) for low, high in pairwise(ends)]
+    gradients = np.zeros((pieces, *masks.values.shape) if texture.any() else (pieces, 0, 0, 0))
+    found = np.zeros((pieces, *core.weights.shape, kernels.SHEARED))
+    places = np.zeros((pieces, *core.weights.shape, len(core.masks), 6))
+    done, total = 0, int(np.count_nonzero(weights))
+    for b, a in zip(*np.nonzero(core.weights), strict=True):
+        tell(progress, done, total)
+        done += int(weights[b, a] != 0)
+        place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
+        samples = fine.divided(values[core.view_rows[b], core.view_columns[a]].reshape(*core.samples, -1))
+        view = tables.View(samples, weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
+
+        def add(piece: int, view: tables.View = view, b: int = b, a: int = a) -> None:
+            to = found[piece, b, a], places[piece, b, a], gradients[piece]
+            kernels.add_sheared(view, grid, footprint, masks, raster, bands[piece], *to)
+
+        list(pool.map(add, range(pieces)))
+    tell(progress, total, total)
+    whole = gradients.sum(axis=0)
+    return _Sums(
+        _of_shears(core, *np.moveaxis(found.sum(axis=0), -1, 0)),
+        places.sum(axis=0),
+        [
+            whole[n, : mask.texture.shape[0], : mask.texture.shape[1]] if texture[n] else None
+            for n, mask in enumerate(core.masks)
+        ],
+    )
+
+
+def _of_shears(
+    core: Footprints,
+    light: Array,
+    x: Array,
+    x_k: Array,
+    x_rows: Array,
+    width: Array,
+    y: Array,
+    y_k: Array,
+    y_l: Array,
+    height: Array,
+    opening: Array,
+) -> dict[str, Array]:
+    """The sums by what they belong to, of those of `kernels.add_sheared`.
+
+    A sample lies at x + shear·(row − y) + column_step·k, with shear = x/l : y/l, column_step = x/k − shear · y/k.
+    """
+    (_, xl), (yk, yl) = core.step
+    column_step = x_k + np.sign(core.column_step) / core.refine * width
+    shear = x_rows - yk * column_step
+    return {
+        "weights": light,
+        "x": x,
+        "y": y - core.shear * x,
+        "opening": opening,
+        "x/k": column_step,
+        "x/l": shear / yl,
+        "y/k": y_k - core.shear * column_step,
+        "y/l": y_l + np.sign(yl) / core.refine * height - shear * xl / yl**2,
+    }
