@@ -34,6 +34,21 @@ def plan_again(what: str) -> InputError:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Numbers of a plan that are linear in what a thing holds, and the transpose of that.
+
+    Args:
+        follows: whether they follow what a thing (cells of a mask, a surface, an element) holds in a field.
+        numbers: their names in a plan (`vcc.plan.model.Plan.numbers`).
+        back: from the thing and weights of the numbers, in that order, to weights of what the field holds.
+    """
+
+    follows: Callable[[Any, str], bool]
+    numbers: Callable[[Any], tuple[str, ...]]
+    back: Callable[[Any, list[Any]], Any]
+
+
 @dataclass
 class _Book:
     """What decisions are written into, by name.
@@ -43,12 +58,14 @@ class _Book:
         alike: by what some decisions are compared.
         made: (key, what was made of it).
         remembers: whether what is made is kept.
+        linear: which numbers are linear in what; None where nobody asks.
     """
 
     kept: dict[str, Any] = field(default_factory=dict)
     alike: dict[str, Callable[[Any, Any], bool]] = field(default_factory=dict)
     made: dict[str, tuple[Hashable, Any]] = field(default_factory=dict)
     remembers: bool = False
+    linear: list[Linear] | None = None
 
 
 class Decisions:
@@ -90,6 +107,10 @@ class Decisions:
         kept: Decided = self._book.kept[name]
         return kept
 
+    def taken(self, name: str) -> Any:
+        """What was decided under a name that `keep` was given."""
+        return self._book.kept[self._about + name]
+
     def hold(self, name: str, now: Decided) -> Decided:
         """What is so now, and must have been so from the first.
 
@@ -125,6 +146,20 @@ class Decisions:
             yield
         finally:
             self._book.remembers = False
+
+    def note(self, linear: Linear) -> None:
+        """Note which numbers of the plan that is made are linear in what, if anybody asks."""
+        if self._book.linear is not None:
+            self._book.linear.append(linear)
+
+    @contextmanager
+    def noting(self) -> Iterator[list[Linear]]:
+        """A list of what is noted within."""
+        self._book.linear = listed = []
+        try:
+            yield listed
+        finally:
+            self._book.linear = None
 
     def differences(self, other: Decisions) -> tuple[str, ...]:
         """The names under which two sets of decisions hold something else, in the order of their taking."""

@@ -119,7 +119,7 @@ def _weights(
     index = np.stack(np.meshgrid(np.arange(float(nu)), np.arange(float(nv))), axis=-1)
     still = np.zeros((2, 2))
     if depends_on_view_only(plane, (nt, ns), still):
-        shares = plane.view_weights(index, np.zeros_like(index), still, (nt, ns))
+        shares = plane.pattern.mean(*plane.boxes(index, np.zeros_like(index), still, (nt, ns)))
         return lambda j, i: shares[j, i]
     lookup = mask_lookup(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
     k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)

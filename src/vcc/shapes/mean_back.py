@@ -1,34 +1,29 @@
 """What each cell of a mask adds to weighted means of a pattern that it is a part of.
 
 A pattern's mean over a rectangle is linear in the values of each array of cells in it, whatever it is multiplied
-with on its sheet. Here is the transpose of that linear map: from weights of the means to weights of the cells. It
-is what a mask's cells are learned by.
+with on its sheet. Here is the transpose of that linear map, rectangle by rectangle: from weights of the means to
+weights of the cells. It is what a mask's cells are learned by (`vcc.plan.footprints.means_back`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.shapes.patterns import (
-    FEWEST_PER_CELL,
-    RASTER_LIMIT,
-    Bounded,
-    Cells,
-    Open,
-    Pattern,
-    Raster,
-    is_grid,
-    overlap_share,
-    raster,
-)
-from vcc.shapes.sheets import Product, Shifted, Tiles, product_of_means
+from vcc.base.describe import Brief
+from vcc.shapes.patterns import Bounded, Cells, Open, Pattern, is_grid
+from vcc.shapes.sheets import Product, Shifted, Tiles
 
 Array = NDArray[np.float64]
+
+
+def is_values(thing: Any, field: str) -> bool:
+    """Whether a field of a thing holds the values of an array of cells."""
+    return isinstance(thing, Cells) and field == "values"
 
 
 def holds(pattern: Pattern | None, cells: Cells) -> bool:
@@ -38,14 +33,11 @@ def holds(pattern: Pattern | None, cells: Cells) -> bool:
     return holds(pattern.pattern, cells) if isinstance(pattern, Bounded | Shifted) else pattern is cells
 
 
-def mean_back(
-    pattern: Pattern, cells: Cells, places: tuple[Array, Array], size: Sequence[float], weights: Array
-) -> Array:
-    """What each value of an array of cells adds to Σ weights · pattern.mean(x, y, width, height).
+def cells_back(cells: Cells, places: tuple[Array, Array], size: Sequence[float], weights: Array) -> Array:
+    """What each value of an array of cells adds to Σ weights · cells.mean(x, y, width, height).
 
     Args:
-        pattern: of which ``cells`` is a part, once.
-        cells: the very object.
+        cells: the array.
         places: (x, y), centres of the rectangles, metres, that broadcast against each other.
         size: (width, height) of every rectangle, metres.
         weights: of the shape that the places broadcast to.
@@ -53,67 +45,48 @@ def mean_back(
     Returns:
         (rows, columns) of the cells.
     """
-    x, y = (np.asarray(place, dtype=np.float64) for place in places)
-    if isinstance(pattern, Cells):
-        whole = Tiles.of(pattern)
-        return _tiles_back(whole, (x, y), size, weights)
-    if isinstance(pattern, Shifted):
-        return mean_back(pattern.pattern, cells, (x - pattern.middle[0], y - pattern.middle[1]), size, weights)
-    if isinstance(pattern, Bounded):
-        shares = [
-            overlap_share(place, max(length, sheet * 1e-5), sheet)
-            for place, length, sheet in zip((x, y), size, (pattern.width, pattern.height), strict=True)
-        ]
-        return mean_back(pattern.pattern, cells, (x, y), size, weights * shares[0] * shares[1])
-    assert isinstance(pattern, Product)
-    return _product_back(pattern, cells, (x, y), size, weights)
+    return tiles_back(Tiles.of(cells), places, size, weights)
 
 
-def _product_back(
-    product: Product, cells: Cells, places: tuple[Array, Array], size: Sequence[float], weights: Array
-) -> Array:
-    """As `mean_back`, of patterns on one sheet: rectangles exactly, what else there is on a raster of points."""
-    own = Tiles.of(cells).moved(*_middle(product, cells))
-    rest = Product((_without(product, cells),)).factors
-    others = tuple(factor for factor in rest if not isinstance(factor, Tiles))
-    sheets = [factor for factor in rest if isinstance(factor, Tiles)]
-    tiles = own.times(sheets[0]) if sheets else own
-    if not others:
-        back = _tiles_back(tiles, places, size, weights)
-    else:
-        back = np.zeros(tiles.values.shape)
-        for points, point, density in _points(product, places, size, weights):
-            around = product_of_means(others, *points, *point)
-            back += _tiles_back(tiles, points, point, density * around)
-    return _of_cells(back, tiles, own, sheets)
+@dataclass(frozen=True, eq=False, repr=False)
+class OnSheet(Brief):
+    """A product of patterns, with an array of cells told apart from what else there is.
 
-
-def _points(
-    product: Product, places: tuple[Array, Array], size: Sequence[float], weights: Array
-) -> list[tuple[tuple[Array, Array], tuple[float, float], Array]]:
-    """Where `Product.mean` looks, over how much (width, height), and what each place counts: its raster's points.
-
-    Where even the coarsest raster would be too large, points in each rectangle.
+    Args:
+        tiles: what the cells and all other rectangles multiply to.
+        own: the cells where they stand.
+        sheet: the other rectangles, or None.
+        others: all that is not made of rectangles.
     """
-    rasters = [raster(*each, FEWEST_PER_CELL) for each in zip(places, size, product.size, strict=True)]
-    across, down = rasters
-    if across is None or down is None or across.places.size * down.places.size > RASTER_LIMIT**2:
-        steps = (np.arange(FEWEST_PER_CELL) + 0.5) / FEWEST_PER_CELL - 0.5
-        part = size[0] / FEWEST_PER_CELL, size[1] / FEWEST_PER_CELL
-        share = weights / FEWEST_PER_CELL**2
-        return [((places[0] + a * size[0], places[1] + b * size[1]), part, share) for a in steps for b in steps]
-    density = _tiles_back(_empty(across, down), places, size, weights)
-    return [((across.places[None, :], down.places[:, None]), (across.step, down.step), density)]
 
+    tiles: Tiles
+    own: Tiles
+    sheet: Tiles | None
+    others: tuple[Pattern, ...]
 
-def _empty(across: Raster, down: Raster) -> Tiles:
-    """The cells of a raster, of which only the borders count."""
-    columns, rows = (np.linspace(each.low, each.high, each.places.size + 1) for each in (across, down))
-    return Tiles(
-        np.asarray(columns, np.float64),
-        np.asarray(rows, np.float64),
-        np.zeros((down.places.size, across.places.size)),
-    )
+    @classmethod
+    def of(cls, product: Product, cells: Cells) -> OnSheet:
+        """A product of which an array of cells, this very object, is a part, once."""
+        own = Tiles.of(cells).moved(*_middle(product, cells))
+        rest = Product((_without(product, cells),)).factors
+        sheet = next((factor for factor in rest if isinstance(factor, Tiles)), None)
+        others = tuple(factor for factor in rest if not isinstance(factor, Tiles))
+        return cls(own if sheet is None else own.times(sheet), own, sheet, others)
+
+    def back(self, weights: Array) -> Array:
+        """Weights of the rectangles as weights of the cells."""
+        if self.sheet is None:
+            return weights
+        x, y = ((borders[1:] + borders[:-1]) / 2 for borders in (self.tiles.columns, self.tiles.rows))
+        row = np.searchsorted(self.own.rows, y, side="right") - 1
+        column = np.searchsorted(self.own.columns, x, side="right") - 1
+        rows, columns = self.own.values.shape
+        inside = ((row >= 0) & (row < rows))[:, None] & ((column >= 0) & (column < columns))[None, :]
+        shares = np.where(inside, weights * self.sheet(x[None, :], y[:, None]), 0.0)
+        total = np.zeros((rows, columns))
+        place = np.clip(row, 0, rows - 1)[:, None], np.clip(column, 0, columns - 1)[None, :]
+        np.add.at(total, place, shares)
+        return total
 
 
 def _middle(pattern: Pattern, cells: Cells) -> tuple[float, float]:
@@ -137,7 +110,7 @@ def _without(pattern: Pattern, cells: Cells) -> Pattern:
     return Open() if pattern is cells else pattern
 
 
-def _tiles_back(tiles: Tiles, places: tuple[Array, Array], size: Sequence[float], weights: Array) -> Array:
+def tiles_back(tiles: Tiles, places: tuple[Array, Array], size: Sequence[float], weights: Array) -> Array:
     """What each of some rectangles side by side adds to weighted means: (rows, columns) of them."""
     x, y = places
     width = max(size[0], float(np.ptp(tiles.columns)) * 1e-5)
@@ -164,19 +137,3 @@ def _overlaps(borders: Array, centres: Array, length: float) -> Any:
     keep = inside & (share > 0)
     row = np.broadcast_to(np.arange(len(centres))[:, None], index.shape)
     return csr_array((share[keep] / length, (row[keep], index[keep])), shape=(len(centres), pieces))
-
-
-def _of_cells(back: Array, tiles: Tiles, own: Tiles, sheets: list[Tiles]) -> Array:
-    """Weights of rectangles that cells and sheets multiply to, as weights of the cells."""
-    if not sheets:
-        return back
-    x, y = ((borders[1:] + borders[:-1]) / 2 for borders in (tiles.columns, tiles.rows))
-    row, column = (
-        np.searchsorted(borders, at, side="right") - 1 for borders, at in ((own.rows, y), (own.columns, x))
-    )
-    rows, columns = own.values.shape
-    inside = ((row >= 0) & (row < rows))[:, None] & ((column >= 0) & (column < columns))[None, :]
-    shares = np.where(inside, back * sheets[0](x[None, :], y[:, None]), 0.0)
-    total = np.zeros((rows, columns))
-    np.add.at(total, (np.clip(row, 0, rows - 1)[:, None], np.clip(column, 0, columns - 1)[None, :]), shares)
-    return total

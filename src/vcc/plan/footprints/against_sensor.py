@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from vcc.optics.sensor import Sensor
 from vcc.plan.decisions import ANEW, Decisions
-from vcc.plan.footprints.means import mean_over
+from vcc.plan.footprints.means import Boxes, mean_over
+from vcc.plan.footprints.means_back import mean_back
 from vcc.plan.footprints.planes import Plane
+from vcc.shapes.mean_back import holds
+from vcc.shapes.patterns import Cells
 
 Array = NDArray[np.float64]
 
@@ -22,14 +25,14 @@ def transmission(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANE
     """The mean transmission over each pixel of what lies against the sensor."""
     if not planes:
         return None
-    vertical, horizontal = sensor.sensitive_pitches
-    total = np.ones(sensor.shape)
-    for n, plane in enumerate(planes):
-        x = sensor.column_places - plane.decentre[0]
-        y = sensor.row_places - plane.decentre[1]
-        its = decisions.of(f"mask {n + 1} against the sensor")
-        total = total * mean_over(plane.pattern, x[None, :], y[:, None], horizontal, vertical, its)
-    return total
+    return np.asarray(math.prod(_means(planes, _pixels(sensor), decisions), start=np.ones(sensor.shape)))
+
+
+def transmission_back(
+    sensor: Sensor, planes: list[Plane], weights: Array, cells: Cells, decisions: Decisions
+) -> Array:
+    """From weights of `transmission` to weights of the cells of a mask, one of the planes'."""
+    return _means_back(planes, _pixels(sensor), weights, cells, decisions)
 
 
 def detail(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANEW) -> Array | None:
@@ -45,38 +48,89 @@ def detail(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANEW) -> 
     """
     if not planes:
         return None
-    opening, parts = math.sqrt(sensor.fill_factor), PARTS_OF_A_PIXEL
-    place = ((np.arange(parts) + 0.5) / parts - 0.5) * opening
-    vertical, horizontal = sensor.pitches
     rows, columns = sensor.shape
-    x = (sensor.column_places[:, None] + place * horizontal).reshape(1, -1)
-    y = (sensor.row_places[:, None] + place * vertical).reshape(-1, 1)
-    means = np.ones((y.size, x.size))
-    for n, plane in enumerate(planes):
-        part = opening * horizontal / parts, opening * vertical / parts
-        its = decisions.of(f"mask {n + 1} against the sensor within pixels")
-        means = means * mean_over(plane.pattern, x - plane.decentre[0], y - plane.decentre[1], *part, its)
-    blocks = means.reshape(rows, parts, columns, parts) / parts**2
+    means = math.prod(_means(planes, _parts(sensor), decisions))
+    blocks = means.reshape(rows, PARTS_OF_A_PIXEL, columns, PARTS_OF_A_PIXEL)
+    detail = np.einsum("yxpq,rpcq->yxrc", _moments(sensor), blocks, optimize=True)
+    there = decisions.keep("detail within pixels", lambda: bool(np.abs(detail).max() > 1e-6))
+    return detail if there else None
 
-    def moment(power_y: Array, power_x: Array) -> Array:
-        return np.asarray(np.einsum("rpcq,p,q->rc", blocks, power_y, power_x))
 
+def detail_back(sensor: Sensor, planes: list[Plane], weights: Array, cells: Cells, decisions: Decisions) -> Array:
+    """From weights of `detail` to weights of the cells of a mask, one of the planes'."""
+    blocks = np.einsum("yxpq,yxrc->rpcq", _moments(sensor), weights, optimize=True)
+    places = tuple(n * PARTS_OF_A_PIXEL for n in sensor.shape)
+    return _means_back(planes, _parts(sensor), blocks.reshape(places), cells, decisions)
+
+
+def _moments(sensor: Sensor) -> Array:
+    """What the mean over each part of a pixel adds to `detail`, (3, 3, parts down, parts across)."""
+    opening, parts = math.sqrt(sensor.fill_factor), PARTS_OF_A_PIXEL
+    place = _within(opening)
     one, square = np.ones(parts), place**2 + (opening / parts) ** 2 / 12
-    mean = moment(one, one)
-    slopes = moment(place, one), moment(one, place)
-    curvatures = [moment(*powers) / 2 - mean * opening**2 / 24 for powers in ((square, one), (one, square))]
-    twist = moment(place, place)
-    detail = np.zeros((3, 3, rows, columns))
+    mean = np.outer(one, one)
+    slopes = np.outer(place, one), np.outer(one, place)
+    curvatures = [np.outer(*powers) / 2 - mean * opening**2 / 24 for powers in ((square, one), (one, square))]
+    twist = np.outer(place, place)
+    moments = np.zeros((3, 3, parts, parts))
     for slope, curvature, before, after in (
         (slopes[0], curvatures[0], (0, 1), (2, 1)),
         (slopes[1], curvatures[1], (1, 0), (1, 2)),
     ):
-        detail[before] += curvature - slope / 2
-        detail[after] += curvature + slope / 2
-        detail[1, 1] -= 2 * curvature
-    detail[0, 0] += twist / 4
-    detail[2, 2] += twist / 4
-    detail[0, 2] -= twist / 4
-    detail[2, 0] -= twist / 4
-    there = decisions.keep("detail within pixels", lambda: bool(np.abs(detail).max() > 1e-6))
-    return detail if there else None
+        moments[before] += curvature - slope / 2
+        moments[after] += curvature + slope / 2
+        moments[1, 1] -= 2 * curvature
+    moments[0, 0] += twist / 4
+    moments[2, 2] += twist / 4
+    moments[0, 2] -= twist / 4
+    moments[2, 0] -= twist / 4
+    return moments / parts**2
+
+
+def _within(opening: float) -> Array:
+    """Middles of the parts of a pixel, in pixels from its own."""
+    return np.asarray(((np.arange(PARTS_OF_A_PIXEL) + 0.5) / PARTS_OF_A_PIXEL - 0.5) * opening)
+
+
+def _pixels(sensor: Sensor) -> Boxes:
+    """The sensitive areas of the pixels."""
+    vertical, horizontal = sensor.sensitive_pitches
+    return Boxes(sensor.column_places[None, :], sensor.row_places[:, None], horizontal, vertical)
+
+
+def _parts(sensor: Sensor) -> Boxes:
+    """The parts of all pixels' sensitive areas."""
+    opening, parts = math.sqrt(sensor.fill_factor), PARTS_OF_A_PIXEL
+    vertical, horizontal = sensor.pitches
+    x = (sensor.column_places[:, None] + _within(opening) * horizontal).reshape(1, -1)
+    y = (sensor.row_places[:, None] + _within(opening) * vertical).reshape(-1, 1)
+    return Boxes(x, y, opening * horizontal / parts, opening * vertical / parts)
+
+
+def _seen(plane: Plane, boxes: Boxes) -> Boxes:
+    """Boxes counted from the middle of a mask."""
+    return boxes._replace(x=boxes.x - plane.decentre[0], y=boxes.y - plane.decentre[1])
+
+
+def _about(decisions: Decisions, n: int, boxes: Boxes) -> Decisions:
+    return decisions.of(f"mask {n + 1} against the sensor, by {boxes.x.size}×{boxes.y.size} places")
+
+
+def _means(planes: list[Plane], boxes: Boxes, decisions: Decisions) -> list[Array]:
+    """Each mask's means over boxes."""
+    return [
+        mean_over(plane.pattern, *_seen(plane, boxes), _about(decisions, n, boxes))
+        for n, plane in enumerate(planes)
+    ]
+
+
+def _means_back(planes: list[Plane], boxes: Boxes, weights: Array, cells: Cells, decisions: Decisions) -> Array:
+    """From weights of the product of all masks' means to weights of the cells of one of them."""
+    means = _means(planes, boxes, decisions)
+    total = np.zeros(cells.values.shape)
+    for n, plane in enumerate(planes):
+        if holds(plane.pattern, cells):
+            others = math.prod((mean for m, mean in enumerate(means) if m != n), start=np.ones(1))
+            its = _about(decisions, n, boxes)
+            total += mean_back(plane.pattern, _seen(plane, boxes), its, weights * others, cells)
+    return total

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +24,10 @@ from vcc.plan.footprints import against_sensor as masks
 from vcc.plan.footprints.cells import divide_samples, divide_views, tap_places
 from vcc.plan.footprints.coverage import missing_rays
 from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
-from vcc.plan.footprints.mask_textures import ROUNDING, mask_lookup
+from vcc.plan.footprints.linear_in_cells import by_masks_against_sensor, by_view_planes
+from vcc.plan.footprints.mask_textures import ROUNDING, mask_in_path, mask_lookup
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.planes import Plane, depends_on_view_only, open_parts, tap_origin
+from vcc.plan.footprints.planes import Aperture, Plane, depends_on_view_only, tap_origin
 from vcc.plan.footprints.shares import SMALLEST_STEP
 from vcc.plan.footprints.words import coarse_textures, notes_of
 from vcc.plan.how import How
@@ -114,10 +114,11 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisio
     index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
     shift = np.stack(np.broadcast_arrays(column_shift[None, :], row_shift[:, None]), axis=-1)
 
+    aperture = Aperture(view_planes, index, shift, between.motion, samples, divide, decisions)
     parts = decisions.made(
         "what is open of views",
         lambda: tuple(content((plane.pattern, plane.at_index, plane.offset)) for plane in view_planes),
-        lambda: open_parts(view_planes, index, shift, between.motion, samples, divide, decisions),
+        aperture.open_parts,
     )
     weights = row_share[:, None] * column_share[None, :] * parts.weights
     used_rows, used_columns = _used(weights, decisions)
@@ -136,7 +137,7 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisio
             divide,
             fine,
             not points,
-            decisions.of(f"mask {n + 1} in mid-path"),
+            decisions.of(mask_in_path(n)),
         )
         for n, plane in enumerate(path_planes)
     )
@@ -165,6 +166,8 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisio
     transmission = masks.transmission(sensor, against_sensor, decisions)
     if guard or transmission is not None:
         after.append(OnSensor(guard, transmission, detail))
+    decisions.note(by_view_planes(aperture, row_share[:, None] * column_share[None, :], keep, path_planes))
+    decisions.note(by_masks_against_sensor(sensor, against_sensor, len(after) - 1, detail is not None, decisions))
     notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, fine, swapped)
     return Plan(
         sensor_shape=sensor.shape,

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.values import content
-from vcc.plan.decisions import ANEW, Decisions, plan_again
-from vcc.plan.footprints.means import mean_over
+from vcc.plan.decisions import ANEW, Decisions, Linear, plan_again
+from vcc.plan.footprints.means import Boxes, mean_over
+from vcc.plan.footprints.means_back import mean_back
 from vcc.plan.footprints.model import MaskLookup
 from vcc.plan.footprints.planes import Plane, tap_origin
 from vcc.plan.sharpening import symmetric
-from vcc.shapes.patterns import Pattern
+from vcc.shapes.mean_back import holds, is_values
+from vcc.shapes.patterns import Cells, Pattern
 
 Array = NDArray[np.float64]
 
@@ -37,6 +39,8 @@ ROUNDING = 1e-6
 """Points or pixels, over a whole view, that are rounding."""
 ROOM = 0.1
 """By how much of what samples meet of a mask a texture that is kept reaches beyond it on each side."""
+LATTICE = "points of its texture"
+"""The decision that holds them."""
 COARSER = 1.5
 """By how much the footprint of samples may change before another texture would be made."""
 
@@ -107,6 +111,16 @@ def mask_lookup(
         lambda: (content(plane.pattern), content(lattice), content(boxes)),
         lambda: _texture(plane.pattern, lattice, boxes, decisions),
     )
+    kept = Textured(lattice, boxes, decisions)
+    decisions.note(
+        Linear(
+            lambda thing, field: is_values(thing, field) and holds(plane.pattern, thing),
+            lambda plan: tuple(
+                f"core.masks[{n}].texture" for n, mask in enumerate(plan.core.masks) if mask.texture is texture
+            ),
+            lambda cells, weights: texture_back(plane, kept, weights[0], cells),
+        )
+    )
     return MaskLookup(
         texture=texture,
         column=(place[..., 0] - column) / spacing[0],
@@ -145,7 +159,7 @@ def _lattice(
         beside = (TEXTURE_FILTER + math.ceil(narrow[0] / 2), TEXTURE_FILTER + math.ceil(narrow[1] / 2))
         return Lattice(*ends(spacing, low, high), spacing, wider, beside)
 
-    lattice = decisions.keep("points of its texture", decided, Lattice.like)
+    lattice = decisions.keep(LATTICE, decided, Lattice.like)
     if decisions.lasting:
         first, last = ends(lattice.spacing, *region)
         if (first < lattice.first).any() or (last > lattice.last).any():
@@ -188,6 +202,62 @@ def _texture(
         boxes: sizes (x, y) of that of a view's part and of that of a sample's, metres.
         decisions: where these are kept, in double precision.
     """
+    x, y, (width, height), filters = _averaged(lattice, boxes)
+    means = np.empty((y.size, x.size), dtype=np.float64 if decisions.lasting else np.float32)
+    across = x[None, :]
+    for n, some in enumerate(_rows_at_once(y.size, x.size)):
+        part = decisions.of(f"part {n}")
+        means[some] = mean_over(pattern, across, y[some, None], width, height, part)
+    return _filtered(means, filters)
+
+
+def mask_in_path(n: int) -> str:
+    """What decisions are about that concern the n-th mask in mid-path."""
+    return f"mask {n + 1} in mid-path"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Textured(Brief):
+    """How a mask's texture was made.
+
+    Args:
+        lattice: its points.
+        boxes: sizes (x, y) over which the pattern was averaged: of a view's part, and of a sample's, metres.
+        decisions: about it.
+    """
+
+    lattice: Lattice
+    boxes: tuple[Array, Array]
+    decisions: Decisions
+
+
+def texture_back(plane: Plane, kept: Textured, weights: Array, cells: Cells) -> Array:
+    """From weights of a mask's texture to weights of the cells of its pattern.
+
+    Args:
+        plane: the mask.
+        kept: how its texture was made.
+        weights: of the texture's points, (rows, columns).
+        cells: the very object.
+    """
+    from scipy.ndimage import convolve1d
+
+    x, y, size, (across, down) = _averaged(kept.lattice, kept.boxes)
+    # Filters are symmetric: a mean counts in all points that its own filter reaches.
+    wide = np.pad(weights, [(len(along) // 2,) * 2 for along in (down, across)])
+    means = convolve1d(convolve1d(wide, across, axis=1, mode="constant"), down, axis=0, mode="constant")
+    total = np.zeros(cells.values.shape)
+    for n, some in enumerate(_rows_at_once(y.size, x.size)):
+        part = kept.decisions.of(f"part {n}")
+        boxes = Boxes(x[None, :], y[some, None], *size)
+        total += mean_back(plane.pattern, boxes, part, means[some], cells)
+    return total
+
+
+def _averaged(
+    lattice: Lattice, boxes: tuple[Array, Array]
+) -> tuple[Array, Array, tuple[float, float], list[Array]]:
+    """Places x and y at which a pattern is averaged, over what size, and the filters that means go through."""
     wide, narrow = (np.where(lattice.by_views == views, *boxes) for views in (True, False))
     filters = [
         _filter(float(width), beside)
@@ -199,12 +269,12 @@ def _texture(
             lattice.first, lattice.last, lattice.beside, lattice.spacing, strict=True
         )
     )
-    means = np.empty((y.size, x.size), dtype=np.float64 if decisions.lasting else np.float32)
-    across = x[None, :]
-    for n, some in enumerate(np.array_split(np.arange(y.size), -(-means.size // POINTS_AT_ONCE))):
-        part = decisions.of(f"part {n}")
-        means[some] = mean_over(pattern, across, y[some, None], float(wide[0]), float(wide[1]), part)
-    return _filtered(means, filters)
+    return x, y, (float(wide[0]), float(wide[1])), filters
+
+
+def _rows_at_once(rows: int, columns: int) -> list[NDArray[np.int64]]:
+    """Rows of a texture in pieces that are averaged at once."""
+    return np.array_split(np.arange(rows), -(-rows * columns // POINTS_AT_ONCE))
 
 
 def _filter(box: float, beside: int) -> Array:

@@ -98,7 +98,7 @@ def _mean(pattern: Pattern, boxes: Boxes, decisions: Decisions) -> Array:
         return _mean(pattern.factors[0], boxes, decisions)
     if _closed(pattern):
         return pattern.mean(*boxes)
-    rasters = _kept(pattern, boxes, decisions)
+    rasters = kept_rasters(pattern, boxes, decisions)
     if rasters is None:
         return _in_each(lambda parts: pattern(parts.x, parts.y), boxes)
     across, down = rasters
@@ -123,10 +123,10 @@ def _mean_of_product(product: Product, boxes: Boxes, decisions: Decisions) -> Ar
         return np.ones(np.broadcast_shapes(boxes.x.shape, boxes.y.shape))
 
     def together(parts: Boxes) -> Array:
-        means = (_mean_or_value(factor, parts, decisions) for factor in product.factors)
+        means = (mean_or_value(factor, parts, decisions) for factor in product.factors)
         return np.clip(math.prod(means, start=np.ones(1)), 0.0, 1.0)
 
-    rasters = _kept(product, boxes, decisions)
+    rasters = kept_rasters(product, boxes, decisions)
     if rasters is None:
         return _in_each(together, boxes)
     across, down = rasters
@@ -139,14 +139,18 @@ def _mean_of_product(product: Product, boxes: Boxes, decisions: Decisions) -> Ar
 
 def _in_each(values: Callable[[Boxes], Array], boxes: Boxes) -> Array:
     """Means by what parts of each rectangle show, which move with it."""
+    return np.asarray(np.mean(np.broadcast_arrays(*(values(parts) for parts in parts_of(boxes))), axis=0))
+
+
+def parts_of(boxes: Boxes) -> list[Boxes]:
+    """Each rectangle's parts, one of each at a time."""
     steps = (np.arange(FEWEST_PER_CELL) + 0.5) / FEWEST_PER_CELL - 0.5
     x, y, width, height = boxes
     part = width / FEWEST_PER_CELL, height / FEWEST_PER_CELL
-    inside = [values(Boxes(x + a * width, y + b * height, *part)) for a in steps for b in steps]
-    return np.asarray(np.mean(np.broadcast_arrays(*inside), axis=0))
+    return [Boxes(x + a * width, y + b * height, *part) for a in steps for b in steps]
 
 
-def _mean_or_value(factor: Pattern, parts: Boxes, decisions: Decisions) -> Array:
+def mean_or_value(factor: Pattern, parts: Boxes, decisions: Decisions) -> Array:
     """Means over the parts that points of a raster stand for; without a closed form, values in their middles."""
     plain = factor.pattern if isinstance(factor, Shifted) else factor
     if isinstance(plain, Polygon) or _closed(plain):
@@ -163,23 +167,47 @@ def _of_raster(found: Array, rasters: tuple[Raster, Raster], boxes: Boxes) -> Ar
     across, down = rasters
     values = np.broadcast_to(found, (down.places.size, across.places.size))
     sums = np.pad(values, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-    x, y, width, height = boxes
-    sides = [
-        [_place(raster, centre + side * length / 2) for side in (-1, 1)]
-        for raster, centre, length in ((across, x, width), (down, y, height))
-    ]
-    (left, right), (top, bottom) = sides
-    points = (width / across.step) * (height / down.step)
-    if is_grid(x, y):  # along one axis after the other
+    points = (boxes.width / across.step) * (boxes.height / down.step)
+    (left, right), (top, bottom) = _sides(rasters, boxes)
+    if is_grid(boxes.x, boxes.y):  # along one axis after the other
         wide = _up_to(right, sums.shape[1]) - _up_to(left, sums.shape[1])
         high = _up_to(bottom, sums.shape[0]) - _up_to(top, sums.shape[0])
         return np.asarray((high @ sums @ wide.T) / points)
-    shape = np.broadcast_shapes(x.shape, y.shape)
+    shape = np.broadcast_shapes(boxes.x.shape, boxes.y.shape)
 
     def at(row: Array, column: Array) -> Array:
         return smooth(sums, np.broadcast_to(row, shape), np.broadcast_to(column, shape))
 
     return (at(bottom, right) - at(bottom, left) - at(top, right) + at(top, left)) / points
+
+
+def of_raster_back(weights: Array, rasters: tuple[Raster, Raster], boxes: Boxes) -> Array:
+    """From weights of means over rectangles to weights of what the points of rasters show, (rows, columns)."""
+    across, down = rasters
+    rows, columns = down.places.size + 1, across.places.size + 1
+    shape = np.broadcast_shapes(boxes.x.shape, boxes.y.shape)
+    (left, right), (top, bottom) = _sides(rasters, boxes)
+    weights = np.broadcast_to(weights, shape) / ((boxes.width / across.step) * (boxes.height / down.step))
+    if not is_grid(boxes.x, boxes.y):
+        left, right, top, bottom = (np.broadcast_to(side, shape) for side in (left, right, top, bottom))
+    wide = _up_to(right, columns) - _up_to(left, columns)
+    high = _up_to(bottom, rows) - _up_to(top, rows)
+    if is_grid(boxes.x, boxes.y):
+        sums = high.T @ weights @ wide
+    else:
+        sums = (high.multiply(weights.reshape(-1, 1)).T @ wide).toarray()
+    # Each point counts in all sums up to borders behind it.
+    return np.asarray(sums[::-1, ::-1].cumsum(0).cumsum(1)[::-1, ::-1][1:, 1:])
+
+
+def _sides(rasters: tuple[Raster, Raster], boxes: Boxes) -> list[list[Array]]:
+    """((left, right), (top, bottom)) of rectangles, as numbers of borders between points of rasters."""
+    across, down = rasters
+    x, y, width, height = boxes
+    return [
+        [_place(raster, centre + side * length / 2) for side in (-1, 1)]
+        for raster, centre, length in ((across, x, width), (down, y, height))
+    ]
 
 
 def _place(raster: Raster, at: Array) -> Array:
@@ -199,7 +227,7 @@ def _up_to(place: Array, borders: int) -> Any:
 # --- rasters ---
 
 
-def _kept(pattern: Pattern, boxes: Boxes, decisions: Decisions) -> tuple[Raster, Raster] | None:
+def kept_rasters(pattern: Pattern, boxes: Boxes, decisions: Decisions) -> tuple[Raster, Raster] | None:
     """The rasters (across, down) on which a pattern is looked at, always the same; None: in each rectangle."""
     rasters = decisions.keep("raster", lambda: _rasters(pattern, boxes), lambda one, other: True)
     if rasters is None:

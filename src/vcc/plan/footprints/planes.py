@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,9 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.plan.decisions import ANEW, Decisions
-from vcc.plan.footprints.means import mean_over
+from vcc.plan.footprints.means import Boxes, mean_over
+from vcc.plan.footprints.means_back import mean_back
+from vcc.shapes.mean_back import holds
 from vcc.shapes.patterns import Cells, Pattern
 from vcc.shapes.sheets import in_one_plane
 
@@ -69,19 +72,11 @@ class Plane(Brief):
         rows, columns = samples
         return np.asarray(self.offset + self.sample_step @ np.array([(columns - 1) / 2, (rows - 1) / 2]))
 
-    def view_weights(
-        self,
-        index: Array,
-        shift: Array,
-        motion: Array,
-        samples: tuple[int, int],
-        divide: int = 1,
-        decisions: Decisions = ANEW,
-    ) -> Array:
-        """The open share of each tap's cell, for a plane that tells views apart only; see `tap_origin`."""
+    def boxes(self, index: Array, shift: Array, motion: Array, samples: tuple[int, int], divide: int = 1) -> Boxes:
+        """The taps' cells on a plane that tells views apart only; see `tap_origin`."""
         place = tap_origin(self.at_index, self.middle_of_view(samples), index, shift, motion)
         width, height = np.abs(self.view_step(motion)).sum(axis=1) / divide
-        return mean_over(self.pattern, place[..., 0], place[..., 1], float(width), float(height), decisions)
+        return Boxes(place[..., 0], place[..., 1], float(width), float(height))
 
     def view_step(self, motion: Array) -> Array:
         """2×2: metres moved here per view, a point of the scene being followed."""
@@ -119,45 +114,105 @@ class OpenParts(Brief):
     middle: Array
 
 
-def open_parts(
-    planes: list[Plane],
-    index: Array,
-    shift: Array,
-    motion: Array,
-    samples: tuple[int, int],
-    divide: int,
-    decisions: Decisions = ANEW,
-) -> OpenParts:
-    """What of each tap's cell is open behind planes that tell views apart only; see `tap_origin`.
+@dataclass(frozen=True, eq=False, repr=False)
+class Aperture(Brief):
+    """Planes that tell views apart only, as the taps of a plan meet them; for places see `tap_origin`.
 
-    A cell that a rim cuts is lit through a part of it, and what other masks do to that light they do around the
-    middle of that part.
+    Args:
+        planes: one or several.
+        index: of the views, (rows of taps, columns of taps, 2).
+        shift: of the taps from them, in views.
+        motion: of the scene.
+        samples: (rows, columns) of a view.
+        divide: parts of a view's cell, each way.
+        decisions: by which means are taken.
     """
-    weights = np.ones(index.shape[:2])
-    middle = np.zeros((*index.shape[:2], 2))
-    if not planes:
+
+    planes: list[Plane]
+    index: Array
+    shift: Array
+    motion: Array
+    samples: tuple[int, int]
+    divide: int
+    decisions: Decisions = ANEW
+
+    def whole_cells(self) -> list[Array]:
+        """Each plane's open share of each tap's cell, (rows, columns)."""
+        return [
+            mean_over(plane.pattern, *self._boxes(plane), self._of_cells(n)) for n, plane in enumerate(self.planes)
+        ]
+
+    def parts(self) -> list[Array]:
+        """The same of parts of the cells, (rows, columns, parts down, parts across)."""
+        return [
+            mean_over(plane.pattern, *self._boxes(plane, self._inside), self._of_parts(n))
+            for n, plane in enumerate(self.planes)
+        ]
+
+    def open_parts(self) -> OpenParts:
+        """What of each tap's cell is open.
+
+        A cell that a rim cuts is lit through a part of it, and what other masks do to that light they do around
+        the middle of that part.
+        """
+        weights = np.ones(self.index.shape[:2])
+        middle = np.zeros((*self.index.shape[:2], 2))
+        if not self.planes:
+            return OpenParts(weights, middle)
+        shares = math.prod(self.parts())
+        light, lit = self._light(shares)
+        middle[lit] = (shares[..., None] * self._inside).sum(axis=(2, 3))[lit] / light[lit][:, None]
+        # Apart from each other: what several leave of a cell is not the product of their shares.
+        weights = shares.mean(axis=(2, 3)) if len(self.planes) > 1 else self.whole_cells()[0]
         return OpenParts(weights, middle)
-    for n, plane in enumerate(planes):
-        its = decisions.of(f"mask {n + 1} at the views")
-        weights = weights * plane.view_weights(index, shift, motion, samples, divide, its)
-    part = ((np.arange(PARTS_OF_A_CELL) + 0.5) / PARTS_OF_A_CELL - 0.5) / divide
-    inside = np.stack(np.meshgrid(part, part), axis=-1)
-    shape = (*index.shape[:2], PARTS_OF_A_CELL, PARTS_OF_A_CELL, 2)
-    index_of_parts = np.broadcast_to(index[:, :, None, None], shape)
-    shift_of_parts = shift[:, :, None, None] + inside
-    shares = np.ones(shape[:4])
-    for n, plane in enumerate(planes):
-        its = decisions.of(f"parts of mask {n + 1} at the views")
-        shares = shares * plane.view_weights(
-            index_of_parts, shift_of_parts, motion, samples, divide * PARTS_OF_A_CELL, its
-        )
-    light = shares.sum(axis=(2, 3))
-    least = ROUNDING if decisions.lasting else 0.0
-    lit = decisions.keep("taps that are lit", lambda: light > least) & (light > least)
-    middle[lit] = (shares[..., None] * inside).sum(axis=(2, 3))[lit] / light[lit][:, None]
-    if len(planes) > 1:  # apart from each other: what both leave of a cell is not the product of their shares
-        weights = shares.mean(axis=(2, 3))
-    return OpenParts(weights, middle)
+
+    def back(self, weights: OpenParts, cells: Cells) -> Array:
+        """From weights of `open_parts` to weights of the cells of one of the planes, this very object."""
+        shares = self.parts()
+        light, lit = self._light(math.prod(shares))
+        middle = self.open_parts().middle
+        from_middle = ((self._inside - middle[:, :, None, None]) * weights.middle[:, :, None, None]).sum(axis=-1)
+        of_shares = np.where(lit[..., None, None], from_middle / np.where(lit, light, 1.0)[..., None, None], 0.0)
+        if len(self.planes) > 1:
+            of_shares = of_shares + weights.weights[..., None, None] / PARTS_OF_A_CELL**2
+        total = np.zeros(cells.values.shape)
+        for n, plane in enumerate(self.planes):
+            if not holds(plane.pattern, cells):
+                continue
+            others = math.prod((share for m, share in enumerate(shares) if m != n), start=np.ones(1))
+            boxes = self._boxes(plane, self._inside)
+            total += mean_back(plane.pattern, boxes, self._of_parts(n), of_shares * others, cells)
+            if len(self.planes) == 1:
+                boxes = self._boxes(plane)
+                total += mean_back(plane.pattern, boxes, self._of_cells(n), weights.weights, cells)
+        return total
+
+    @property
+    def _inside(self) -> Array:
+        """Middles of the parts of a cell, in views from its own, (parts, parts, 2)."""
+        part = ((np.arange(PARTS_OF_A_CELL) + 0.5) / PARTS_OF_A_CELL - 0.5) / self.divide
+        return np.stack(np.meshgrid(part, part), axis=-1)
+
+    def _boxes(self, plane: Plane, inside: Array | None = None) -> Boxes:
+        """The taps' cells on a plane, or with ``inside`` parts of them."""
+        index, shift, divide = self.index, self.shift, self.divide
+        if inside is not None:
+            shift = shift[:, :, None, None] + inside
+            index = np.broadcast_to(index[:, :, None, None], shift.shape)
+            divide *= PARTS_OF_A_CELL
+        return plane.boxes(index, shift, self.motion, self.samples, divide)
+
+    def _of_cells(self, n: int) -> Decisions:
+        return self.decisions.of(f"mask {n + 1} at the views")
+
+    def _of_parts(self, n: int) -> Decisions:
+        return self.decisions.of(f"parts of mask {n + 1} at the views")
+
+    def _light(self, shares: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """The light through each tap's cell, and which taps are lit."""
+        light = shares.sum(axis=(2, 3))
+        least = ROUNDING if self.decisions.lasting else 0.0
+        return light, self.decisions.keep("taps that are lit", lambda: light > least) & (light > least)
 
 
 def detail_lost(plane: Plane, known: Array, added: Array) -> float:

@@ -25,6 +25,7 @@ from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import steps
 from vcc.plan.rays.aim import Aimed, aimed
 from vcc.plan.rays.beam import footprint
+from vcc.plan.rays.linear import by_cells, by_surface, by_widths
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.points import table
@@ -273,7 +274,9 @@ def _transmission(pattern: Pattern, met: _Met, notes: list[str]) -> list[steps.S
             pattern.middle[1] + decentre[1] - size[1] * rows / 2,
         )
         kind = np.float64 if met.decisions.lasting else np.float32
-        return [steps.CellShares(pattern.values.astype(kind), corner, size, label)]
+        shares = steps.CellShares(pattern.values.astype(kind), corner, size, label)
+        met.decisions.note(by_cells(pattern, shares))
+        return [shares]
     if isinstance(pattern, CosineSum):
         across, down = (2 * math.pi / period for period in pattern.periods)
         return [steps.Cosines(decentre, (across, down), pattern.phase, pattern.harmonics, label)]
@@ -320,7 +323,9 @@ def _deflection(met: _Met, notes: list[str]) -> steps.Step:
             f"{label} bends by a texture of {texture.values.shape[0]}² points, {error:.1%} root mean square of "
             "its steepest slope away from it"
         )
-    return steps.TextureUnbend(texture, label)
+    step = steps.TextureUnbend(texture, label)
+    met.decisions.note(by_surface(met.stage, step))
+    return step
 
 
 def _scatter(scatter: Scatter, column: int, met: _Met) -> steps.Unscatter:
@@ -333,7 +338,10 @@ def _scatter(scatter: Scatter, column: int, met: _Met) -> steps.Unscatter:
     if scatter.width is not None:
         width = _sheet(scatter.width, met, "widths of kernels")
     pick = column + 2 * kernels if cumulative is not None else -1
-    return steps.Unscatter(column, kernels, pick, cumulative, width, met.label)
+    step = steps.Unscatter(column, kernels, pick, cumulative, width, met.label)
+    if width is not None:
+        met.decisions.note(by_widths(met.stage, step, width))
+    return step
 
 
 def _sheet(given: object, met: _Met, what: str) -> steps.Texture:

@@ -1,0 +1,77 @@
+"""Which numbers of a plan by footprints are linear in the cells of masks, and the transposes of these maps.
+
+Those of masks in mid-path are noted where their textures are made (`vcc.plan.footprints.mask_textures`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.optics.sensor import Sensor
+from vcc.plan.decisions import Decisions, Linear
+from vcc.plan.footprints.against_sensor import detail_back, transmission_back
+from vcc.plan.footprints.mask_textures import LATTICE, mask_in_path
+from vcc.plan.footprints.planes import Aperture, OpenParts, Plane
+from vcc.shapes.mean_back import holds, is_values
+
+Array = NDArray[np.float64]
+
+
+def by_view_planes(aperture: Aperture, shares: Array, keep: Any, path_planes: list[Plane]) -> Linear:
+    """How taps' weights, and where they meet masks in mid-path, follow the cells of masks at the views.
+
+    Args:
+        aperture: these masks.
+        shares: of the light of views, that all taps have.
+        keep: which of the taps there are.
+        path_planes: the masks in mid-path: light through a part of a tap's cell meets them around its middle.
+    """
+
+    def back(cells: Any, weights: list[Any]) -> Any:
+        of_taps = OpenParts(np.zeros(shares.shape), np.zeros((*shares.shape, 2)))
+        of_taps.weights[keep] = weights[0] * shares[keep]
+        for n, plane in enumerate(path_planes):
+            spacing = aperture.decisions.of(mask_in_path(n)).taken(LATTICE).spacing
+            places = np.stack(weights[1 + 2 * n : 3 + 2 * n], axis=-1) / spacing
+            of_taps.middle[keep] += places @ plane.view_step(aperture.motion)
+        return aperture.back(of_taps, cells)
+
+    return Linear(
+        lambda thing, field: (
+            is_values(thing, field) and any(holds(plane.pattern, thing) for plane in aperture.planes)
+        ),
+        lambda plan: (
+            "core.weights",
+            *(f"core.masks[{n}].{place}" for n in range(len(path_planes)) for place in ("column", "row")),
+        ),
+        back,
+    )
+
+
+def by_masks_against_sensor(
+    sensor: Sensor, planes: list[Plane], place: int, detailed: bool, decisions: Decisions
+) -> Linear:
+    """How what the picture is multiplied by follows the cells of masks against the sensor.
+
+    Args:
+        sensor: of the camera.
+        planes: the masks against it.
+        place: of what applies them among what is done after the core.
+        detailed: whether their variation within pixels counts.
+        decisions: by which means are taken.
+    """
+
+    def back(cells: Any, weights: list[Any]) -> Any:
+        found = transmission_back(sensor, planes, weights[0], cells, decisions)
+        return found + detail_back(sensor, planes, weights[1], cells, decisions) if detailed else found
+
+    return Linear(
+        lambda thing, field: is_values(thing, field) and any(holds(plane.pattern, thing) for plane in planes),
+        lambda plan: tuple(
+            f"after[{place}].{name}" for name in ("transmission", "detail")[: 2 if detailed else 1]
+        ),
+        back,
+    )

@@ -1,0 +1,70 @@
+"""Which numbers of a plan by rays are linear in what elements hold, and the transposes of these maps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vcc.optics.diffuser import CodedDiffuser
+from vcc.optics.train import Stage
+from vcc.plan.decisions import Linear
+from vcc.plan.rays.steps import CellShares, Step, Texture, TextureUnbend
+from vcc.shapes.height_maps import HeightMap, PathMap
+from vcc.shapes.mean_back import is_values
+from vcc.shapes.patterns import Cells
+
+
+def by_cells(cells: Cells, step: CellShares) -> Linear:
+    """A mask of cells that rays meet one by one: its values are the cells'."""
+    return Linear(
+        lambda thing, field: is_values(thing, field) and thing is cells,
+        lambda plan: _of_step(plan, step, "values"),
+        lambda thing, weights: weights[0],
+    )
+
+
+def by_surface(stage: Stage, step: TextureUnbend) -> Linear:
+    """A plate of measured or designed height: its slopes are those of a spline through the heights."""
+    surface = getattr(stage.faces.bending, "surface", None)
+    x, y = (
+        start - middle + apart * np.arange(count)
+        for start, middle, apart, count in zip(
+            step.texture.start,
+            stage.element.decentre,
+            step.texture.spacing,
+            step.texture.values.shape[1::-1],
+            strict=True,
+        )
+    )
+
+    def back(sheet: Any, weights: list[Any]) -> Any:
+        return sheet.factor * sheet.paths_back(x[None, :], y[:, None], (weights[0][..., 0], weights[0][..., 1]))
+
+    return Linear(
+        lambda thing, field: (
+            thing is surface and isinstance(thing, HeightMap | PathMap) and field in ("heights", "paths")
+        ),
+        lambda plan: _of_step(plan, step, "texture.values"),
+        back,
+    )
+
+
+def by_widths(stage: Stage, step: Step, width: Texture) -> Linear:
+    """A diffuser whose kernel is stretched over its surface: the texture is the map of widths itself."""
+    return Linear(
+        lambda thing, field: (
+            thing is stage.element
+            and isinstance(thing, CodedDiffuser)
+            and field == "widths"
+            and thing.widths is not None
+            and thing.widths.shape == width.values.shape[:2]
+        ),
+        lambda plan: _of_step(plan, step, "width.values"),
+        lambda thing, weights: weights[0][..., 0],
+    )
+
+
+def _of_step(plan: Any, step: Any, name: str) -> tuple[str, ...]:
+    """The full names of a number of a step, where the plan has it."""
+    return tuple(f"core.steps[{n}].{name}" for n, one in enumerate(plan.core.steps) if one is step)
