@@ -3,28 +3,32 @@
 A plan is made anew for each value of its parameters, by decisions that were taken once
 (`vcc.plan.decisions.Decisions`), so that its numbers are smooth functions of the parameters. The derivative to a
 parameter is the central difference of all numbers that follow it, in double precision. A plan takes milliseconds
-to make where what costs (textures) did not change.
+to make where what costs (textures) did not change. What numbers are linear in (the cells of a mask, heights of a
+plate) is learned by the transposes of these maps, all at once (`vcc.plan.decisions.Linear`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
-from vcc.learn.parameters import Parameter, parameter, put, read
+from vcc.learn.parameters import CONTENT, Parameter, parameter, put, read
 from vcc.learn.scales import scale
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
-from vcc.plan.decisions import Decisions, plan_again
+from vcc.plan.decisions import Decisions, Linear, plan_again
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.rays.edges import edges_that_cut
 from vcc.plan.rays.model import Rays
+from vcc.shapes.patterns import Cells
 
 Array = NDArray[np.float64]
 Values = Mapping[str, ArrayLike]
@@ -63,7 +67,7 @@ class Chain:
         self.names = tuple(names)
         self.decisions = self._undecided()
         self._steps = {name: STEP * scale(train, name) for name in self.names}
-        self._made: tuple[dict[str, bytes], Plan, Numbers] | None = None
+        self._made: _Made | None = None
         self._form: tuple[tuple[str, tuple[int, ...]], ...] | None = None
         self._check_sizes()
         self._check_edges({})
@@ -77,7 +81,7 @@ class Chain:
         Raises:
             InputError: values that an element does not take, or for which the decisions no longer hold.
         """
-        return self._at(values or {})[0]
+        return self._at(values or {}).plan
 
     def followed(self, values: Values | None = None) -> dict[str, tuple[str, ...]]:
         """For each parameter the names of the plan's numbers (`Plan.numbers`) that follow it.
@@ -88,12 +92,15 @@ class Chain:
         Raises:
             InputError: as `pull`.
         """
-        found = {}
+        found, made = {}, self._at(values or {})
         for name in self.names:
             moved: dict[str, None] = {}
-            for index in np.ndindex(read(self.train, name).shape):
-                moved |= dict.fromkeys(self._derivative(values or {}, name, index))
-            found[name] = tuple(number for number in self._at(values or {})[1] if number in moved)
+            for linear in made.linear(name):
+                moved |= dict.fromkeys(linear.numbers(made.plan))
+            if not moved:
+                for index in np.ndindex(read(self.train, name).shape):
+                    moved |= dict.fromkeys(self._derivative(values or {}, name, index))
+            found[name] = tuple(number for number in made.numbers if number in moved)
         return found
 
     def pull(self, values: Values, cotangents: Mapping[str, ArrayLike]) -> dict[str, Array]:
@@ -111,10 +118,12 @@ class Chain:
             InputError: values at which a parameter cannot be followed, or rays that run into an edge there.
         """
         weights = {name: np.asarray(cotangent, dtype=np.float64) for name, cotangent in cotangents.items()}
-        self._at(values)
-        found = {}
+        made, found = self._at(values), {}
         for name in self.names:
             found[name] = np.zeros(read(self.train, name).shape)
+            if linear := made.linear(name):
+                found[name] += sum(made.pulled(one, name, weights) for one in linear)
+                continue
             for index in np.ndindex(found[name].shape):
                 slopes = self._derivative(values, name, index, weights)
                 found[name][index] = sum(np.vdot(weights[number], slope) for number, slope in slopes.items())
@@ -137,16 +146,17 @@ class Chain:
         moving = (parameter(self.train, name) for name in self.names if name.endswith(".z"))
         return Decisions([found.owned_by for found in moving])
 
-    def _at(self, values: Values) -> tuple[Plan, Numbers]:
+    def _at(self, values: Values) -> _Made:
         """The plan for some values, and its numbers; what costs is kept for plans nearby."""
         key = {name: np.asarray(value, dtype=np.float64).tobytes() for name, value in values.items()}
-        if self._made is None or self._made[0] != key:
-            with self.decisions.remembering():
-                plan = compile_best(put(self.train, dict(values)), self.grid, self.how, self.decisions)
-            numbers = plan.numbers()
-            self._check_form(numbers)
-            self._made = key, plan, numbers
-        return self._made[1:]
+        if self._made is None or self._made.key != key:
+            train = put(self.train, dict(values))
+            with self.decisions.remembering(), self.decisions.noting() as linear:
+                plan = compile_best(train, self.grid, self.how, self.decisions)
+            made = _Made(key, train, plan, plan.numbers(), tuple(linear))
+            self._check_form(made.numbers)
+            self._made = made
+        return self._made
 
     def _beside(self, values: Values, name: str, index: tuple[int, ...], step: float) -> Train | InputError:
         """The train with one number of a parameter moved by a step; what it refuses."""
@@ -183,7 +193,7 @@ class Chain:
         near, far = (self._beside(values, name, index, n * side * step) for n in (1, 2))
         if isinstance(near, InputError) or isinstance(far, InputError):
             raise InputError(f"there is no derivative to {name}: {near if isinstance(near, InputError) else far}")
-        here = self._at(values)[1]
+        here = self._at(values).numbers
         parts = (-1.5, here), (2.0, self._numbers(near, name)), (-0.5, self._numbers(far, name))
         return _combined(parts, side * step, wanted)
 
@@ -198,17 +208,20 @@ class Chain:
             raise plan_again("which numbers the plan has")
 
     def _check_sizes(self) -> None:
+        made = self._at({})
         for name in self.names:
             found = parameter(self.train, name)
-            if found.array().size > MOST_BY_DIFFERENCES and array_puller(found) is None:
+            if found.array().size > MOST_BY_DIFFERENCES and not made.linear(name):
                 raise InputError(
-                    f"{name} ({found.owned_by}) has {found.array().size} numbers, and a parameter of its kind is "
-                    f"learned by differences, up to {MOST_BY_DIFFERENCES} of them: give it fewer"
+                    f"no number of this plan is linear in {name} ({found.owned_by}), which has "
+                    f"{found.array().size} numbers; what is not is learned by differences, up to "
+                    f"{MOST_BY_DIFFERENCES} numbers. Give it fewer; a plate that bends nothing yet, begin with "
+                    "one that does"
                 )
 
     def _check_edges(self, values: Values) -> None:
         """Refuse parameters that move rays against hard edges that cut them."""
-        core = self._at(values)[0].core
+        core = self._at(values).plan.core
         if not isinstance(core, Rays) or not self.names:
             return
         for name, followed in self.followed(values).items():
@@ -223,16 +236,42 @@ class Chain:
                 )
 
 
-ArrayPuller = Callable[[Any, Mapping[str, Array]], Array]
-
-
-def array_puller(found: Parameter) -> ArrayPuller | None:
-    """How derivatives to numbers become those to a large array, all at once; None where by differences.
+@dataclass(frozen=True, eq=False, repr=False)
+class _Made(Brief):
+    """A plan for some values.
 
     Args:
-        found: the parameter.
+        key: the values.
+        train: with them.
+        plan: of the train.
+        numbers: of the plan.
+        linears: which of them are linear in what.
     """
-    return None
+
+    key: dict[str, bytes]
+    train: Train
+    plan: Plan
+    numbers: Numbers
+    linears: tuple[Linear, ...]
+
+    def linear(self, name: str) -> list[Linear]:
+        """By what numbers are linear in a parameter; none where they are not."""
+        thing, field = _held(parameter(self.train, name))
+        return [linear for linear in self.linears if linear.follows(thing, field)]
+
+    def pulled(self, linear: Linear, name: str, weights: Mapping[str, Array]) -> Array:
+        """What weights of numbers say of a parameter that they are linear in."""
+        numbers = linear.numbers(self.plan)
+        if not any(number in weights for number in numbers):
+            return np.zeros(read(self.train, name).shape)
+        listed = [weights.get(number, np.zeros(self.numbers[number].shape)) for number in numbers]
+        return np.asarray(linear.back(_held(parameter(self.train, name))[0], listed))
+
+
+def _held(found: Parameter) -> tuple[Any, str]:
+    """The thing that holds the numbers of a parameter, and in which field: a mask's are those of its cells."""
+    thing = getattr(found.holder, found.field)
+    return (thing, CONTENT) if isinstance(thing, Cells) else (found.holder, found.field)
 
 
 def _combined(parts: Iterable[tuple[float, Numbers]], step: float, wanted: Mapping[str, Any] | None) -> Numbers:

@@ -155,7 +155,8 @@ class Decisions:
     @contextmanager
     def noting(self) -> Iterator[list[Linear]]:
         """A list of what is noted within."""
-        self._book.linear = listed = []
+        listed: list[Linear] = []
+        self._book.linear = listed
         try:
             yield listed
         finally:

@@ -298,7 +298,4 @@ def in_one_plane(patterns: list[tuple[Pattern, tuple[float, float]]]) -> Pattern
         patterns: each with the place (x, y) of its middle, metres.
     """
     placed = tuple(Shifted(pattern, middle) if any(middle) else pattern for pattern, middle in patterns)
-    if len(placed) == 1:
-        return placed[0]
-    product = Product(placed)
-    return product.factors[0] if len(product.factors) == 1 else product
+    return placed[0] if len(placed) == 1 else Product(placed)

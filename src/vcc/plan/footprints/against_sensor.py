@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ def transmission(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANE
     """The mean transmission over each pixel of what lies against the sensor."""
     if not planes:
         return None
-    return np.asarray(math.prod(_means(planes, _pixels(sensor), decisions), start=np.ones(sensor.shape)))
+    return reduce(np.multiply, _means(planes, _pixels(sensor), decisions), np.ones(sensor.shape))
 
 
 def transmission_back(
@@ -49,7 +50,7 @@ def detail(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANEW) -> 
     if not planes:
         return None
     rows, columns = sensor.shape
-    means = math.prod(_means(planes, _parts(sensor), decisions))
+    means = reduce(np.multiply, _means(planes, _parts(sensor), decisions))
     blocks = means.reshape(rows, PARTS_OF_A_PIXEL, columns, PARTS_OF_A_PIXEL)
     detail = np.einsum("yxpq,rpcq->yxrc", _moments(sensor), blocks, optimize=True)
     there = decisions.keep("detail within pixels", lambda: bool(np.abs(detail).max() > 1e-6))
@@ -130,7 +131,7 @@ def _means_back(planes: list[Plane], boxes: Boxes, weights: Array, cells: Cells,
     total = np.zeros(cells.values.shape)
     for n, plane in enumerate(planes):
         if holds(plane.pattern, cells):
-            others = math.prod((mean for m, mean in enumerate(means) if m != n), start=np.ones(1))
+            others = reduce(np.multiply, (mean for m, mean in enumerate(means) if m != n), np.ones(1))
             its = _about(decisions, n, boxes)
             total += mean_back(plane.pattern, _seen(plane, boxes), its, weights * others, cells)
     return total

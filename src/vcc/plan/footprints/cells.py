@@ -85,7 +85,7 @@ def divide_views(
             detail_lost(plane, np.zeros(2), np.abs(plane.view_step(between.motion)).sum(axis=1) / parts)
             for plane in path_planes
         )
-        return math.sqrt(lost[-1] * lost[-2])
+        return math.sqrt(max(lost[-2], 0.0) * max(lost[-1], 0.0))  # what is counted on cells may be below 0
 
     left = correlated(1)
     while left > CORRELATED and divide < LARGEST_CHOSEN_REFINEMENT:

@@ -362,21 +362,16 @@ def _used(weights: Array, decisions: Decisions) -> tuple[NDArray[np.int64], NDAr
     """Rows and columns of taps that give light; where decisions are kept, and one without on each side."""
     found = []
     for axis, along in enumerate(("rows", "columns")):
-        lit = weights.any(axis=1 - axis)
-        used = decisions.keep(f"{along} of taps", partial(_kept_taps, lit, decisions.lasting))
-        if np.delete(lit, used).any():
-            raise plan_again(f"{along} of views that give light")
-        found.append(used)
+        lit = np.asarray(weights.any(axis=1 - axis))
+        found.append(decisions.keep(f"{along} of taps", partial(_kept_taps, lit, decisions.lasting)))
     return found[0], found[1]
 
 
-def _kept_taps(lit: Any, wider: bool) -> NDArray[np.int64]:
-    """Those that are lit, or the first where none is; and their neighbours."""
-    if not lit.any():
-        return np.arange(len(lit)) if wider else np.zeros(1, dtype=np.int64)
-    if wider:
-        lit = lit | np.append(lit[1:], False) | np.append(False, lit[:-1])
-    return np.flatnonzero(lit)
+def _kept_taps(lit: NDArray[np.bool_], lasting: bool) -> NDArray[np.int64]:
+    """Those that are lit, or the first where none is; all where what is dark may be lit later."""
+    if lasting:
+        return np.arange(len(lit))
+    return np.flatnonzero(lit) if lit.any() else np.zeros(1, dtype=np.int64)
 
 
 def _smear(between: BetweenViews, divide: int, decisions: Decisions) -> tuple[int, AlongAxes | None]:

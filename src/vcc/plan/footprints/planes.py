@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,7 +159,7 @@ class Aperture(Brief):
         middle = np.zeros((*self.index.shape[:2], 2))
         if not self.planes:
             return OpenParts(weights, middle)
-        shares = math.prod(self.parts())
+        shares = _product(self.parts())
         light, lit = self._light(shares)
         middle[lit] = (shares[..., None] * self._inside).sum(axis=(2, 3))[lit] / light[lit][:, None]
         # Apart from each other: what several leave of a cell is not the product of their shares.
@@ -169,7 +169,7 @@ class Aperture(Brief):
     def back(self, weights: OpenParts, cells: Cells) -> Array:
         """From weights of `open_parts` to weights of the cells of one of the planes, this very object."""
         shares = self.parts()
-        light, lit = self._light(math.prod(shares))
+        light, lit = self._light(_product(shares))
         middle = self.open_parts().middle
         from_middle = ((self._inside - middle[:, :, None, None]) * weights.middle[:, :, None, None]).sum(axis=-1)
         of_shares = np.where(lit[..., None, None], from_middle / np.where(lit, light, 1.0)[..., None, None], 0.0)
@@ -179,7 +179,7 @@ class Aperture(Brief):
         for n, plane in enumerate(self.planes):
             if not holds(plane.pattern, cells):
                 continue
-            others = math.prod((share for m, share in enumerate(shares) if m != n), start=np.ones(1))
+            others = _product([share for m, share in enumerate(shares) if m != n])
             boxes = self._boxes(plane, self._inside)
             total += mean_back(plane.pattern, boxes, self._of_parts(n), of_shares * others, cells)
             if len(self.planes) == 1:
@@ -213,6 +213,10 @@ class Aperture(Brief):
         light = shares.sum(axis=(2, 3))
         least = ROUNDING if self.decisions.lasting else 0.0
         return light, self.decisions.keep("taps that are lit", lambda: light > least) & (light > least)
+
+
+def _product(shares: list[Array]) -> Array:
+    return reduce(np.multiply, shares, np.ones(1))
 
 
 def detail_lost(plane: Plane, known: Array, added: Array) -> float:

@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 from vcc.base.units import mm
-from vcc.shapes.mean_back import holds, mean_back
+from vcc.plan.decisions import Decisions
+from vcc.plan.footprints.means import Boxes, mean_over
+from vcc.plan.footprints.means_back import mean_back
+from vcc.shapes.mean_back import holds
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, as_pattern
 from vcc.shapes.sheets import Product, Shifted, in_one_plane
 
@@ -39,7 +42,7 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("size", [(1.7 * mm, 0.9 * mm), (0.02 * mm, 0.03 * mm), (12 * mm, 9 * mm)])
+@pytest.mark.parametrize("size", [(1.7 * mm, 0.9 * mm), (0.25 * mm, 0.3 * mm), (12 * mm, 9 * mm)])
 @pytest.mark.parametrize("where", PLACES)
 @pytest.mark.parametrize("name", PATTERNS)
 def test_it_is_the_transpose_of_the_mean(name, where, size):
@@ -51,8 +54,9 @@ def test_it_is_the_transpose_of_the_mean(name, where, size):
     pattern = PATTERNS[name](cells)
     weights = generator.standard_normal(np.broadcast_shapes(x.shape, y.shape))
     changed = PATTERNS[name](Cells(values + change, 6 * mm, 5 * mm))
-    difference = changed.mean(x, y, *size) - pattern.mean(x, y, *size)
-    back = mean_back(pattern, cells, (x, y), size, weights)
+    decisions = Decisions()
+    difference = mean_over(changed, x, y, *size, decisions) - mean_over(pattern, x, y, *size, decisions)
+    back = mean_back(pattern, Boxes(x, y, *size), decisions, weights, cells)
     assert back.shape == values.shape
     assert np.sum(weights * difference) == pytest.approx(np.sum(back * change), rel=1e-9, abs=1e-12)
 
@@ -60,7 +64,7 @@ def test_it_is_the_transpose_of_the_mean(name, where, size):
 def test_places_without_any_size_read_the_cell_that_holds_them():
     cells = Cells(np.random.default_rng(1).random((5, 6)), 6 * mm, 5 * mm)
     x, y = np.array([0.5, -1.5]) * mm, np.array([1.0, -2.0]) * mm
-    back = mean_back(cells, cells, (x, y), (0.0, 0.0), np.array([2.0, 3.0]))
+    back = mean_back(cells, Boxes(x, y, 0.0, 0.0), Decisions(), np.array([2.0, 3.0]), cells)
     wanted = np.zeros((5, 6))
     wanted[3, 3], wanted[0, 1] = 2, 3
     np.testing.assert_allclose(back, wanted, atol=1e-12)
