@@ -111,9 +111,9 @@ def test_planning_again_tells_what_it_would_decide():
 def test_what_cannot_follow_is_refused_by_name():
     with pytest.raises(vcc.InputError, match=r"no derivative to code\.z: which masks stand against the sensor"):
         Chain(camera(code(z=58 * mm)), LIGHT_FIELD.grid, None, ["code.z"]).pull({}, {})
-    many = vcc.Mask(np.full((30, 30), 0.5), width=4 * mm, z=40 * mm, name="code")
-    with pytest.raises(vcc.InputError, match=r"code\.pattern .* has 900 numbers"):
-        Chain(camera(many), LIGHT_FIELD.grid, None, ["code.pattern"])
+    many = vcc.Diffuser(np.full((31, 31), 1 / 961), 1e-4, name="ground", z=1 * mm)
+    with pytest.raises(vcc.InputError, match=r"linear in ground\.kernel .* has 961 numbers"):
+        Chain(camera(many), LIGHT_FIELD.grid, None, ["ground.kernel"])
 
 
 def test_rays_that_move_against_a_hard_edge_are_refused():
