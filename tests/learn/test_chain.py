@@ -111,9 +111,10 @@ def test_planning_again_tells_what_it_would_decide():
 def test_what_cannot_follow_is_refused_by_name():
     with pytest.raises(vcc.InputError, match=r"no derivative to code\.z: which masks stand against the sensor"):
         Chain(camera(code(z=58 * mm)), LIGHT_FIELD.grid, None, ["code.z"]).pull({}, {})
-    many = vcc.Diffuser(np.full((31, 31), 1 / 961), 1e-4, name="ground", z=1 * mm)
-    with pytest.raises(vcc.InputError, match=r"linear in ground\.kernel .* has 961 numbers"):
-        Chain(camera(many), LIGHT_FIELD.grid, None, ["ground.kernel"])
+    slopes = np.random.default_rng(0).uniform(-1e-3, 1e-3, (21, 20, 2))
+    many = vcc.PrismArray(slopes, 0.5 * mm, name="prisms", z=1 * mm)
+    with pytest.raises(vcc.InputError, match=r"linear in prisms\.slopes .* has 840 numbers"):
+        Chain(camera(many), LIGHT_FIELD.grid, None, ["prisms.slopes"])
 
 
 def test_rays_that_move_against_a_hard_edge_are_refused():
