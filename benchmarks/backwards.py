@@ -148,12 +148,30 @@ def numbers_by_footprints(kind: str) -> Case:
     )
 
 
+def geometry_by_rays(name: str) -> Case:
+    """The derivative to where rays are aimed and to all optics between what they meet, by rays, 8 bits."""
+    field = rays.light_field()
+    plan = rays.cameras()[name].compile(field, method="rays")
+    given = weights(plan)
+    shape = ("core.first_pixel", "core.pitch", "core.index_from_ray", "core.aim.")
+    wanted = [each for each in plan.numbers() if each.startswith(shape) or each.endswith("before_from_behind")]
+    return Case(
+        f"geometry by rays, 8 bits: {name}",
+        {
+            "picture": lambda: drive(plan, field, HOW),
+            "back to all geometry": lambda: back(plan, field, given, HOW, samples_wanted=False, wanted=wanted),
+        },
+        "picture",
+    )
+
+
 CASES: dict[str, Callable[[], Case]] = {
     "samples": lambda: samples_by_footprints(masked=False),
     "samples, mask": lambda: samples_by_footprints(masked=True),
     "numbers, float32": lambda: numbers_by_footprints("float32"),
     "numbers, 8 bits": lambda: numbers_by_footprints("uint8"),
     **{f"rays: {name}": partial(samples_by_rays, name) for name in rays.cameras()},
+    **{f"geometry by rays: {name}": partial(geometry_by_rays, name) for name in rays.cameras()},
 }
 """By name, in the order in which they are timed."""
 

@@ -327,7 +327,7 @@ def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[
     per_area = abs(per_x * per_y)
     from_x, from_y = cells.place_from_sensor
     own, kinds, of_borders, sums = of_cells
-    sums[:] = 0.0
+    s0 = s1 = s2 = s8 = s9 = s10 = s18 = x0 = x1 = x2 = x3 = y0 = y1 = y2 = y3 = 0.0
     for p in range(n):
         x, y = rays[0, p], rays[1, p]
         if rays[4, p] == 0.0:
@@ -356,12 +356,12 @@ def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[
                 bottom, by_bottom = centre_y + chord, -1
         tall, v = bottom - top, unit(points[3, start + p], down)
         a_bar, b_bar, area_bar = bar[2, p] * per_x, bar[3, p] * per_y, bar[4, p] * per_area
-        own[0] -= x * a_bar
-        own[8] -= y * b_bar
-        own[1] -= rays[2, p] * a_bar + rays[4, p] * bar[4, p] * per_x
-        own[9] -= rays[3, p] * b_bar + rays[4, p] * bar[4, p] * per_y
-        own[2] -= a_bar
-        own[10] -= b_bar
+        s0 -= x * a_bar
+        s8 -= y * b_bar
+        s1 -= rays[2, p] * a_bar + rays[4, p] * bar[4, p] * per_x
+        s9 -= rays[3, p] * b_bar + rays[4, p] * bar[4, p] * per_y
+        s2 -= a_bar
+        s10 -= b_bar
         bar[0, p] -= from_x * a_bar
         bar[1, p] -= from_y * b_bar
         bottom_bar = area_bar * wide + b_bar * v
@@ -382,10 +382,10 @@ def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[
                 if chord > 0.0:
                     away_bar -= away / chord * sign * end_bar
                     own[19] += radius / chord * sign * end_bar
-        sums[1, 0] += image_bar
-        sums[1, 1] += image_bar * y
-        sums[1, 2] += chord_bar * root
-        sums[1, 3] += cell_bar
+        y0 += image_bar
+        y1 += image_bar * y
+        y2 += chord_bar * root
+        y3 += cell_bar
         bar[1, p] += image_bar * along_y
         off_bar = 0.0
         if disc and root > 0.0:
@@ -399,18 +399,27 @@ def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[
             half_bar -= left_bar
         else:
             cell_bar += left_bar
-            own[18] -= left_bar
+            s18 -= left_bar
         if image + half <= centre + reach:
             image_bar += right_bar
             half_bar += right_bar
         else:
             cell_bar += right_bar
-            own[18] += right_bar
-        sums[0, 0] += image_bar
-        sums[0, 1] += image_bar * x
-        sums[0, 2] += half_bar
-        sums[0, 3] += cell_bar
+            s18 += right_bar
+        x0 += image_bar
+        x1 += image_bar * x
+        x2 += half_bar
+        x3 += cell_bar
         bar[0, p] += image_bar * along
+    own[0] += s0
+    own[1] += s1
+    own[2] += s2
+    own[8] += s8
+    own[9] += s9
+    own[10] += s10
+    own[18] += s18
+    sums[0, 0], sums[0, 1], sums[0, 2], sums[0, 3] = x0, x1, x2, x3
+    sums[1, 0], sums[1, 1], sums[1, 2], sums[1, 3] = y0, y1, y2, y3
     image_back(images, cells, cell, sums, own, kinds)
 
 
