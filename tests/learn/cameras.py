@@ -18,6 +18,7 @@ def plate(surface, **options):
 
 
 HEIGHTS = np.random.default_rng(0).normal(size=(4, 5)) * um
+WEIGHTS = np.stack([np.linspace(0, 1, 9), np.linspace(1, 0, 9)]).reshape(2, 3, 3)
 CELLS = np.random.default_rng(1).uniform(0.2, 0.8, (3, 4))
 
 ELEMENTS: dict[str, vcc.Element] = {
@@ -42,7 +43,7 @@ ELEMENTS: dict[str, vcc.Element] = {
         kernels.Gaussian(1.0), 8 * mm, widths=np.full((3, 3), 0.002), name="frosted"
     ),
     "mixed diffuser": vcc.CodedDiffuser(
-        (kernels.Gaussian(0.002), kernels.TopHat(0.004)), 8 * mm, weights=np.full((2, 3, 3), 0.5), name="frosted"
+        (kernels.Gaussian(0.002), kernels.TopHat(0.004)), 8 * mm, weights=WEIGHTS, name="frosted"
     ),
     "quadratic plate": plate(surfaces.Quadratic(1.0), diameter=8 * mm),
     "tilted plate": plate(surfaces.Tilt((0.001, 0.002)), width=8 * mm, height=7 * mm),

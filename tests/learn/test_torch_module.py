@@ -436,6 +436,11 @@ def test_a_parameter_that_is_no_number_any_more_is_named():
             call()
 
 
+def test_a_loss_that_is_no_number_ends_on_its_way_back():
+    with pytest.raises(vcc.InputError, match=r"weights of a picture are finite numbers; at \(0, 0\) there is nan"):
+        (exact()() * math.nan).sum().backward()
+
+
 def test_a_module_elsewhere_is_told_that_there_is_no_engine():
     with pytest.raises(
         vcc.InputError, match=r"code.pattern is on meta, and there is no GPU engine.*model.cpu\(\)"

@@ -9,7 +9,7 @@ plate) is learned by the transposes of these maps, all at once (`vcc.plan.decisi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -103,23 +103,26 @@ class Chain:
             found[name] = tuple(number for number in made.numbers if number in moved)
         return found
 
-    def pull(self, values: Values, cotangents: Mapping[str, ArrayLike]) -> dict[str, Array]:
+    def pull(
+        self, values: Values, cotangents: Mapping[str, ArrayLike], names: Collection[str] | None = None
+    ) -> dict[str, Array]:
         """The derivatives to the parameters of what has these derivatives to the plan's numbers.
 
         Args:
             values: as for `plan`.
             cotangents: derivatives to numbers of the plan, by the names of `Plan.numbers`, each of its number's
                 shape; those that are left out are 0.
+            names: of the parameters whose derivatives are wanted; None: of all.
 
         Returns:
-            By the names of all parameters, float64, each of its parameter's shape.
+            By the names of these parameters, float64, each of its parameter's shape.
 
         Raises:
             InputError: values at which a parameter cannot be followed, or rays that run into an edge there.
         """
         weights = {name: np.asarray(cotangent, dtype=np.float64) for name, cotangent in cotangents.items()}
         made, found = self._at(values), {}
-        for name in self.names:
+        for name in self.names if names is None else names:
             found[name] = np.zeros(read(self.train, name).shape)
             if linear := made.linear(name):
                 found[name] += sum(made.pulled(one, name, weights) for one in linear)

@@ -141,7 +141,7 @@ class _Call:
             part = Backwards(drive, of_plan).gradient(one, samples_wanted=samples, found=found)
             parts.append(part.samples)
             total = total + replace(part, samples=None)
-        pulled = chain.pull(numbers, total.numbers) if wanted else {}
+        pulled = chain.pull(numbers, total.numbers, wanted) if wanted else {}
         return np.stack(parts) if samples else None, pulled
 
 

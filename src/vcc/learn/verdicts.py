@@ -62,7 +62,7 @@ def verdict(train: Train, grid: Grid, name: str, how: How | None = None) -> Verd
     except InputError as error:
         return Verdict("refused", str(error))
     if isinstance(found.holder, Polygon) and chain.plan({}).by_rays:
-        return Verdict("smoothed", "by rays its edges are as soft as the points of a texture are far apart")
+        return Verdict("smoothed", "by rays its edges are those of a texture")
     return Verdict("exact")
 
 
