@@ -144,6 +144,24 @@ def test_the_second_derivative_is_refused():
         gradient.backward()
 
 
+@pytest.mark.parametrize(
+    ("learn", "options"),
+    [
+        ([*LEARN, "main.diameter", "code.z", "code.width", "sensor.pitch"], {}),
+        (["code.pattern"], {"method": "rays", "samples": 16}),
+    ],
+)
+def test_compiled_gradients_are_the_references(learn, options):
+    fast, plain = module(learn, **options), exact(learn, **options)
+    weights = torch.randn(2, 7, 8, dtype=torch.float64, generator=torch.Generator().manual_seed(3))
+    samples = samples_of(2)
+    found = torch.autograd.grad((weights * fast(samples)).sum(), list(fast.parameters()))
+    expected = torch.autograd.grad((weights * plain(samples.double())).sum(), list(plain.parameters()))
+    for one, other in zip(found, expected, strict=True):
+        # Single precision, in sums of weights of both signs
+        torch.testing.assert_close(one, other, rtol=1e-4, atol=1e-5 * other.abs().max().item())
+
+
 # --- a module among modules ---
 
 
