@@ -133,7 +133,8 @@ def _as_kept(path: Path, kept: KeptAim) -> Aimed:
     """The aim that was decided, as the optics are now."""
     anew = replace(path, decisions=ANEW)
     _, slack = strayed(path, _chosen(anew, Slack.none(path), kept), kept.bends)
-    aim = _chosen(path, slack, kept)
+    # Without what rays stray by, more cells may seem to be seen than are.
+    aim = _with_kept_reach(_chosen(path, slack, kept), kept)
     regions, _ = strayed(path, aim, kept.bends)
     for leg, region, most in zip(path.legs, regions, kept.bends, strict=True):
         now = largest_bend(leg, region)
@@ -148,9 +149,18 @@ def _chosen(path: Path, slack: Slack, kept: KeptAim) -> Aim:
         return window_of(path, slack.unknown, kept.everything, kept.strips)
     assert kept.towards is not None
     cells = cell_windows.cell_windows_towards(path, slack.whole, kept.everything, *kept.towards)
-    if cells is None or cells.reach[0] > kept.reach[0] or cells.reach[1] > kept.reach[1]:
+    if cells is None:
         raise plan_again("the cells that pixels see")
-    return replace(cells, reach=kept.reach, halvings=kept.halvings)
+    return replace(cells, halvings=kept.halvings)
+
+
+def _with_kept_reach(aim: Aim, kept: KeptAim) -> Aim:
+    """The aim with as many cells as were looked at, which are enough."""
+    if not isinstance(aim, CellWindows):
+        return aim
+    if aim.reach[0] > kept.reach[0] or aim.reach[1] > kept.reach[1]:
+        raise plan_again("the cells that pixels see")
+    return replace(aim, reach=kept.reach)
 
 
 def found(path: Path) -> tuple[Aimed, Aimed | None]:
