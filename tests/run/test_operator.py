@@ -38,7 +38,7 @@ MASK = vcc.Mask(pattern=CosineSum((0.5 * mm, 0.6 * mm), 1, 0.3), z=0.96 * FOCUS)
 LENSLETS = vcc.LensArray(focal_length=2 * mm, pitch=1 * mm, z=FOCUS - 3 * mm)
 CAMERAS = {
     "fine mask": (vcc.Camera([LENS, MASK], SENSOR), {}),
-    "strong defocus": (vcc.Camera([LENS], vcc.Sensor(40 * mm, (20, 22), 40 * mm * 2e-3)), {}),
+    "strong defocus": (vcc.Camera([LENS], vcc.Sensor(40 * mm, (9, 10), 40 * mm * 2e-3)), {}),
     "diffuser at the views": (
         vcc.Camera([LENS, vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.004)), replace(MASK, z=FOCUS / 2)], SENSOR),
         {"method": "footprints"},
@@ -92,14 +92,14 @@ def test_dot_products_on_turned_views_of_three_channels(name, engine, largest):
     assert dot_error(operator(name, quarter, engine=engine)) <= largest
 
 
-@pytest.mark.parametrize("name", list(CAMERAS))
+@pytest.mark.parametrize("name", ["fine mask", "diffuser at the views", "lenslets"])
 def test_each_number_of_the_matrix_is_that_of_the_transpose(name):
-    op = operator(name, light_field(shape=(2, 2, 5, 6)), engine="reference")
+    op = operator(name, light_field(shape=(2, 2, 4, 5)), engine="reference")
     ahead = op(np.eye(op.shape[1]).reshape(-1, *op.samples_shape)).reshape(op.shape[::-1]).T
     back = op.T(np.eye(op.shape[0]).reshape(-1, *op.picture_shape)).reshape(op.shape)
     assert op.T.shape == op.shape[::-1]
     np.testing.assert_allclose(back, ahead, rtol=0, atol=1e-14 * np.abs(ahead).max())
-    single = operator(name, light_field(shape=(2, 2, 5, 6)))
+    single = operator(name, light_field(shape=(2, 2, 4, 5)))
     back = single.T(np.eye(op.shape[0]).reshape(-1, *op.picture_shape)).reshape(op.shape)
     np.testing.assert_allclose(back, ahead, rtol=0, atol=2e-6 * np.abs(ahead).max())
 
