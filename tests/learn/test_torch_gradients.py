@@ -28,7 +28,6 @@ SENSOR = vcc.Sensor(60 * mm, (3, 4), (0.41 * mm, 0.37 * mm), decentre=(0.11 * mm
 LENS = vcc.Lens(57 * mm, 3.7 * mm, z=2.1 * mm, decentre=(0.13 * mm, 0.07 * mm), name="main")
 
 BY_FOOTPRINTS = [
-    "prism",
     "mask of cells",
     "mask of cosines",
     "circle",
@@ -36,7 +35,7 @@ BY_FOOTPRINTS = [
     "quadratic plate",
     "first order",
 ]
-BY_RAYS = ["mask of cosines", "gaussian diffuser", "cubic plate", "lens array of two", "prism"]
+BY_RAYS = ["gaussian diffuser", "cubic plate", "lens array of two"]
 
 
 def camera_with(kind):

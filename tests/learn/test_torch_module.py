@@ -81,7 +81,7 @@ def test_whole_numbers_are_shares_of_their_largest():
 
 def test_colours():
     field = vcc.LightField.from_views(RANDOM.random((*SHAPE, 3), np.float32), 1.5 * mm, 5e-3, 1.0, (0, 0))
-    model = exact(field=field)
+    model = module(field=field)
     assert model().shape == (7, 8, 3)
     assert model(torch.rand(2, *SHAPE, 3)).shape == (2, 7, 8, 3)
     model().sum().backward()
@@ -190,7 +190,7 @@ def test_cells_that_were_placed_have_a_name_of_their_own():
 
 
 def test_functional_calls_and_their_gradients():
-    model = exact()
+    model = module()
     longer = {"main.focal_length": model.main.focal_length.detach() + 1}
     with torch.no_grad():
         expected = model()
@@ -240,7 +240,7 @@ def test_workers_of_a_loader_make_pictures():
 
 @pytest.mark.filterwarnings("ignore:The .grad attribute of a Tensor that is not a leaf")  # by the compiler itself
 def test_compiled_functions_around_it_give_the_same():
-    model = exact()
+    model = module()
     around = torch.compile(lambda samples: (2 * model(samples)).square().sum(), backend="eager")
     samples = samples_of().requires_grad_()
     values = []
@@ -276,8 +276,8 @@ def test_a_mask_moves_towards_its_target():
         for cells in (start, code)
     )
     with torch.no_grad():
-        wanted = exact([], target)(samples_of(4))
-    model = exact(["code.pattern"], camera, constraints={"code.pattern": sigmoid_mask})
+        wanted = module([], target)(samples_of(4))
+    model = module(["code.pattern"], camera, constraints={"code.pattern": sigmoid_mask})
     torch.testing.assert_close(model.values()["code.pattern"].detach(), torch.as_tensor(start))
     optimiser = torch.optim.Adam(model.parameters(), lr=0.5)
     losses = []
@@ -294,9 +294,9 @@ def test_a_mask_moves_towards_its_target():
 
 def test_focus_is_found_again_by_the_same_learning_rate():
     with torch.no_grad():
-        wanted = exact([])()
+        wanted = module([])()
     away = vcc.Camera([vcc.Lens(50.6 * mm, 5 * mm, name="main"), CODE], SENSOR)
-    model = exact(["main.focal_length"], away)
+    model = module(["main.focal_length"], away)
     optimiser = torch.optim.Adam(model.parameters(), lr=0.2)
     for _ in range(20):
         optimiser.zero_grad()
@@ -306,7 +306,7 @@ def test_focus_is_found_again_by_the_same_learning_rate():
 
 
 def test_constraints_are_applied_in_order():
-    model = exact(constraints={"code.pattern": (sigmoid_mask, partial(total_light, share=0.5), binary)})
+    model = module(constraints={"code.pattern": (sigmoid_mask, partial(total_light, share=0.5), binary)})
     cells = model.values()["code.pattern"]
     assert set(cells.unique().tolist()) <= {0.0, 1.0}
     model().sum().backward()
@@ -315,7 +315,7 @@ def test_constraints_are_applied_in_order():
 
 
 def test_electronics_learn_their_gain():
-    model = exact(["main.focal_length", "sensor.electronics.gain", "sensor.pitch"])
+    model = module(["main.focal_length", "sensor.electronics.gain", "sensor.pitch"])
     exposure = torch.tensor(2 * ms, dtype=torch.float64, requires_grad=True)
     # As much light as fills half of the well where it is brightest
     brightest = CAMERA.capture(FIELD).values.max() * SENSOR.sensitive_area
