@@ -84,11 +84,12 @@ def test_dot_products_on_random_cameras(kind, engine, largest):
 @pytest.mark.parametrize(("engine", "largest"), [("numba", SINGLE), ("reference", DOUBLE)])
 @pytest.mark.parametrize("name", list(CAMERAS))
 def test_dot_products_on_turned_views_of_three_channels(name, engine, largest):
-    given = light_field("float16", 3).transformed(turned(0.4))
+    few = (2, 3, 7, 8)
+    given = light_field("float16", 3, shape=few).transformed(turned(0.4))
     op = operator(name, given, engine=engine)
-    assert op.samples_shape == (*SHAPE, 3)
+    assert op.samples_shape == (*few, 3)
     assert dot_error(op) <= largest
-    quarter = light_field().transformed(vcc.Affine(np.rint(turned(np.pi / 2).matrix)))
+    quarter = light_field(shape=few).transformed(vcc.Affine(np.rint(turned(np.pi / 2).matrix)))
     assert dot_error(operator(name, quarter, engine=engine)) <= largest
 
 
@@ -122,7 +123,7 @@ def test_the_picture_is_that_of_capture(name, kind):
 
 
 def test_the_reference_gives_double_precision():
-    for name in CAMERAS:
+    for name in ("fine mask", "lenslets"):
         camera, options = CAMERAS[name]
         op = operator(name, engine="reference")
         assert op.dtype == op().dtype == np.float64
@@ -214,10 +215,10 @@ def test_samples_that_take_more_than_the_limit_are_refused(tmp_path):
 def test_least_squares_by_scipy_find_what_the_whole_matrix_finds():
     """One view behind a diffuser, with a little noise, sharpened again. Oracle: the normal equations, solved."""
     camera = vcc.Camera(
-        [LENS, vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.003), z=0.0)], vcc.Sensor(FOCUS, (12, 13), 1e-4)
+        [LENS, vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.003), z=0.0)], vcc.Sensor(FOCUS, (9, 10), 1.3e-4)
     )
     rng = np.random.default_rng(4)
-    given = vcc.LightField.from_views(rng.random((1, 1, 12, 13), np.float32), 7 * mm, 2e-3, 1.0)
+    given = vcc.LightField.from_views(rng.random((1, 1, 9, 10), np.float32), 7 * mm, 2e-3, 1.0)
     op = camera.operator(given, engine="reference")
     matrix = op(np.eye(op.shape[1]).reshape(-1, *op.samples_shape)).reshape(op.shape[::-1]).T
     damp = 0.05 * np.linalg.norm(matrix, 2)
@@ -286,7 +287,7 @@ def test_what_is_no_linear_map_is_refused():
         camera.operator(given.replaced(torch.asarray(given.values)))
     with pytest.raises(vcc.InputError, match="samples is decided when a plan is made"):
         camera.operator(given, plan=camera.compile(given), samples=8)
-    with pytest.raises(vcc.InputError, match="this plan is for a sensor of"):
+    with pytest.raises(vcc.InputError, match="this plan is for another camera"):
         camera.operator(given, plan=CAMERAS["strong defocus"][0].compile(given))
     with pytest.raises(vcc.InputError, match=r"light_field is a vcc\.LightField, not a ndarray"):
         camera.operator(given.values)
