@@ -142,7 +142,8 @@ class _Call:
             parts.append(part.samples)
             total = total + replace(part, samples=None)
         pulled = chain.pull(numbers, total.numbers, wanted) if wanted else {}
-        return np.stack(parts) if samples else None, pulled
+        whole = parts[0] if len(parts) == 1 else np.stack(parts)  # one alone, often large, is not copied
+        return whole if samples else None, pulled
 
 
 def _refuse(samples: Samples) -> None:
