@@ -187,6 +187,29 @@ def test_more_cells_may_seem_to_be_seen_than_are():
     compile_best(case.camera, case.light_field.grid, How(), Decisions())
 
 
+def with_a_cubic(strength, z):
+    """Rays are aimed at the plate, or come through it from the sensor to a lens, at which they are aimed."""
+    size = {"width": 8 * mm} if z == 0 else {}
+    rim = {} if z == 0 else {"diameter": 8 * mm}
+    plate = vcc.PhasePlate(vcc.surfaces.Cubic(strength), z=z, name="plate", **size)
+    return vcc.Camera([vcc.Lens(50 * mm, **rim), plate], vcc.Sensor(52 * mm, (6, 6), 0.2 * mm))
+
+
+def test_a_plate_that_rays_are_aimed_at_may_bend_them_as_much_as_it_likes():
+    decisions = Decisions()
+    compile_best(with_a_cubic(0.01, 0.0), GRID, None, decisions)
+    kept = compile_best(with_a_cubic(50.0, 0.0), GRID, None, decisions).core
+    anew = compile_best(with_a_cubic(50.0, 0.0), GRID, None, Decisions()).core
+    np.testing.assert_array_equal(kept.aim.slope_from_point, anew.aim.slope_from_point)
+
+
+def test_a_plate_behind_what_rays_are_aimed_at_may_not():
+    decisions = Decisions()
+    compile_best(with_a_cubic(10.0, 5 * mm), GRID, None, decisions)
+    with pytest.raises(vcc.InputError, match=r"how far rays stray \(bent by .*plate"):
+        compile_best(with_a_cubic(50.0, 5 * mm), GRID, None, decisions)
+
+
 def test_a_camera_that_moves_too_far_is_told_to_plan_again():
     camera, decisions = camera_with_a_mask(CELLS), Decisions()
     compile_best(camera, GRID, None, decisions)

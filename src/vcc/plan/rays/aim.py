@@ -59,7 +59,7 @@ class KeptAim:
 
     Args:
         everything: see `vcc.plan.rays.strips.bounds`.
-        bends: by how much each leg's stage bends rays at most, with room; None: as it does now.
+        bends: by how much each leg's stage bends rays at most, with room; None: as it does now, however much.
         strips: the two that cut out the window; None where cells have windows of their own.
         towards: (number of the leg, words) of the bound that cells look at; None for a window.
         reach: (rows, columns) of cells that are looked at on each side.
@@ -121,7 +121,31 @@ def _kept(path: Path, taken: Aimed) -> KeptAim:
         for pair, window in windows_by_strips(anew, taken.slack.unknown, taken.everything)
         if window.words == aim.words and window.solid_angle == aim.solid_angle
     )
-    return KeptAim(taken.everything, bends, pair)
+    return _as_much_as_it_likes(anew, KeptAim(taken.everything, bends, pair))
+
+
+def _as_much_as_it_likes(path: Path, kept: KeptAim) -> KeptAim:
+    """A kept window, with room only for what bends rays before they are where it counts.
+
+    What stands where the window is, or before all that has a texture, may bend rays as much as it likes.
+    """
+    pair = kept.strips
+    assert pair is not None
+
+    def led_to(bends: tuple[Slopes, ...]) -> Array:
+        """Where rays are aimed, and where they then meet each stage, in one row."""
+        _, slack = strayed(path, _chosen(path, Slack.none(path), kept), bends)
+        aim = window_of(path, slack.unknown, kept.everything, pair)
+        regions, _ = strayed(path, aim, bends)
+        return np.concatenate([aim.slope_from_point.ravel(), aim.offset, np.ravel(regions)])
+
+    bends, here = list(kept.bends), led_to(kept.bends)
+    for n, most in enumerate(kept.bends):
+        if most is not None:
+            further = (*kept.bends[:n], (2 * most[0], 2 * most[1]), *kept.bends[n + 1 :])
+            if np.array_equal(led_to(further), here):
+                bends[n] = None
+    return replace(kept, bends=tuple(bends))
 
 
 def _the_same_anywhere(leg: Leg) -> bool:
