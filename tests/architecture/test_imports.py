@@ -73,17 +73,18 @@ BY_NAME = {
     "sources.depth_map": "meshes are made by compiled loops",
     "engines": "an engine is loaded when it is first used: Numba takes a second",
     "run.drive": "views in between need Numba",
+    "run.operator": "deepinv, and PyTorch with it, is loaded when it is asked for",
     "cli": "a command is loaded when it is called",
     "gallery.listing": "an entry is loaded when it is asked for",
     "showcase.listing": "an entry is loaded when it is asked for",
 }
 """Modules that load others by names in strings, and why."""
 
-NEVER = {"torch", "jax", "dask", "cupy", "tensorflow"}
+NEVER = {"torch", "deepinv", "jax", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""
 
-OF_TORCH = re.compile(r"torch|learn\.torch_\w+")
-"""But these: they are for programs that have imported PyTorch already, and nothing else of ours imports them."""
+OF_TORCH = re.compile(r"torch|(learn|run)\.torch_\w+")
+"""But these: they are for programs that use PyTorch, and nothing else of ours imports them, but by name."""
 
 LATE = {
     "numba",
@@ -235,12 +236,13 @@ def test_only_those_listed_load_modules_by_name():
 @pytest.mark.parametrize("module", INSIDE)
 def test_heavy_libraries_are_never_imported(module):
     heavy = {name.split(".")[0] for name, _ in imports(MODULES[module])} & NEVER
-    assert not heavy - ({"torch"} if OF_TORCH.fullmatch(module) else set())
+    assert not heavy - ({"torch", "deepinv"} if OF_TORCH.fullmatch(module) else set())
 
 
 def test_what_imports_torch_is_imported_by_its_face_only():
     for module in INSIDE:
-        of_torch = {target for target in GRAPH[module] if OF_TORCH.fullmatch(target)}
+        imported = GRAPH[module] - (named(MODULES[module]) if module in BY_NAME else set())
+        of_torch = {target for target in imported if OF_TORCH.fullmatch(target)}
         assert not of_torch or OF_TORCH.fullmatch(module), module
 
 

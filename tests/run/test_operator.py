@@ -243,6 +243,22 @@ def test_scipy_gets_a_matrix():
     np.testing.assert_array_equal(linear @ np.ones(op.shape[1], int), op(np.ones(op.samples_shape)).reshape(-1))
 
 
+def test_without_deepinv_its_extra_is_named(monkeypatch, tmp_path):
+    op = operator("fine mask")
+    monkeypatch.delitem(sys.modules, "vcc.run.torch_physics", raising=False)
+    for name in [name for name in sys.modules if name.split(".")[0] == "deepinv"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "deepinv", None)
+    with pytest.raises(vcc.InputError, match=r"op\.as_deepinv needs the package deepinv.*\[deepinv\]"):
+        op.as_deepinv()
+    # As it ends where torchvision is of another build than torch.
+    (tmp_path / "deepinv.py").write_text("raise RuntimeError('operator torchvision::nms does not exist')")
+    monkeypatch.delitem(sys.modules, "deepinv")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(vcc.InputError, match=r"\(operator torchvision::nms does not exist\): .* of one build"):
+        op.as_deepinv()
+
+
 # --- what it says ---
 
 

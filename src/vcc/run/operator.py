@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import late
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.fields.grid import Block, Grid
@@ -132,6 +133,25 @@ class Operator:
             rmatvec=times(self.T, self.picture_shape),
             dtype=self.dtype,
         )
+
+    def as_deepinv(self, *, scale: float = 1.0, **options: Any) -> Any:
+        """The same for the solvers, priors and networks of `deepinv`; needs the extra of that name.
+
+        Args:
+            scale: by which pictures are multiplied, and samples on the way back. The solvers of `deepinv` are made
+                for operators of norm 1, and irradiance is far less than radiance: 1/norm serves them.
+            options: of `deepinv.physics.LinearPhysics`, such as ``noise_model`` or ``max_iter``.
+
+        Returns:
+            A `deepinv.physics.LinearPhysics` between tensors on the CPU: samples (B, channels, v, u, t, s) and
+            pictures (B, channels, rows, columns), channels 1 where the light field has none. What it gives has the
+            type `dtype` and carries gradients, of any order.
+
+        Raises:
+            InputError: deepinv is not there, or does not load; a scale that is not positive.
+        """
+        physics = late.module("vcc.run.torch_physics")
+        return physics.linear_physics(self, self.samples_shape, self.picture_shape, scale, options)
 
     def __repr__(self) -> str:
         samples, picture = ("×".join(map(str, shape)) for shape in (self.samples_shape, self.picture_shape))

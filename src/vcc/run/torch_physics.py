@@ -1,0 +1,119 @@
+"""A linear map of arrays as the physics of `deepinv`, between tensors of PyTorch; loaded when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import checks
+from vcc.base.errors import InputError
+
+with checks.package("op.as_deepinv", "deepinv", "deepinv"):
+    try:
+        import torch
+        from deepinv.physics import LinearPhysics
+    except RuntimeError as error:  # what torchvision ends in beside a torch that it was not built for
+        raise InputError(
+            f"deepinv does not load here ({error}): torch and torchvision, which it needs, have to be of one "
+            "build. Install both from one place, such as pip install --force-reinstall torch torchvision "
+            "--index-url https://download.pytorch.org/whl/cpu"
+        ) from error
+
+
+class LinearMap(Protocol):
+    """What maps arrays, one or several of them, and has an adjoint."""
+
+    @property
+    def T(self) -> LinearMap:
+        """The adjoint."""
+        ...
+
+    def __call__(self, numbers: NDArray[Any], /) -> NDArray[Any]:
+        """What it makes of them."""
+        ...
+
+
+def linear_physics(
+    ahead: LinearMap, samples: tuple[int, ...], picture: tuple[int, ...], scale: float, options: Mapping[str, Any]
+) -> Any:
+    """The physics of a map from samples to a picture.
+
+    Args:
+        ahead: the map.
+        samples: their shape, (v, u, t, s[, channels]).
+        picture: its shape, (rows, columns[, channels]).
+        scale: by which pictures are multiplied, and samples on the way back.
+        options: of the physics.
+    """
+    scale = checks.above_zero("scale", scale, unit="")
+    channels = samples[4:]
+    shapes = [(*(channels or (1,)), *samples[:4]), (*(channels or (1,)), *picture[:2])]
+    return LinearPhysics(
+        A=_Times(ahead, "samples", shapes[0], bool(channels), scale),
+        A_adjoint=_Times(ahead.T, "pictures", shapes[1], bool(channels), scale),
+        img_size=shapes[0],
+        **options,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Times:
+    """A map between tensors, differentiable any number of times.
+
+    Args:
+        map: of arrays whose channels come last.
+        what: it takes.
+        shape: of one of them, channels first.
+        coloured: whether the arrays have an axis of channels.
+        scale: by which what it makes is multiplied.
+    """
+
+    map: LinearMap
+    what: str
+    shape: tuple[int, ...]
+    coloured: bool
+    scale: float
+
+    def __call__(self, tensor: torch.Tensor, **parameters: Any) -> torch.Tensor:
+        """What the map makes of each; parameters are those of the noise, which `deepinv` passes here as well."""
+        if not isinstance(tensor, torch.Tensor) or not tensor.is_floating_point():
+            given = tensor.dtype if isinstance(tensor, torch.Tensor) else type(tensor).__name__
+            raise InputError(f"{self.what} are tensors of floating-point numbers here, not {given}")
+        if tensor.device.type != "cpu":
+            raise InputError(
+                f"{self.what} are on {tensor.device}, and there is no GPU engine: pass tensor.cpu(), and keep the "
+                "physics in the CPU's memory"
+            )
+        if tuple(tensor.shape[1:]) != self.shape or not len(tensor):
+            raise InputError(
+                f"{self.what} have the shape (batch, channels, …), (B, {', '.join(map(str, self.shape))}) here, "
+                f"not {tuple(tensor.shape)}"
+            )
+        made: torch.Tensor = _Product.apply(self.map, tensor, self.coloured)
+        return made if self.scale == 1 else made * self.scale
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> _Times:
+        return self  # nothing of it ever changes
+
+
+class _Product(torch.autograd.Function):  # type: ignore[misc]
+    """A linear map of tensors: its derivative is its adjoint's, and so on."""
+
+    @staticmethod
+    def forward(map: LinearMap, tensor: torch.Tensor, coloured: bool) -> torch.Tensor:
+        given = tensor.detach().to(torch.promote_types(tensor.dtype, torch.float32)).numpy()
+        made = map(np.ascontiguousarray(np.moveaxis(given, 1, -1) if coloured else given[:, 0]))
+        first = np.moveaxis(made, -1, 1) if coloured else made[:, None]
+        return torch.from_numpy(np.ascontiguousarray(first))
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: torch.Tensor) -> None:
+        ctx.map, _, ctx.coloured = inputs
+
+    @staticmethod
+    def backward(ctx: Any, weights: torch.Tensor) -> tuple[Any, ...]:
+        return None, _Product.apply(ctx.map.T, weights, ctx.coloured), None
