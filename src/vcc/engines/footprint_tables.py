@@ -170,6 +170,31 @@ class EntryMasks(NamedTuple):
     shares: NDArray[np.float32]
 
 
+class ManyLines(NamedTuple):
+    """The textures of one mask, several of a size, as the samples of one column of view taps meet them.
+
+    Args:
+        lines: (textures, and some of zero to a multiple of four; lines; pixels or values of a row of samples)
+            float32.
+        taps: int64, rows of taps; those of a group look up lines side by side and end before ``ends[n + 1]``.
+        ends: (groups + 1,) int64.
+        begin: (rows of taps,) int64, the line of the mask's row 0, or where it would be.
+        rows: how many the mask has.
+        row: (rows of taps,), mask row of sample row 0.
+        row_step: mask rows from one row of samples to the next.
+        repeat: 3 where a weight counts for three channels, else 1.
+    """
+
+    lines: NDArray[np.float32]
+    taps: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    begin: NDArray[np.int64]
+    rows: int
+    row: Array
+    row_step: float
+    repeat: int
+
+
 # --- and backwards ---
 
 

@@ -22,21 +22,18 @@ from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import ray_transpose, rays_compiled, sharpening_kernels
+from vcc.engines.footprint_columns import ByColumns, band_height, bands
 from vcc.engines.footprint_numbers import numbers_back
-from vcc.engines.footprint_samples import FineGrid, MaskColumns, blocks, textures
+from vcc.engines.footprint_samples import FineGrid, textures
 from vcc.engines.footprints_back import samples_back
 from vcc.engines.ray_numbers import ray_numbers_back
-from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
+from vcc.engines.vector_sums import EIGHT
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import REACH, taps
+from vcc.plan.footprints.shares import REACH
 from vcc.plan.protocol import Gradient, Partial
 from vcc.plan.rays.model import Rays
 
-BAND = 64
-"""Rows of the picture that a thread works on at once, at most."""
-BAND_BYTES = 3 * 2**17
-"""Their sums stay in the second-level cache."""
 SMALL = 2**17
 """Numbers of a picture below which filtering it takes less time than starting threads for it."""
 
@@ -54,7 +51,7 @@ def footprints(
     channels = values.shape[4] if values.ndim == 5 else 1
     with Workers(threads) as pool:
         if core.separable:
-            raster = _ByColumns(core, channels, pool).raster(values, progress)
+            raster = ByColumns(core, channels, pool).raster(values, progress)
         else:
             raster = _sheared(core, values, channels, pool, progress)
     return Partial(raster.reshape(*core.raster_shape, channels))
@@ -184,7 +181,7 @@ def _in_one_pass(
         kernels.filter_rows(lines, filtering, tables.Band(0, rows), picture)
     else:
         with Workers(threads) as pool:
-            list(pool.map(lambda band: kernels.filter_rows(lines, filtering, band, picture), _bands(rows)))
+            list(pool.map(lambda band: kernels.filter_rows(lines, filtering, band, picture), bands(rows)))
     return picture.reshape(rows, columns, channels)
 
 
@@ -195,94 +192,11 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
         return int(core.points.nbytes + 2 * core.tables_bytes)
     line = 4 * channels * core.samples[1] * core.refine
     raster = 4 * channels * math.prod(core.raster_shape)
-    band = _band(line)
+    band = band_height(line)
     # A band's sums, eight of them turned, and the rows of a view where its samples are divided.
     thread = (band + EIGHT + (2 * band if core.refine > 1 else 0)) * line
     masks = sum(mask.texture.nbytes + len(mask.texture) * line for mask in core.masks)
     return threads * thread + 2 * raster + masks
-
-
-def _bands(rows: int, height: int = BAND) -> list[tables.Band]:
-    """The picture's rows in bands so high."""
-    return [tables.Band(start, min(start + height, rows)) for start in range(0, rows, height)]
-
-
-def _band(line: int) -> int:
-    """How many rows of the picture make a band whose lines of sums take so many bytes: a multiple of eight."""
-    return int(np.clip(BAND_BYTES // line, EIGHT, BAND)) // EIGHT * EIGHT
-
-
-class _ByColumns:
-    """Tables for plans in which rows and columns part, and the loop over columns of views and bands."""
-
-    def __init__(self, core: Footprints, channels: int, pool: Workers) -> None:
-        self.core, self.channels, self.pool = core, channels, pool
-        self.fine = fine = FineGrid(core)
-        rows, columns = core.raster_shape
-        start_y = core.y[:, 0] + core.row_step * fine.first_row
-        start_x = core.x[0] + core.column_step * fine.first_column
-        row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
-        down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
-        across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
-        # How many rows of samples four rows of the raster gather, and how many the next four need anew.
-        ends = np.pad(down.first, [(0, 0), (0, -rows % ROWS)], mode="edge").reshape(len(start_y), -1, ROWS)
-        reach = int(np.ptp(ends, axis=2).max(initial=0)) + down.weights.shape[2]
-        advance = min(math.ceil(ROWS / abs(row_step)), reach) if core.refine == 1 else 0
-        self.mirrored = column_step < 0
-        if self.mirrored:
-            across = across.mirrored()
-        self.footprints = tables.Footprints(
-            (core.weights * core.scale).astype(np.float32),
-            tables.Rows(down.first, down.weights, reach, advance),
-            tables.Columns(across.first, across.weights),
-        )
-        # A mask's weight counts for all channels of a sample: for three of them as it is looked up, for other
-        # numbers by being repeated.
-        shared, repeated = (3, 1) if channels == 3 else (1, channels)
-        self.masks = MaskColumns(core, fine, repeated, shared, pool)
-
-    def raster(self, values: NDArray[Any], progress: Progress | None) -> NDArray[np.float32]:
-        """The sum over all samples: the raster (rows, columns × channels)."""
-        core, fine, done = self.core, self.fine, 0
-        rows, columns = core.raster_shape
-        tiles = np.zeros((-(-rows // EIGHT), columns * self.channels, EIGHT), dtype=np.float32)
-        # Values in a row of samples: as many as kernels add at once, at least.
-        pitch = max(fine.columns, -(-SHORTEST // self.channels)) * self.channels
-        divided = fine.tables(pitch) if core.refine > 1 else None
-        weights = self.footprints.weights
-        for samples, taken in blocks(core, values, bool(core.masks) or core.refine > 1 or progress is not None):
-            used = int(np.count_nonzero(weights[:, slice(*taken)]))
-            if used == 0:
-                continue
-            add = partial(self.add, samples, taken, divided, self.masks.at(taken[0], pitch), tiles)
-            list(self.pool.map(add, _bands(rows, _band(4 * pitch))))
-            if progress is not None:
-                done += used
-                progress(done, core.taps_used)
-        raster = np.empty((rows, columns * self.channels), dtype=np.float32)
-
-        def untiled(band: tables.Band) -> None:
-            # A real image runs against its samples: the raster is then in mirror writing.
-            kernels.raster_of(tiles, self.channels, self.mirrored, band, raster)
-
-        list(self.pool.map(untiled, _bands(rows)))
-        return raster
-
-    def add(
-        self,
-        samples: tables.Samples,
-        columns: tuple[int, int],
-        divided: tables.FineSamples | None,
-        masks: tables.MaskLines | None,
-        tiles: NDArray[np.float32],
-        band: tables.Band,
-    ) -> None:
-        """Add columns of view taps to a band of raster rows."""
-        if divided is None:
-            kernels.add_columns(samples, columns, self.footprints, masks, band, tiles)
-            return
-        for a in range(*columns):
-            kernels.add_divided_column(samples, a, self.footprints, divided, masks, band, tiles)
 
 
 def _sheared(
@@ -310,8 +224,8 @@ def _sheared(
             samples = samples.copy()  # to be weighed
         view = tables.View(samples, core.weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
         if core.masks:
-            list(pool.map(partial(kernels.weigh_samples, view, grid, masks), _bands(len(samples))))
+            list(pool.map(partial(kernels.weigh_samples, view, grid, masks), bands(len(samples))))
         add = partial(kernels.sheared_view, view, grid, footprint)
-        list(pool.map(lambda band, add=add: add(band, raster), _bands(len(raster))))
+        list(pool.map(lambda band, add=add: add(band, raster), bands(len(raster))))
     tell(progress, core.taps_used, core.taps_used)
     return raster.reshape(len(raster), -1)

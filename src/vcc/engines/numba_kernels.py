@@ -70,7 +70,7 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
             y = start + ROWS * (step if downwards else tiles - 1 - step)
             listed, next_count = 0, 0
             for b in views:
-                top, rows = _rows_of(b, y, stop, weights[b], gathered, share, listed, lowest, highest)
+                top, rows = rows_of(b, y, stop, weights[b], gathered, share, listed, lowest, highest)
                 for q in range(rows):
                     entry, l = listed + q, top + q
                     places[entry] = begin[b] + l * pitch
@@ -88,7 +88,7 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
                     for l in range(top, top + rows):
                         first_rows[first_count] = begin[b] + l * pitch + jump
                         first_count += 1
-            _sort(ranges, listed, ends, order)
+            sort_by_range(ranges, listed, ends, order)
             following, following_count = (next_rows, next_count) if step < tiles - 1 else (first_rows, first_count)
             for x in range(0, pitch, run):
                 for near in range((x + per_line - 1) // per_line * per_line, min(x + run, pitch), per_line):
@@ -104,7 +104,7 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
 
 
 @_inlined
-def _rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # type: ignore[no-untyped-def]
+def rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # type: ignore[no-untyped-def]
     """List the rows of samples of tap b that fall on four raster rows from y on: the first, and how many.
 
     Row ``first + q`` counts ``share[entry + q]`` there, and reaches raster rows y + lowest[q] … y + highest[q];
@@ -156,7 +156,7 @@ def masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
 
 
 @_inlined
-def _sort(ranges, entries, ends, order):  # type: ignore[no-untyped-def]
+def sort_by_range(ranges, entries, ends, order):  # type: ignore[no-untyped-def]
     """Order the entries by range; ``ends`` counts those of each range and the ones before it."""
     ends[:] = 0
     for entry in range(entries):

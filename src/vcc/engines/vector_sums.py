@@ -164,12 +164,38 @@ def _add_rows(
     context: Any, builder: Any, signature: Any, arguments: Sequence[Any], vectors: int, masks: _Masks | None
 ) -> Any:
     """The body of `add_rows` and its kin: see there for the arguments."""
-    values, total_sums = (context.make_array(signature.args[n])(context, builder, arguments[n]) for n in (0, 5))
-    order, ends, places, shares = (
-        each.data for each in _arrays(context, builder, signature.args[1], arguments[1])
-    )
-    x, skip, line = arguments[3], arguments[4], arguments[6]
-    values, sums, pitch = values.data, total_sums.data, cgutils.unpack_tuple(builder, total_sums.shape)[1]
+    values, entries, _, x, skip, sums, line = arguments
+    totals = _totals(context, builder, signature, (values, entries, x), vectors, masks)
+    sums, pitch = _plane(context, builder, signature.args[5], sums)
+    dark = ir.Constant(WIDE, [0.0] * LANES)
+    skipped = everywhere(builder, skip)
+    for row in range(ROWS):
+        begin = builder.add(builder.mul(builder.add(line, constant(row)), pitch), x)
+        for k in range(vectors):
+            pointer = builder.gep(sums, [builder.add(begin, constant(k * LANES))])
+            lanes = ir.Constant(ir.VectorType(PLACE, LANES), [k * LANES + lane for lane in range(LANES)])
+            fresh = builder.select(builder.icmp_signed(">=", lanes, skipped), totals[row][k], dark)
+            here = builder.bitcast(pointer, WIDE.as_pointer())
+            builder.store(builder.fadd(builder.load(here, align=4), fresh, flags=FLAGS), here, align=4)
+    return context.get_dummy_value()
+
+
+def _plane(context: Any, builder: Any, kind: Any, array: Any) -> tuple[Any, Any]:
+    """The numbers of an array (rows, values), and how many there are in a row."""
+    made = context.make_array(kind)(context, builder, array)
+    return made.data, cgutils.unpack_tuple(builder, made.shape)[1]
+
+
+def _totals(
+    context: Any, builder: Any, signature: Any, arguments: Sequence[Any], vectors: int, masks: _Masks | None
+) -> list[list[Any]]:
+    """Σ shares[e, r] · values[places[e] + x …] for four rows r, vector by vector.
+
+    signature: whose first two arguments are values and entries. arguments: values, entries and x.
+    """
+    values, entries, x = arguments
+    values = context.make_array(signature.args[0])(context, builder, values).data
+    order, ends, places, shares = (each.data for each in _arrays(context, builder, signature.args[1], entries))
     dark = ir.Constant(WIDE, [0.0] * LANES)
     totals = [[cgutils.alloca_once(builder, WIDE) for _ in range(vectors)] for _ in range(ROWS)]
     for total in (total for row in totals for total in row):
@@ -194,21 +220,82 @@ def _add_rows(
                     total = totals[row][k]
                     builder.store(plus(builder, builder.load(total), each, samples), total)
         start = stop
-    skipped = everywhere(builder, skip)
-    for row in range(ROWS):
-        begin = builder.add(builder.mul(builder.add(line, constant(row)), pitch), x)
-        for k in range(vectors):
-            pointer = builder.gep(sums, [builder.add(begin, constant(k * LANES))])
-            lanes = ir.Constant(ir.VectorType(PLACE, LANES), [k * LANES + lane for lane in range(LANES)])
-            fresh = builder.select(builder.icmp_signed(">=", lanes, skipped), builder.load(totals[row][k]), dark)
-            here = builder.bitcast(pointer, WIDE.as_pointer())
-            builder.store(builder.fadd(builder.load(here, align=4), fresh, flags=FLAGS), here, align=4)
-    return context.get_dummy_value()
+    return [[builder.load(total) for total in row] for row in totals]
+
+
+def _whole_rows(vectors: int, repeat: int | None = None, parted: bool = False) -> Any:
+    run = vectors * LANES
+
+    @intrinsic
+    def sum_whole_rows(typing_context, values, entries, masks, sums, to, length):  # type: ignore[no-untyped-def]
+        """sums[r, to + x] = Σ shares[e, r] · values[places[e] + x], for r = 0 … 3 and all x of a row.
+
+        Where sums are parted, each run of ``RUN_OF_THREES`` values has the sums of the first channel of its pixels,
+        then those of the second and the third; and each begins behind the one before it, though the values of the
+        last begin earlier, so as to end with the row.
+
+        Args:
+            typing_context: Numba's.
+            values: samples of any type, flat.
+            entries: `vcc.engines.footprint_tables.Entries`.
+            masks: `vcc.engines.footprint_tables.EntryMasks`, or None.
+            sums: float32 (rows, sample values), which are overwritten.
+            to: int64, where in the first of the four rows, or so far behind its beginning.
+            length: int64, values to sum, a run at least.
+        """
+        signature = types.void(values, entries, masks, sums, types.int64, types.int64)
+
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            values, entries, masks, sums, to, length = arguments
+            weighed = None
+            if repeat is not None:
+                weighed = _Masks(context, builder, signature.args[2], masks, repeat)
+            sums, pitch = _plane(context, builder, signature.args[3], sums)
+            last = builder.sub(length, constant(run))
+            with cgutils.for_range_slice(builder, constant(0), length, constant(run), PLACE) as (x, _):
+                here = builder.select(builder.icmp_signed("<", x, last), x, last)
+                totals = _totals(context, builder, signature, (values, entries, here), vectors, weighed)
+                for row, total in enumerate(totals):
+                    written = _parted(builder, total) if parted else total
+                    begin = builder.add(builder.add(to, builder.mul(constant(row), pitch)), x if parted else here)
+                    for k, each in enumerate(written):
+                        pointer = builder.gep(sums, [builder.add(begin, constant(k * LANES))])
+                        builder.store(each, builder.bitcast(pointer, WIDE.as_pointer()), align=4)
+            return context.get_dummy_value()
+
+        return signature, generate
+
+    return sum_whole_rows
+
+
+def _picked(builder: Any, three: Sequence[Any], lanes: Sequence[int]) -> Any:
+    """A vector of some of the lanes of three, numbered one vector after the other."""
+    first = [lane if lane < 2 * LANES else 0 for lane in lanes]
+    second = [n if lane < 2 * LANES else lane - LANES for n, lane in enumerate(lanes)]
+    kind = ir.VectorType(NUMBER, LANES)
+    of_two = builder.shuffle_vector(three[0], three[1], ir.Constant(kind, first))
+    return builder.shuffle_vector(of_two, three[2], ir.Constant(kind, second))
+
+
+def _parted(builder: Any, three: Sequence[Any]) -> list[Any]:
+    """Pixels of three channels, channel by channel."""
+    return [_picked(builder, three, [3 * n + c for n in range(LANES)]) for c in range(3)]
+
+
+def joined(builder: Any, three: Sequence[Any]) -> list[Any]:
+    """Three channels as pixels: the inverse of what parts them."""
+    places = [(i % 3) * LANES + i // 3 for i in range(3 * LANES)]
+    return [_picked(builder, three, places[k * LANES : (k + 1) * LANES]) for k in range(3)]
 
 
 add_rows = _rows_adder(VECTORS)
 add_masked_rows = _rows_adder(VECTORS, repeat=1)
 add_masked_rows_of_threes = _rows_adder(3, repeat=3)
+sum_whole_rows = _whole_rows(VECTORS)
+sum_masked_whole_rows = _whole_rows(VECTORS, repeat=1)
+sum_masked_whole_rows_of_threes = _whole_rows(3, repeat=3)
+part_whole_rows = _whole_rows(3, parted=True)
+part_masked_whole_rows = _whole_rows(3, repeat=3, parted=True)
 
 
 @intrinsic

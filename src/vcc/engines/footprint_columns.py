@@ -1,0 +1,112 @@
+"""Footprints in which rows and columns part, by columns of view taps: the tables, and the loop over bands."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.progress import Progress
+from vcc.base.workers import Workers
+from vcc.engines import footprint_tables as tables
+from vcc.engines import numba_kernels as kernels
+from vcc.engines.footprint_samples import FineGrid, MaskColumns, blocks
+from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
+from vcc.plan.footprints.model import Footprints
+from vcc.plan.footprints.shares import taps
+
+BAND = 64
+"""Rows of the picture that a thread works on at once, at most."""
+BAND_BYTES = 3 * 2**17
+"""Their sums stay in the second-level cache."""
+
+
+def bands(rows: int, height: int = BAND) -> list[tables.Band]:
+    """The picture's rows in bands so high."""
+    return [tables.Band(start, min(start + height, rows)) for start in range(0, rows, height)]
+
+
+def band_height(line: int) -> int:
+    """How many rows of the picture make a band whose lines of sums take so many bytes: a multiple of eight."""
+    return int(np.clip(BAND_BYTES // line, EIGHT, BAND)) // EIGHT * EIGHT
+
+
+class ByColumns:
+    """Tables for plans in which rows and columns part, and the loop over columns of views and bands."""
+
+    def __init__(self, core: Footprints, channels: int, pool: Workers) -> None:
+        self.core, self.channels, self.pool = core, channels, pool
+        self.fine = fine = FineGrid(core)
+        rows, columns = core.raster_shape
+        start_y = core.y[:, 0] + core.row_step * fine.first_row
+        start_x = core.x[0] + core.column_step * fine.first_column
+        row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
+        down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
+        across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
+        # How many rows of samples four rows of the raster gather, and how many the next four need anew.
+        ends = np.pad(down.first, [(0, 0), (0, -rows % ROWS)], mode="edge").reshape(len(start_y), -1, ROWS)
+        reach = int(np.ptp(ends, axis=2).max(initial=0)) + down.weights.shape[2]
+        advance = min(math.ceil(ROWS / abs(row_step)), reach) if core.refine == 1 else 0
+        self.mirrored = column_step < 0
+        if self.mirrored:
+            across = across.mirrored()
+        self.footprints = tables.Footprints(
+            (core.weights * core.scale).astype(np.float32),
+            tables.Rows(down.first, down.weights, reach, advance),
+            tables.Columns(across.first, across.weights),
+        )
+        # A mask's weight counts for all channels of a sample: for three of them as it is looked up, for other
+        # numbers by being repeated.
+        shared, repeated = (3, 1) if channels == 3 else (1, channels)
+        self.masks = MaskColumns(core, fine, repeated, shared, pool)
+
+    def raster(self, values: NDArray[Any], progress: Progress | None) -> NDArray[np.float32]:
+        """The sum over all samples: the raster (rows, columns × channels)."""
+        core, fine, done = self.core, self.fine, 0
+        rows, columns = core.raster_shape
+        tiles = np.zeros((-(-rows // EIGHT), columns * self.channels, EIGHT), dtype=np.float32)
+        # Values in a row of samples: as many as kernels add at once, at least.
+        pitch = max(fine.columns, -(-SHORTEST // self.channels)) * self.channels
+        divided = fine.tables(pitch) if core.refine > 1 else None
+        weights = self.footprints.weights
+        for samples, taken in blocks(core, values, bool(core.masks) or core.refine > 1 or progress is not None):
+            used = int(np.count_nonzero(weights[:, slice(*taken)]))
+            if used == 0:
+                continue
+            add = partial(self.add, samples, taken, divided, self.masks.at(taken[0], pitch), tiles)
+            list(self.pool.map(add, bands(rows, band_height(4 * pitch))))
+            if progress is not None:
+                done += used
+                progress(done, core.taps_used)
+        return self.untiled(tiles)
+
+    def untiled(self, tiles: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The raster (rows, columns × channels) of its tiles (rows / 8, columns · channels, 8)."""
+        rows, columns = self.core.raster_shape
+        raster = np.empty((rows, columns * self.channels), dtype=np.float32)
+
+        def write(band: tables.Band) -> None:
+            # A real image runs against its samples: the raster is then in mirror writing.
+            kernels.raster_of(tiles, self.channels, self.mirrored, band, raster)
+
+        list(self.pool.map(write, bands(rows)))
+        return raster
+
+    def add(
+        self,
+        samples: tables.Samples,
+        columns: tuple[int, int],
+        divided: tables.FineSamples | None,
+        masks: tables.MaskLines | None,
+        tiles: NDArray[np.float32],
+        band: tables.Band,
+    ) -> None:
+        """Add columns of view taps to a band of raster rows."""
+        if divided is None:
+            kernels.add_columns(samples, columns, self.footprints, masks, band, tiles)
+            return
+        for a in range(*columns):
+            kernels.add_divided_column(samples, a, self.footprints, divided, masks, band, tiles)

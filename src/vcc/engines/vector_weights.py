@@ -1,0 +1,109 @@
+"""Rows of sums weighed by lines of several masks at once, as vector instructions; see `vcc.engines.vector_sums`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from vcc.engines.vector_sums import FLAGS, LANES, PLACE, VECTORS, WIDE, constant, everywhere, floats, joined, plus
+
+MASKS = 4
+"""Masks that sums are weighed by at once."""
+
+
+def _weigher(vectors: int, parted: bool) -> Any:
+    run = vectors * LANES
+
+    @intrinsic
+    def weigh_rows(typing_context, sums, pitch, count, lines, at, line, plane, out, to, step, length):  # type: ignore[no-untyped-def]
+        """out[to + n · step + x] += Σ_r lines[at + n · plane + r · line + x] · sums[r · pitch + x], for all x.
+
+        For four masks n. Where three channels share a weight, x / 3 in the lines, and sums are parted as
+        `vcc.engines.vector_sums.part_whole_rows` has them.
+
+        Args:
+            typing_context: Numba's.
+            sums: float32, flat.
+            pitch: int64, from a row of them to the next.
+            count: int64, how many rows.
+            lines: float32, flat.
+            at: int64, where the line of row 0 begins in them.
+            line: int64, from a line to the next.
+            plane: int64, from a mask to the next.
+            out: float32, flat.
+            to: int64, where the first mask's values begin.
+            step: int64, from a mask to the next.
+            length: int64, values to weigh, a run at least.
+        """
+        whole = types.int64
+        signature = types.void(sums, whole, whole, lines, whole, whole, whole, out, whole, whole, whole)
+
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            sums, lines, out = (
+                context.make_array(signature.args[n])(context, builder, arguments[n]).data for n in (0, 3, 7)
+            )
+            _, pitch, count, _, at, line, plane, _, to, step, length = arguments
+            last = builder.sub(length, constant(run))
+            with cgutils.for_range_slice(builder, constant(0), length, constant(run), PLACE) as (x, _):
+                here = builder.select(builder.icmp_signed("<", x, last), x, last)
+                of_line = builder.add(at, builder.udiv(here, constant(3)) if parted else here)
+                rows = (sums, x if parted else here, pitch, count), (lines, of_line, line, plane)
+                skipped = builder.sub(x, here)
+                for n, total in enumerate(_weighed(builder, *rows, vectors, parted)):
+                    begin = builder.add(builder.add(to, builder.mul(constant(n), step)), here)
+                    _add_behind(builder, joined(builder, total) if parted else total, out, begin, skipped)
+            return context.get_dummy_value()
+
+        return signature, generate
+
+    return weigh_rows
+
+
+def _weighed(
+    builder: Any, of_sums: Sequence[Any], of_lines: Sequence[Any], vectors: int, parted: bool
+) -> list[list[Any]]:
+    """A run of what four masks make of sums: of each, as many vectors.
+
+    of_sums: where they are, where the run begins, from a row to the next, and how many. of_lines: where they are,
+    where the run begins, from a line to the next, and from a mask to the next.
+    """
+    sums, place, pitch, count = of_sums
+    lines, at, line, plane = of_lines
+    totals = [[cgutils.alloca_once(builder, WIDE) for _ in range(vectors)] for _ in range(MASKS)]
+    for total in (total for mask in totals for total in mask):
+        builder.store(ir.Constant(WIDE, [0.0] * LANES), total)
+    with cgutils.for_range(builder, count, intp=PLACE) as loop:
+        begin = builder.add(place, builder.mul(loop.index, pitch))
+        places = [builder.add(begin, constant(k * LANES)) for k in range(vectors)]
+        values = [floats(builder, builder.gep(sums, [each])) for each in places]
+        below = builder.add(at, builder.mul(loop.index, line))
+        for n in range(MASKS):
+            here = builder.add(below, builder.mul(constant(n), plane))
+            different = 1 if parted else vectors
+            places = [builder.add(here, constant(k * LANES)) for k in range(different)]
+            weights = [floats(builder, builder.gep(lines, [each])) for each in places]
+            for k, value in enumerate(values):
+                total = totals[n][k]
+                builder.store(plus(builder, builder.load(total), weights[k % different], value), total)
+    return [[builder.load(total) for total in mask] for mask in totals]
+
+
+def _add_behind(builder: Any, vectors: Sequence[Any], out: Any, begin: Any, skipped: Any) -> None:
+    """out[begin …] += vectors, but for some of the first values."""
+    skipped = everywhere(builder, skipped)
+    for k, vector in enumerate(vectors):
+        pointer = builder.gep(out, [builder.add(begin, constant(k * LANES))])
+        pointer = builder.bitcast(pointer, WIDE.as_pointer())
+        lanes = ir.Constant(ir.VectorType(PLACE, LANES), [k * LANES + lane for lane in range(LANES)])
+        dark = ir.Constant(WIDE, [0.0] * LANES)
+        fresh = builder.select(builder.icmp_signed(">=", lanes, skipped), vector, dark)
+        builder.store(builder.fadd(builder.load(pointer, align=4), fresh, flags=FLAGS), pointer, align=4)
+
+
+weigh_rows = _weigher(VECTORS, parted=False)
+weigh_parted_rows = _weigher(3, parted=True)
