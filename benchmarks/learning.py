@@ -18,14 +18,17 @@ import platform
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numba
 import numpy as np
 import torch
-from backwards import THREADS, Case, Step, light_field, timed
+from backwards import SHAPE, THREADS, Case, Step, light_field, timed
 
 import vcc
+from vcc.engines import numba_cpu
 from vcc.torch import CameraModule, sigmoid_mask
 from vcc.units import mm
 
@@ -123,6 +126,31 @@ def masks(place: str) -> Case:
             f"{MASKS} masks and back": lambda: model(values={"code.pattern": with_gradient}).sum().backward(),
         },
         "capture of one",
+    )
+
+
+def at_once(kind: str, shape: tuple[int, ...], place: str) -> Case:
+    """Rasters of several masks in one pass over the samples, without plans and what is done to pictures."""
+    values = np.random.default_rng(0).integers(0, 256, shape, dtype=np.uint8)
+    values = values if kind == "uint8" else values.astype(np.float32) / np.float32(255)
+    size = shape[2]
+    field = vcc.LightField.from_views(values, 1 * mm, 24 * mm / (52 * mm) / size, 1.3, disparity_range=(-0.5, 0.5))
+    sensor = vcc.Sensor(z=52 * mm, shape=(size, size), pitch=24 * mm / size * 0.93)
+    mask = [vcc.Mask(np.full((1000, 1000), 0.5), width=30 * mm, z=40 * mm)] if place == "in mid-path" else []
+    core = vcc.Camera([vcc.Lens(50 * mm), *mask], sensor).compile(field).core
+    draw = np.random.default_rng(3)
+    if mask:
+        textures = [draw.random(core.masks[0].texture.shape) for _ in range(MASKS)]
+        cores = [replace(core, masks=(replace(core.masks[0], texture=texture),)) for texture in textures]
+    else:
+        cores = [replace(core, weights=draw.random(core.weights.shape)) for _ in range(MASKS)]
+    return Case(
+        f"rasters of {MASKS} masks {place}, {kind}, {'×'.join(map(str, shape))}",
+        {
+            "one": lambda: numba_cpu.footprints(cores[0], values, threads=THREADS),
+            f"{MASKS} in one pass": lambda: numba_cpu.together(cores, values, threads=THREADS),
+        },
+        "one",
     )
 
 
@@ -225,6 +253,10 @@ def main() -> None:
         "masks, views": lambda: masks("at the views"),
         "masks, mid-path": lambda: masks("in mid-path"),
     }
+    for size, shape in (("large", SHAPE), ("small", (9, 9, 200, 200, 3))):
+        for kind in ("float32", "uint8"):
+            for place in ("at the views", "in mid-path"):
+                cases[f"at once, {size}, {kind}, {place}"] = partial(at_once, kind, shape, place)
     for name, case in cases.items():
         if name.startswith(given.case):
             timed(case(), given.rounds)

@@ -104,6 +104,17 @@ def test_many_masks_on_one_light_field():
     assert model(samples_of(2), values={"code.pattern": masks}).shape == (3, 2, 7, 8)
 
 
+@pytest.mark.parametrize("z", [0.0, 2 * mm])
+def test_many_masks_are_the_pictures_of_each(z):
+    model = module(["code.pattern"], vcc.Camera([LENS, replace(CODE, z=z)], SENSOR))
+    masks = torch.rand(5, 3, 4, dtype=torch.float64)
+    pictures = model(values={"code.pattern": masks})
+    for picture, mask in zip(pictures, masks, strict=True):
+        alone = model(values={"code.pattern": mask})
+        # Single precision, added up in another order.
+        torch.testing.assert_close(picture, alone, rtol=0, atol=1e-6 * alone.max().item())
+
+
 # --- gradients ---
 
 

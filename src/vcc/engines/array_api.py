@@ -63,6 +63,10 @@ def footprints_back(core: Footprints, values: Any, raster: Any, **options: Any) 
 rays_back = footprints_back
 
 
+def together(cores: Any, values: Any, **options: Any) -> None:
+    """None: several cores run one after the other; see `vcc.plan.protocol.Engine`."""
+
+
 def prepared(before: Sequence[operators.Before], values: Any, threads: int) -> Any:
     """Samples as a core takes them."""
     for operator in before:

@@ -33,7 +33,8 @@ FEWEST = 2
 def differing_mask(cores: Sequence[Footprints]) -> int | None:
     """What rasters that can be made at once differ in: −1 the weights of views, or n the texture of mask n.
 
-    None where they cannot: they can where rows and columns part and samples are not divided, and where nothing else differs.
+    None where they cannot: they can where rows and columns part, where samples are not divided, and where nothing
+    else differs.
     """
     first = cores[0]
     if len(cores) < FEWEST or not first.separable or first.refine > 1:

@@ -37,9 +37,9 @@ _inlined = compiled(fastmath=_FAST, inline="always")
 def add_column_of_views(samples, a, footprints, weights, masks, band, tiles):  # type: ignore[no-untyped-def]
     """Add column a of view taps to a band of several rasters, which weigh its taps otherwise.
 
-    samples: `Samples`. footprints: `Footprints`, whose weights are 0 of taps that no raster adds. weights: (rasters
-    and some of zero to a multiple of four, rows of taps) float32. masks: `MaskLines`, or None. tiles: (rasters, rows
-    / 8, columns · channels, 8).
+    samples: `Samples`. footprints: `Footprints`, whose weights are 0 of taps that no raster adds. weights:
+    (rasters, and some of zero to a multiple of four; rows of taps) float32. masks: `MaskLines`, or None. tiles:
+    (rasters, rows / 8, columns · channels, 8).
     """
     looked_at, rows, (first_column, column_shares) = footprints
     values, begin, further, pitch, channels = samples
@@ -118,7 +118,7 @@ def _sum_view(  # type: ignore[no-untyped-def]
                 places[entry] = begin + (top + entry) * pitch
                 r = lowest[entry]
                 ranges[entry] = -1 if r < 0 else r * ROWS - r * (r + 1) // 2 + highest[entry]
-                if masks is not None:  # noqa: SIM102  (told apart when compiled)
+                if masks is not None:  # told apart when compiled
                     if masks_at(masks, b, top + entry, entry, weighed):
                         _moved(weighed, entry, low // repeat)
                     else:
@@ -191,6 +191,8 @@ def add_column_of_textures(samples, a, footprints, met, masks, band, tiles):  # 
                         low = min(low, met.begin[b] + max(r - 1, 0))
                         high = max(high, met.begin[b] + min(r + 1, met.rows - 1))
                         listed += 1
+                if listed == 0:
+                    continue
                 count = high - low + 1
                 for four in range(0, count, ROWS):
                     _reach(line_of, three, listed, low + four, entries, ranges, reached)
@@ -220,7 +222,7 @@ def add_column_of_textures(samples, a, footprints, met, masks, band, tiles):  # 
 
 @_inlined
 def _reach(line_of, three, listed, low, entries, ranges, reached):  # type: ignore[no-untyped-def]
-    """List the rows of samples that reach any of four lines from ``low`` on, by which of them, with their shares."""
+    """List the rows of samples that reach any of four lines from ``low`` on, sorted by which of them."""
     order, ends, _, share = entries
     count = 0
     ends[:] = 0

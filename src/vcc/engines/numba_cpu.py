@@ -26,6 +26,7 @@ from vcc.engines.footprint_columns import ByColumns, band_height, bands
 from vcc.engines.footprint_numbers import numbers_back
 from vcc.engines.footprint_samples import FineGrid, textures
 from vcc.engines.footprints_back import samples_back
+from vcc.engines.footprints_of_many import rasters
 from vcc.engines.ray_numbers import ray_numbers_back
 from vcc.engines.vector_sums import EIGHT
 from vcc.plan import operators
@@ -55,6 +56,20 @@ def footprints(
         else:
             raster = _sheared(core, values, channels, pool, progress)
     return Partial(raster.reshape(*core.raster_shape, channels))
+
+
+def together(
+    cores: Sequence[Footprints | Rays], values: NDArray[Any], *, threads: int, progress: Progress | None = None
+) -> list[Partial] | None:
+    """The rasters of several cores in one pass over the samples; see `vcc.plan.protocol.Engine`.
+
+    Of footprints that differ only in the weights of views or in the texture of one mask, where rows and columns
+    part and samples are not divided.
+    """
+    if not all(isinstance(core, Footprints) for core in cores):
+        return None
+    made = rasters(cores, values, threads, progress)  # type: ignore[arg-type]
+    return None if made is None else [Partial(raster) for raster in made]
 
 
 def footprints_back(

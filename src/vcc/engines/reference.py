@@ -86,6 +86,10 @@ def rays_back(
     )
 
 
+def together(cores: Any, values: Any, **options: Any) -> None:
+    """None: several cores run one after the other; see `vcc.plan.protocol.Engine`."""
+
+
 def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:
     """Samples as a core takes them, filtered in double precision; bytes are sharpened exactly."""
     for operator in before:

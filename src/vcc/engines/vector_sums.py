@@ -230,9 +230,9 @@ def _whole_rows(vectors: int, repeat: int | None = None, parted: bool = False) -
     def sum_whole_rows(typing_context, values, entries, masks, sums, to, length):  # type: ignore[no-untyped-def]
         """sums[r, to + x] = Σ shares[e, r] · values[places[e] + x], for r = 0 … 3 and all x of a row.
 
-        Where sums are parted, each run of ``RUN_OF_THREES`` values has the sums of the first channel of its pixels,
-        then those of the second and the third; and each begins behind the one before it, though the values of the
-        last begin earlier, so as to end with the row.
+        Where sums are parted, each run of ``RUN_OF_THREES`` values has the sums of the first channel of its
+        pixels, then those of the second and the third; and each begins behind the one before it, though the values
+        of the last begin earlier, so as to end with the row.
 
         Args:
             typing_context: Numba's.

@@ -1,4 +1,4 @@
-"""Rows of sums weighed by lines of several masks at once, as vector instructions; see `vcc.engines.vector_sums`."""
+"""Rows of sums weighed by lines of several masks at once, as vector instructions (`vcc.engines.vector_sums`)."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Gradient, Partial
 from vcc.run.backwards import Backwards
-from vcc.run.drive import Drive
+from vcc.run.drive import Drive, rounds_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,49 +78,55 @@ def pictures(
     Returns:
         (…, rows, columns[, channels]), the axis of cameras before those of the light fields.
     """
-    if not several:
-        return _Pictures.apply(_Call(work, tuple(numbers)), samples, *numbers.values())
-    count = len(numbers[next(iter(several))])
-    each = (
-        {name: value[n] if name in several else value for name, value in numbers.items()} for n in range(count)
-    )
-    return torch.stack([pictures(work, samples, one, ()) for one in each])
+    return _Pictures.apply(_Call(work, tuple(numbers), several), samples, *numbers.values())
 
 
 class _Call:
-    """Pictures by one plan, and what the way back needs of them.
+    """Pictures by one plan or several, and what the way back needs of them.
 
     Args:
         work: camera and light field.
         names: of the parameters, in the order in which their numbers are given.
+        several: those whose numbers have an axis of cameras in front.
     """
 
-    def __init__(self, work: Work, names: tuple[str, ...]) -> None:
-        self.work, self.names = work, names
-        self.ahead: list[tuple[Drive, Partial]] = []
+    def __init__(self, work: Work, names: tuple[str, ...], several: Collection[str]) -> None:
+        self.work, self.names, self.several = work, names, several
+        self.ahead: list[list[tuple[Drive, Partial]]] = []  # by light field and camera
+
+    def _cameras(self, numbers: Mapping[str, NDArray[np.float64]]) -> list[dict[str, NDArray[np.float64]]]:
+        """The numbers of each camera; of one where no number has an axis of them."""
+        count = len(numbers[next(iter(self.several))]) if self.several else 1
+        return [
+            {name: value[n] if name in self.several else value for name, value in numbers.items()}
+            for n in range(count)
+        ]
 
     def made(
         self, samples: torch.Tensor | None, numbers: Mapping[str, NDArray[np.float64]]
     ) -> NDArray[np.floating]:
-        """The pictures, (…, rows, columns[, channels])."""
-        plan = self.work.chain.plan(numbers)
-        grid = self.work.light_field.grid
-        if samples is None:
-            return self._picture(plan, self.work.light_field)
-        values = samples.detach().numpy()
-        kept = replace(grid, kind=values.dtype)
-        lead = values.shape[: values.ndim - len(grid.shape)]
-        made = [self._picture(plan, InMemory.of(one, kept)) for one in values.reshape(-1, *grid.shape)]
-        return np.stack(made).reshape(*lead, *made[0].shape) if lead else made[0]
+        """The pictures, (…, rows, columns[, channels]), the axis of cameras before those of the light fields."""
+        plans = [self.work.chain.plan(one) for one in self._cameras(numbers)]
+        field = self.work.light_field
+        fields, lead = [field], ()
+        if samples is not None:
+            values, shape = samples.detach().numpy(), field.grid.shape
+            kept = replace(field.grid, kind=values.dtype)
+            fields = [InMemory.of(one, kept) for one in values.reshape(-1, *shape)]
+            lead = values.shape[: values.ndim - len(shape)]
+        found = np.stack([self._pictures(plans, one) for one in fields], axis=1)
+        cameras = (len(plans),) if self.several else ()
+        return found.reshape(*cameras, *lead, *found.shape[2:])
 
-    def _picture(self, plan: Plan, samples: Samples) -> NDArray[np.floating]:
-        drive = Drive.of_linear(plan, samples, self.work.how)
-        found = drive.rounds()
-        self.ahead.append((drive, found))
-        picture: NDArray[np.floating] = drive.engine.finished(plan.after, found.values, drive.threads)
-        if not np.isfinite(picture).all():
+    def _pictures(self, plans: Sequence[Plan], samples: Samples) -> NDArray[np.floating]:
+        """The pictures of a light field by several plans, which read it once where they can."""
+        drives = [Drive.of_linear(plan, samples, self.work.how) for plan in plans]
+        found = rounds_of(drives)
+        self.ahead.append(list(zip(drives, found, strict=True)))
+        pictures = np.stack([drive.picture(each) for drive, each in self.ahead[-1]])
+        if not np.isfinite(pictures).all():
             _refuse(samples)
-        return picture if samples.grid.channels is not None else picture[..., 0]
+        return pictures
 
     def back(
         self, weights: NDArray[np.floating], samples: bool, wanted: Collection[str], numbers: Mapping[str, Any]
@@ -131,19 +137,29 @@ class _Call:
             weights: of the pictures.
             samples: whether the derivative to them is wanted.
             wanted: names of parameters.
-            numbers: of all parameters, at which the plan was made.
+            numbers: of all parameters, at which the plans were made.
         """
-        chain = self.work.chain
+        chain, cameras = self.work.chain, self._cameras(numbers)
         of_plan = {number for name in wanted for number in self.work.followed[name]}
-        total, parts = Gradient(), []
-        each = weights.reshape(len(self.ahead), *weights.shape[weights.ndim - len(self.work.picture_shape) :])
-        for one, (drive, found) in zip(each, self.ahead, strict=True):
-            part = Backwards(drive, of_plan).gradient(one, samples_wanted=samples, found=found)
-            parts.append(part.samples)
-            total = total + replace(part, samples=None)
-        pulled = chain.pull(numbers, total.numbers, wanted) if wanted else {}
-        whole = parts[0] if len(parts) == 1 else np.stack(parts)  # one alone, often large, is not copied
-        return whole if samples else None, pulled
+        lead = weights.ndim - len(self.work.picture_shape)
+        each = weights.reshape(len(cameras), len(self.ahead), *weights.shape[lead:])
+        of_fields: list[Any] = [0] * len(self.ahead)
+        pulled: list[dict[str, Any]] = []
+        for n, one in enumerate(cameras):
+            total = Gradient()
+            for m, ahead in enumerate(self.ahead):
+                drive, found = ahead[n]
+                part = Backwards(drive, of_plan).gradient(each[n, m], samples_wanted=samples, found=found)
+                if samples:
+                    of_fields[m] = part.samples if n == 0 else of_fields[m] + part.samples
+                total = total + replace(part, samples=None)
+            pulled.append(chain.pull(one, total.numbers) if wanted else {})
+        return np.stack(of_fields) if samples else None, {
+            name: np.stack([one[name] for one in pulled])
+            if name in self.several
+            else sum(one[name] for one in pulled)
+            for name in wanted
+        }
 
 
 def _refuse(samples: Samples) -> None:

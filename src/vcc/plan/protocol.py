@@ -155,6 +155,23 @@ class Engine(Protocol):
     double: bool
     """Whether it computes floating-point samples in double precision, and gives pictures in it."""
 
+    def together(
+        self, cores: Sequence[Any], values: Any, *, threads: int, progress: Progress | None = None
+    ) -> list[Partial] | None:
+        """The rasters of the same samples by several cores, where this takes less than one after the other.
+
+        Args:
+            cores: what is computed.
+            values: the samples.
+            threads: how many work at once.
+            progress: called with (done, total).
+
+        Returns:
+            One for each core; None where the cores differ in more than this engine can share, which is left to who
+            asks.
+        """
+        ...
+
     def prepared(self, before: Sequence[Any], values: Any, threads: int) -> Any:
         """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it."""
         ...

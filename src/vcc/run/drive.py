@@ -9,7 +9,7 @@ each the share that is there, and each block meets the same rays.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -76,6 +76,26 @@ def drive(plan: Plan, samples: Samples, how: How | None = None, progress: Progre
             damaged, or a memory limit that is too small.
     """
     return Drive(plan, samples, how or How()).recorded(progress)
+
+
+def rounds_of(drives: Sequence[Drive]) -> list[Partial]:
+    """The rasters of several plans of one light field, read once where an engine can share it.
+
+    It can where the samples are in memory as a whole, the same is done to them before, and the cores differ in one
+    mask alone (see `vcc.plan.protocol.Engine.together`); else one after the other.
+
+    Args:
+        drives: plans on their way through one engine, with the same samples.
+    """
+    first = drives[0]
+    whole = first.in_memory and first.how.tolerance is None and len(list(first.blocks)) == 1
+    if len(drives) > 1 and whole and all(drive.plan.before == first.plan.before for drive in drives):
+        found = first.engine.together([drive.core for drive in drives], first.prepared, threads=first.threads)
+        if found is not None:
+            for drive in drives:
+                drive.prepared = first.prepared  # once for all, for the way back, too
+            return found
+    return [drive.rounds() for drive in drives]
 
 
 class Drive:

@@ -1,0 +1,91 @@
+"""Several rasters in one pass over the samples: each is what its own core makes of them.
+
+Sums are taken in another order: single precision rounds each to 6e-8 of itself, and hundreds of positive ones to
+less than 1e-6 of the largest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_footprint_numbers import Drawn
+
+from vcc.engines import array_api, numba_cpu, reference
+from vcc.engines.many_kernels import SPAN
+from vcc.plan.footprints.model import Footprints
+
+AGREEMENT = 1e-6
+COUNT = 5
+"""More than are weighed at once."""
+
+PLANS = {
+    "one mask": Drawn(masks=1),
+    "two masks, one channel": Drawn(masks=2, channels=None, interpolation="cubic"),
+    "two masks, two channels": Drawn(masks=2, channels=2, seed=1),
+    "rows of some spans": Drawn(masks=2, samples=(20, SPAN), seed=2),
+    "large samples": Drawn(masks=1, step=3.3, samples=(14, 30), opening=0.7, seed=3),
+}
+
+
+def with_other_weights(core: Footprints) -> list[Footprints]:
+    """Each opens and closes other taps; one opens none."""
+    draw = np.random.default_rng(5)
+    several = [draw.random(core.weights.shape) * draw.integers(0, 2, core.weights.shape) for _ in range(COUNT)]
+    several[2] *= 0
+    return [replace(core, weights=weights) for weights in several]
+
+
+def with_other_textures(core: Footprints, n: int) -> list[Footprints]:
+    draw = np.random.default_rng(6)
+    masks = [replace(core.masks[n], texture=draw.random(core.masks[n].texture.shape)) for _ in range(COUNT)]
+    return [replace(core, masks=(*core.masks[:n], mask, *core.masks[n + 1 :])) for mask in masks]
+
+
+def assert_each_as_alone(cores: list[Footprints], values: np.ndarray) -> None:
+    found = numba_cpu.together(cores, values, threads=1)
+    again = numba_cpu.together(cores, values, threads=3)
+    assert found is not None
+    assert again is not None
+    largest = 0.0
+    for core, one, other in zip(cores, found, again, strict=True):
+        alone = numba_cpu.footprints(core, values, threads=2).values
+        assert one.values.shape == alone.shape
+        assert one.values.tobytes() == other.values.tobytes()
+        assert np.abs(one.values - alone).max() <= AGREEMENT * np.abs(alone).max()
+        largest = max(largest, np.abs(alone).max())
+    assert largest > 0
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_codes_at_the_views(name: str) -> None:
+    core, values = PLANS[name].core(), PLANS[name].values()
+    assert_each_as_alone(with_other_weights(core), values)
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_textures_of_a_mask(name: str) -> None:
+    core, values = PLANS[name].core(), PLANS[name].values()
+    assert_each_as_alone(with_other_textures(core, len(core.masks) - 1), values)
+
+
+def test_codes_without_masks_in_mid_path() -> None:
+    drawn = Drawn(masks=0, kind="uint8")
+    assert_each_as_alone(with_other_weights(drawn.core()), drawn.values())
+
+
+def test_what_differs_in_more_runs_one_after_the_other() -> None:
+    drawn = Drawn(masks=2)
+    core, values = drawn.core(), drawn.values()
+    textures = with_other_textures(core, 0)
+    assert numba_cpu.together([core], values, threads=1) is None
+    both = [*textures, *with_other_textures(core, 1)]
+    assert numba_cpu.together(both, values, threads=1) is None
+    assert numba_cpu.together([core, replace(core, scale=2.0)], values, threads=1) is None
+    assert numba_cpu.together([*textures, with_other_weights(core)[0]], values, threads=1) is None
+    for other in (Drawn(refine=3), Drawn(shear=0.1)):
+        apart = with_other_weights(other.core())
+        assert numba_cpu.together(apart, other.values(), threads=1) is None
+    for engine in (reference, array_api):
+        assert engine.together(textures, values, threads=1) is None
