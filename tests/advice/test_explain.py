@@ -36,6 +36,15 @@ def test_it_shows_itself_plainly_at_the_prompt():
     assert explanation.expected_seconds > 0
 
 
+def test_it_speaks_of_a_light_field_whose_view_is_a_direction():
+    # Places along (s, t) of the samples, slopes along (u, v): parallel rays, as behind a display.
+    rays = vcc.Affine.from_parts([[0, 0, 1e-3, 0], [0, 0, 0, 1e-3], [1e-6, 0, 0, 0], [0, 1e-6, 0, 0]], [0.0] * 4)
+    field = vcc.LightField(np.ones((1, 1, 9, 9)), rays, disparity_range=(0, 0))
+    layers = [vcc.Mask(np.ones((6, 6)), width=5 * mm, z=z) for z in (0.0, 6 * mm)]
+    train = vcc.Camera(layers, vcc.Sensor(z=6 * mm, shape=(5, 5), pitch=1 * mm))
+    assert "mask" in train.explain(field, method="rays")
+
+
 def test_its_lines_fit_a_terminal():
     fine = vcc.Mask(np.random.default_rng(1).random((200, 200)).round(), width=17 * mm, z=51.8 * mm)
     lines = camera(vcc.Lens(50 * mm, diameter=12 * mm), fine).explain(light_field()).splitlines()

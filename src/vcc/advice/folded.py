@@ -128,7 +128,11 @@ class Folded:
             return self.views
         across, down = np.linalg.norm(self.frame.linear[:2, :2], axis=0)
         rows, columns = self.views
-        return min(rows, enough(2 * self.stop / down)), min(columns, enough(2 * self.stop / across))
+        # Views that are directions all come in where any does.
+        return (
+            min(rows, enough(2 * self.stop / down)) if down > 0 else rows,
+            min(columns, enough(2 * self.stop / across)) if across > 0 else columns,
+        )
 
     @property
     def half_width(self) -> float | None:
