@@ -144,11 +144,16 @@ def at_once(kind: str, shape: tuple[int, ...], place: str) -> Case:
         cores = [replace(core, masks=(replace(core.masks[0], texture=texture),)) for texture in textures]
     else:
         cores = [replace(core, weights=draw.random(core.weights.shape)) for _ in range(MASKS)]
+    times = max(1, 2**28 // values.size)  # long enough for the processor's time to be told
+
+    def several(step: Step) -> Step:
+        return lambda: [step() for _ in range(times)]
+
     return Case(
-        f"rasters of {MASKS} masks {place}, {kind}, {'×'.join(map(str, shape))}",
+        f"{times} times rasters of {MASKS} masks {place}, {kind}, {'×'.join(map(str, shape))}",
         {
-            "one": lambda: numba_cpu.footprints(cores[0], values, threads=THREADS),
-            f"{MASKS} in one pass": lambda: numba_cpu.together(cores, values, threads=THREADS),
+            "one": several(lambda: numba_cpu.footprints(cores[0], values, threads=THREADS)),
+            f"{MASKS} in one pass": several(lambda: numba_cpu.together(cores, values, threads=THREADS)),
         },
         "one",
     )
