@@ -243,6 +243,32 @@ def test_scipy_gets_a_matrix():
     np.testing.assert_array_equal(linear @ np.ones(op.shape[1], int), op(np.ones(op.samples_shape)).reshape(-1))
 
 
+def test_jax_differentiates_by_callbacks():
+    """As docs/operator.md shows it. Oracles: the operator itself, and its adjoint of what it gives."""
+    jax = pytest.importorskip("jax")
+    op = operator("fine mask", light_field("float32", 2))
+
+    def called(verb, shape):
+        made = jax.ShapeDtypeStruct(shape, op.dtype)
+        return lambda given: jax.pure_callback(
+            lambda array: verb(np.array(array)), made, given, vmap_method="sequential"
+        )
+
+    picture_of = jax.custom_vjp(called(op, op.picture_shape))
+    picture_of.defvjp(
+        lambda samples: (picture_of(samples), None),
+        lambda _, weights: (called(op.T, op.samples_shape)(weights),),
+    )
+    several = np.random.default_rng(6).random((2, *op.samples_shape), np.float32)
+    np.testing.assert_array_equal(jax.jit(jax.vmap(picture_of))(several), op(several))
+    energy = jax.grad(lambda samples: (picture_of(samples) ** 2).sum() / 2)
+    for gradient in (energy, jax.jit(energy)):
+        expected = op.T(op(several[0]))
+        np.testing.assert_allclose(gradient(several[0]), expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+    with pytest.raises(Exception, match="samples are finite numbers; at "):
+        jax.jit(picture_of)(several[0] * np.nan).block_until_ready()
+
+
 def test_without_deepinv_its_extra_is_named(monkeypatch, tmp_path):
     op = operator("fine mask")
     monkeypatch.delitem(sys.modules, "vcc.run.torch_physics", raising=False)
