@@ -167,6 +167,7 @@ def test_compiled_rays_agree_with_the_reference(name):
     What is nothing but rounding of the picture when a number is changed by a share of itself may differ.
     """
     core, values, raster = case(name)
+    values = values.astype(np.float32)
     names, size = wanted(core), np.abs(reference.rays(core, values, threads=1).values * raster).sum()
     right = ray_numbers_back(core, values, raster, names, beside=1)
     told = ray_numbers.ray_numbers_back(core, values, raster, names, beside=1, threads=2)
@@ -183,7 +184,7 @@ def test_any_number_of_threads_makes_the_same_bytes():
     core, _, _ = case("zeros and cosines")
     random = np.random.default_rng(1)
     core = replace(core, raster_shape=(70, 40), samples=2)
-    values, raster = random.random(core.views), random.standard_normal((70, 40, 1))
+    values, raster = random.random(core.views, np.float32), random.standard_normal((70, 40, 1))
     names = wanted(core)
     one, two, three = (
         ray_numbers.ray_numbers_back(core, values, raster, names, threads=threads) for threads in (1, 2, 3)

@@ -146,6 +146,7 @@ def test_blocks_with_borders_give_what_the_whole_gives(engine, between):
 def test_samples_and_numbers_count_to_one_total(engine):
     core = made(vcc.Camera([LENS], SENSOR), field_of((3, 3, 9, 11)))
     samples, weights = drawn(core, ())
+    samples = samples.astype(np.float32)
     calls: list[tuple[int, int]] = []
     back = engine.rays_back(
         core, samples, weights, wanted=["scale"], threads=1, progress=lambda *call: calls.append(call)

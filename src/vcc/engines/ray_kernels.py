@@ -2,7 +2,8 @@
 
 One kernel serves every camera: what a ray meets comes as a list of numbers (`vcc.plan.rays.steps`), read step by
 step for a packet of rays at a time, so that reading the list costs nothing and the arithmetic runs on several
-rays at once. A packet holds the rays of one pixel.
+rays at once. A packet holds the rays of one pixel. Its stages are functions of their own, compiled once for all
+kernels that trace rays and for all types of samples: inlined in each, they took three times as long to compile.
 """
 
 from __future__ import annotations
@@ -90,7 +91,7 @@ def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
     )
 
 
-@_inlined
+@_compiled
 def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     """Take a packet of rays through all steps.
 
@@ -365,7 +366,7 @@ def fold_lanes(sums, channels):  # type: ignore[no-untyped-def]
                 sums[half, channel] += sums[half, channels + channel]
 
 
-@_inlined
+@_compiled
 def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
     """Replace the places and slopes of n rays by their indices (i, j, k, l), by a 4×5 matrix."""
     x, y, s, t, _ = rays
@@ -422,7 +423,7 @@ def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
     return kinds[r, c, 0], kinds[r, c, 1], kinds[r, c, 2]
 
 
-@_inlined
+@_compiled
 def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
     """Fill ``near`` with the (row, column) of the cells through which a pixel sees the stop; returns how many."""
     beyond, from_sensor, from_slope = cells.beyond, cells.beyond_from_sensor, cells.beyond_from_slope
@@ -457,7 +458,7 @@ def unit(point, flipped):  # type: ignore[no-untyped-def]
     return (np.float64(np.int32(point * DIGITS_ABOVE) ^ flipped) + 0.5) * DIGITS_BELOW
 
 
-@_inlined
+@_compiled
 def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
     """Places of a packet's rays over the sensitive area of a pixel."""
     points, start, n, flipped = drawn
@@ -469,7 +470,7 @@ def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
         y[p] = middle_y + (unit(points[1, start + p], down) - 0.5) * high
 
 
-@_inlined
+@_compiled
 def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays towards a window, making up for diffusers; see `vcc.plan.rays.windows.Window`."""
     points, start, n, flipped = drawn
@@ -499,7 +500,7 @@ def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
             t[p] += g0 * a + g1 * b
 
 
-@_inlined
+@_compiled
 def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays through what of a cell the stop is seen through; see `CellWindows.aimed`.
 

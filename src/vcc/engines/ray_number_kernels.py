@@ -39,9 +39,6 @@ from vcc.engines.ray_tables import Drawn, Packet, Steps
 _compiled = compiled(fastmath={"contract", "nsz", "reassoc"})
 _inlined = compiled(fastmath={"contract", "nsz", "reassoc"}, inline="always")
 
-take_step = _compiled(take_steps.py_func)
-"""Not inlined, as only one step is taken at a time: that would take longer to compile than all else here."""
-
 
 @_inlined
 def packet_of(numbers):  # type: ignore[no-untyped-def]
@@ -67,7 +64,7 @@ def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyp
             column, row = math.floor((before[0, p] - f[0]) * f[2]), math.floor((before[1, p] - f[1]) * f[3])
             lit[p] *= (column >= 0) & (column < a[1]) & (row >= 0) & (row < a[0])
     one = Steps(codes[number : number + 1], whole[number : number + 1], real[number : number + 1], shares, slopes)
-    take_step(one, drawn, packet_of(behind))
+    take_steps(one, drawn, packet_of(behind))
     if hole:
         for p in range(n):
             lit[p] *= behind[4, p]
