@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from vcc.recover.plenoptic import LensletGrid
 
@@ -17,15 +18,15 @@ def example():
 
 
 def test_half_a_lenslet_and_one_per_cent_come_back(example):
-    """With noise. In the middle of eight recordings the largest distance was SPREAD, and LIMIT pixel at most."""
-    found, recording, wanted = example["simulated"](lenslets=8, samples=8, seed=0)
+    """With noise and few rays; of eight seeds the worst is 0.034 pixel off."""
+    found, recording, wanted = example["simulated"](lenslets=8, samples=8, seed=3)
     errors = [
         example["apart"](LensletGrid.of_camera(each), wanted, recording.shape)[1]
         for each in (*found.before, found.camera)
     ]
     assert errors[0] > 5  # of 9 pixels a lenslet
-    assert errors[1] < 4.5  # the right minimum
-    assert errors[2] < 0.03
+    assert errors[1] < 3  # pitch and rotation are still off
+    assert errors[2] < 0.05
 
 
 def test_distances_of_centres_are_those_of_grids_that_were_moved(example):
@@ -35,8 +36,6 @@ def test_distances_of_centres_are_those_of_grids_that_were_moved(example):
 
 
 def test_exposure_may_vary_slowly(example):
-    import torch
-
     picture = np.random.default_rng(1).random((20, 24))
     y, x = np.mgrid[:20, :24]
     misfit = example["Misfit"](picture * (3 + 0.02 * x - 0.001 * x * y))
