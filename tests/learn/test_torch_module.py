@@ -23,7 +23,7 @@ from vcc.units import mm, ms
 RANDOM = np.random.default_rng(0)
 SHAPE = (5, 4, 9, 10)
 FIELD = vcc.LightField.from_views(
-    RANDOM.random(SHAPE), 1.5 * mm, 5e-3, 1.0, disparity_range=(-0.3, 0.4), sample="point"
+    RANDOM.random(SHAPE).astype(np.float32), 1.5 * mm, 5e-3, 1.0, disparity_range=(-0.3, 0.4), sample="point"
 )
 CELLS = RANDOM.uniform(0.3, 0.7, (3, 4))
 LENS = vcc.Lens(50 * mm, diameter=5 * mm, name="main")
