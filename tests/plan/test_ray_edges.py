@@ -53,6 +53,24 @@ def test_cells_that_are_aimed_at_one_by_one_have_no_border():
     assert edges_that_cut(core(array, samples=2)) == ('a border between cells of lens array "array"',)
 
 
+def test_a_stop_that_cells_image_within_a_pixel_is_an_edge():
+    # Parallel light comes from the stop, 200 mm before the relay lens, and lenslets gather it in their focus.
+    elements = [
+        vcc.Lens(1e9, diameter=8 * mm, name="main"),
+        vcc.Lens(200 * mm, z=200 * mm, name="relay"),
+        vcc.LensArray(1 * mm, 2.5 * mm, z=400 * mm, name="array", rotation=1e-4),
+    ]
+    light_field = vcc.LightField.from_views(np.ones((9, 9, 20, 20), np.float32), 1.2 * mm, 4e-3)
+    sharp = vcc.Camera(elements, vcc.Sensor(402.5 * mm, (36, 36), 0.1 * mm)).compile(light_field, method="rays")
+    assert [words for words in edges_that_cut(sharp.core) if "image sharply" in words]
+    assert not [words for words in edges_that_cut(sharp.core, ["scale"]) if "image sharply" in words]
+    # With f-numbers that match, a micro-image is blurred by a good part of a pixel.
+    plenoptic = vcc.Camera.plenoptic(
+        50 * mm, lenslet_pitch=0.1 * mm, f_number=4, pixels_per_lenslet=9, lenslets=(10, 10)
+    )
+    assert edges_that_cut(plenoptic.compile(light_field).core) == ()
+
+
 def test_only_what_is_met_later_is_moved_against_an_edge():
     """From the sensor on: the diffuser, the mask with an edge, the biprism with another, the lens's rim."""
     met = core(

@@ -16,7 +16,7 @@ from vcc.base.errors import InputError
 from vcc.plan.rays import steps
 from vcc.plan.rays.model import Cell, Rays
 from vcc.plan.rays.steps import Bundle, Step
-from vcc.plan.rays.windows import Window
+from vcc.plan.rays.windows import CellWindows, Window
 
 EDGES: dict[type, tuple[str, ...]] = {
     steps.Disc: ("middle", "radius"),
@@ -36,6 +36,9 @@ PIXELS = 16
 """Pixels a side of the sensor whose rays tell."""
 RAYS = 32
 """Rays of each of them."""
+SHARP = 1 / 16
+"""Share of a pixel over which the rim of a stop may be seen at least: of 64 rays, evenly spread, half a column
+lies there. What fewer rays say of it is noise, or nothing."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,10 @@ def _edges(core: Rays, pixels: int) -> list[_Edge]:
     pixel = (rows[:, None] * core.raster_shape[1] + columns).reshape(-1)
     rays, cells = core.aimed(pixel, core.block(pixel))
     found = []
+    if isinstance(core.aim, CellWindows) and _images_its_stop(core, core.aim):
+        lit = rays.share > 0
+        if (lit.any(axis=-1) & ~lit.all(axis=-1)).any():
+            found.append(_Edge(0, f"the rim of {core.aim.words}, which cells image sharply within a pixel"))
     for n, step in enumerate(core.steps):
         before = replace(rays)
         step(rays)
@@ -139,6 +146,17 @@ def _edges(core: Rays, pixels: int) -> list[_Edge]:
     if not core.between_views and len(view) and np.ptp(view, axis=0).any():
         found.append(_Edge(len(core.steps), "the borders between the views"))
     return found
+
+
+def _images_its_stop(core: Rays, aim: CellWindows) -> bool:
+    """Whether cells image the rim of their stop on the sensor within so little of a pixel that few rays show it.
+
+    Seen from places of a pixel, the stop comes into a cell's opening over this share of the pixel's width.
+    """
+    sight = aim.sight
+    gain = np.abs(sight.beyond + aim.cells.powers.reshape(-1, 1) * sight.beyond_from_slope)
+    across = 2 * gain * aim.opening.half / (np.abs(sight.beyond_from_sensor) * np.array(core.sensitive))
+    return bool((across < SHARP).any())
 
 
 def _cut(step: Step, before: Bundle, behind: Bundle, cells: Cell | None) -> str:
