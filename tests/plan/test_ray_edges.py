@@ -68,7 +68,7 @@ def test_a_stop_that_cells_image_within_a_pixel_is_an_edge():
     plenoptic = vcc.Camera.plenoptic(
         50 * mm, lenslet_pitch=0.1 * mm, f_number=4, pixels_per_lenslet=9, lenslets=(10, 10)
     )
-    assert edges_that_cut(plenoptic.compile(light_field).core) == ()
+    assert not [words for words in edges_that_cut(plenoptic.compile(light_field).core) if "sharply" in words]
 
 
 def test_only_what_is_met_later_is_moved_against_an_edge():

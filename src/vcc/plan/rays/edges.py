@@ -36,9 +36,9 @@ PIXELS = 16
 """Pixels a side of the sensor whose rays tell."""
 RAYS = 32
 """Rays of each of them."""
-SHARP = 1 / 16
-"""Share of a pixel over which the rim of a stop may be seen at least: of 64 rays, evenly spread, half a column
-lies there. What fewer rays say of it is noise, or nothing."""
+SHARP = 1 / 64
+"""Share of a pixel over which the rim of a stop is to be seen at least: of 64 rays, evenly spread, one lies there.
+What fewer rays say of it is noise, or nothing."""
 
 
 @dataclass(frozen=True)
