@@ -241,6 +241,7 @@ class Pictures(torch.utils.data.Dataset):
             return self.model(samples_of(seed=place))
 
 
+@pytest.mark.filterwarnings("ignore:os.fork.. was called:RuntimeWarning")  # by JAX, where other tests loaded it
 def test_workers_of_a_loader_make_pictures():
     pictures = Pictures(module())
     loader = torch.utils.data.DataLoader(pictures, batch_size=2, num_workers=1, multiprocessing_context="fork")
