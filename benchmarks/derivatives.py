@@ -19,12 +19,12 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "physics"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
-from random_cameras import AFFINE, Case, drawn
 
 import vcc
+from tests.physics.random_cameras import AFFINE, Case, drawn
 from vcc.learn.chain import Chain
 from vcc.learn.parameters import names, read
 from vcc.learn.scales import scale

@@ -16,13 +16,11 @@ import sys
 import warnings
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "physics"))
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "run"))
-
-from dots import dot_error
-from random_cameras import AFFINE, KINDS, drawn
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import vcc
+from tests.physics.random_cameras import AFFINE, KINDS, drawn
+from tests.run.dots import dot_error
 
 LARGEST = {"numba": 1e-6, "reference": 1e-12}
 

@@ -20,12 +20,11 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "physics"))
-
-from laws import LAWS, Check, brute_force
-from random_cameras import BENT, KINDS, drawn
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import vcc
+from tests.physics.laws import LAWS, Check, brute_force
+from tests.physics.random_cameras import BENT, KINDS, drawn
 
 
 def checks(kind: str, seed: int, laws: list[str], by_force: bool) -> Iterator[Check]:

@@ -12,9 +12,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tests.learn.cameras import ELEMENTS
-
 import vcc
+from tests.learn.cameras import ELEMENTS
 from vcc.learn.parameters import names
 from vcc.learn.verdicts import Verdict, verdict
 from vcc.units import mm

@@ -19,7 +19,7 @@ import scipy.io
 import tifffile
 
 import vcc
-from command_line import CAMERA, run
+from tests.command_line import CAMERA, run
 from vcc.camera_file import ELEMENT_KINDS
 from vcc.cli.synth.rendering import ViewsAndPixels
 from vcc.gallery.entry import Entry, Result

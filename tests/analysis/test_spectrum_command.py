@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import vcc
-from command_line import run as run_command
+from tests.command_line import run as run_command
 from vcc.store import save_store
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import vcc
-from command_line import CAMERA, KNOWN, refused, run, write_views
+from tests.command_line import CAMERA, KNOWN, refused, run, write_views
 from vcc.cli.app import COMMANDS, RENDERERS
 from vcc.cli.console import _Foretold, as_options
 from vcc.plan.how import How

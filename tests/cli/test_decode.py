@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import imagecodecs
@@ -12,15 +11,13 @@ import scipy.io
 import tifffile
 
 import vcc
-from command_line import refused, run
+from tests.command_line import refused, run
+from tests.formats.test_lytro_lfp import container, pack_little
 from vcc.cli.raw_recordings import turned_tile
 from vcc.files.statement import CameraMark, statement_of
 from vcc.formats.writing import save_light_field
 from vcc.recover import LensletGrid, decode_heterodyne, decode_plenoptic
 from vcc.store import open_store
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "formats"))
-from test_lytro_lfp import container, pack_little
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "plenoptic_raw"
 real = pytest.mark.skipif(not DATA.is_dir(), reason=f"real recordings are not here: {DATA}")

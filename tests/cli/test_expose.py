@@ -8,7 +8,7 @@ import pytest
 import tifffile
 
 import vcc
-from command_line import KNOWN, refused, run, write_views
+from tests.command_line import KNOWN, refused, run, write_views
 from vcc.cli import capture, convert, decode, expose, refocus
 from vcc.formats import video
 from vcc.formats.writing import save_folder

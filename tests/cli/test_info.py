@@ -10,7 +10,7 @@ import pytest
 from scipy import ndimage
 
 import vcc
-from command_line import run as run_command
+from tests.command_line import run as run_command
 from vcc.cli.brightness import brightness, histogram
 from vcc.cli.view_grid import grid_figure
 from vcc.files import transfer

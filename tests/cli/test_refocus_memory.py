@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vcc
-from command_line import refused, run
+from tests.command_line import refused, run
 from vcc.store import save_store
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import vcc
-from command_line import refused, run
+from tests.command_line import refused, run
 from vcc.base.units import deg, mm
 from vcc.sources import CameraArray
 

@@ -6,21 +6,17 @@ single precision rounds each product to 6e-8 and sums of hundreds of them to som
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import vcc
+from tests.physics.random_cameras import AFFINE, drawn
 from vcc.engines import numba_cpu, reference
 from vcc.engines.footprint_numbers import SPAN, numbers_back
 from vcc.plan.footprints.model import Footprints, MaskLookup
 from vcc.plan.numbers import numbers
-
-sys.path.append(str(Path(__file__).parents[1] / "physics"))
-from random_cameras import AFFINE, drawn
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

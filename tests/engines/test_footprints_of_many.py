@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_footprint_numbers import Drawn
 
+from tests.engines.test_footprint_numbers import Drawn
 from vcc.engines import array_api, numba_cpu, reference
 from vcc.engines.many_kernels import SPAN
 from vcc.plan.footprints.model import Footprints

@@ -6,15 +6,14 @@ pass. A step that changes the picture by a share h of it moves rays by about h s
 hardly one meets a kink when h is 1e-8, and what is left is the rounding of two pictures, some 1e-16/h.
 """
 
-import sys
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import vcc
+from tests.physics.random_cameras import BENT, drawn
 from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.engines import ray_numbers, reference
@@ -23,9 +22,6 @@ from vcc.plan.numbers import numbers, with_numbers
 from vcc.plan.rays.edges import EDGES
 from vcc.plan.rays.windows import CellWindows
 from vcc.shapes import kernels, patterns
-
-sys.path.append(str(Path(__file__).parents[1] / "physics"))
-from random_cameras import BENT, drawn
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

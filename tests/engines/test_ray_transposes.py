@@ -7,20 +7,15 @@ three weights is right to 2⁻²²; thousands of rays that err by chance stay fa
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import vcc
+from tests.physics import random_cameras
 from vcc.base.units import mm
 from vcc.engines import numba_cpu, ray_transpose, reference
 from vcc.fields.grid import Block
 from vcc.plan.rays.model import Rays
-
-sys.path.append(str(Path(__file__).parents[1] / "physics"))
-import random_cameras
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

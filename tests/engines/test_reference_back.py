@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from test_agreement import CAMERAS, field, samples, turned
 
 import vcc
+from tests.engines.test_agreement import CAMERAS, field, samples, turned
+from tests.physics.random_cameras import AFFINE, drawn
 from vcc.engines import array_api, reference
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import share_slopes, shares
 from vcc.plan.numbers import numbers, with_numbers
-
-sys.path.append(str(Path(__file__).parents[1] / "physics"))
-from random_cameras import AFFINE, drawn
 
 # Cameras here ask for what they like.
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")

@@ -7,14 +7,13 @@ one; and the matrix A itself, which the plain engine gives where each sample is 
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import vcc
+from tests.physics.random_cameras import AFFINE, drawn
 from vcc.base.units import mm
 from vcc.engines import engine
 from vcc.plan.choice import compile_best
@@ -22,9 +21,6 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import How
 from vcc.plan.operators import BlurViews, SharpenViews, SwapPixelAxes
 from vcc.shapes.patterns import CosineSum
-
-sys.path.append(str(Path(__file__).parents[1] / "physics"))
-from random_cameras import AFFINE, drawn
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

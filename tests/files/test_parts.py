@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from lock_holder import LOCKS
+from tests.lock_holder import LOCKS
 from vcc.errors import InputError
 from vcc.files import parts
 from vcc.files.atomic import atomic_path

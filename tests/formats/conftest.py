@@ -6,7 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from small_views import Views, moving_texture, png
+
+from tests.formats.small_views import Views, moving_texture, png
 
 
 @pytest.fixture(scope="session")

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from small_views import moving_texture, png
 
+from tests.formats.small_views import moving_texture, png
 from vcc.base.errors import InputError, ResultWarning
 from vcc.formats import SparseViews, open_light_field, open_sparse_views, read_geometry, read_ground_truth
 from vcc.light_field import LightField

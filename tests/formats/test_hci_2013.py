@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from small_views import moving_texture
 
+from tests.formats.small_views import moving_texture
 from vcc.base.errors import InputError, ResultWarning
 from vcc.formats import open_light_field, read_container, read_geometry, read_ground_truth
 

@@ -6,7 +6,7 @@ import warnings
 import pytest
 
 import vcc
-from command_line import run
+from tests.command_line import run
 from vcc.formats import keep_geometry
 
 GIVEN = {"spacing": 2.5e-3, "slope_per_pixel": 1.7e-3, "focus_distance": 1.3}

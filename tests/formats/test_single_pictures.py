@@ -11,8 +11,8 @@ import imagecodecs
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from small_views import moving_texture
 
+from tests.formats.small_views import moving_texture
 from vcc.base.errors import InputError, ResultWarning
 from vcc.files import transfer
 from vcc.files.pfm import read_pfm

@@ -5,8 +5,8 @@ import struct
 import numpy as np
 import pytest
 from scipy import ndimage
-from small_views import moving_texture
 
+from tests.formats.small_views import moving_texture
 from vcc import LightField
 from vcc.base.errors import InputError
 from vcc.files import transfer

@@ -11,7 +11,7 @@ import imagecodecs
 import numpy as np
 import pytest
 
-from command_line import refused, run
+from tests.command_line import refused, run
 from vcc import Affine, Image, InputError, LightField, ResultWarning, open_light_field
 from vcc.files import transfer
 from vcc.files.statement import statement_of

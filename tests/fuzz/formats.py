@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
+import vcc.formats.arrays
+import vcc.formats.lftoolbox
 from tests.fuzz import readers, seeds
 from tests.fuzz.readers import Read
 from tests.fuzz.seeds import Maker
 from tests.fuzz.texts import LENS, ZEMAX
-
-import vcc.formats.arrays
-import vcc.formats.lftoolbox
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from tests.fuzz.child import Child, Outcome, alone
 from tests.fuzz.formats import FORMATS
 from tests.fuzz.readers import Read
 from tests.fuzz.seeds import Maker
-
 from vcc.base.reading import LONGEST_MESSAGE
 
 BLOAT = 2**30

@@ -18,9 +18,9 @@ import OpenEXR
 import tifffile
 from numpy.typing import NDArray
 from scipy.io import savemat
-from tests.fuzz.texts import CAMERA, HCI_CAMERA, LENS, MITSUBA_SCENE, PBRT_SCENE
 
 import vcc
+from tests.fuzz.texts import CAMERA, HCI_CAMERA, LENS, MITSUBA_SCENE, PBRT_SCENE
 from vcc.store import Lossy, save_store
 
 Maker = Callable[[Path], Any]

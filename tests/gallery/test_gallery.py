@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import vcc
-from command_line import run
+from tests.command_line import run
 from vcc.base import measures
 from vcc.base.units import mm
 from vcc.files.pictures import read_picture

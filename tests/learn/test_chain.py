@@ -5,14 +5,13 @@ The oracle is what a lens does: places in closed form; and for random cameras di
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import vcc
+from tests.physics.random_cameras import drawn
 from vcc.learn.chain import Chain
 from vcc.learn.parameters import names as all_names
 from vcc.learn.parameters import read
@@ -22,9 +21,6 @@ from vcc.plan.operators import finished
 from vcc.run.backwards import back
 from vcc.run.drive import Drive
 from vcc.units import mm, um
-
-sys.path.append(str(Path(__file__).parents[1] / "physics"))
-from random_cameras import drawn
 
 LIGHT_FIELD = vcc.LightField.from_views(
     np.random.default_rng(0).random((4, 5, 12, 14)).astype(np.float32), 2 * mm, 2e-3, disparity_range=(0, 0)

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from tests.learn.cameras import CELLS, ELEMENTS, SENSOR, camera_with
 
 import vcc
+from tests.learn.cameras import CELLS, ELEMENTS, SENSOR, camera_with
 from vcc.learn.parameters import names, put, read
 from vcc.learn.scales import scale
 from vcc.units import mm

@@ -8,9 +8,9 @@ import jax
 import numpy as np
 import pytest
 import torch
-from tests.learn.cameras import ELEMENTS, SENSOR, camera_with
 
 import vcc
+from tests.learn.cameras import ELEMENTS, SENSOR, camera_with
 from vcc.learn.parameters import keys, names, parameter
 from vcc.optics.electronics import Electronics
 from vcc.shapes.lattice import Lattice

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.learn.cameras import ELEMENTS
 from torch.func import functional_call
 
 import vcc
+from tests.learn.cameras import ELEMENTS
 from vcc.learn.parameters import names
 from vcc.learn.verdicts import verdict
 from vcc.torch import CameraModule

@@ -6,9 +6,9 @@ import runpy
 from pathlib import Path
 
 import pytest
-from tests.learn.cameras import ELEMENTS
 
 import vcc
+from tests.learn.cameras import ELEMENTS
 from vcc.learn.verdicts import verdict
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -24,10 +24,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from random_cameras import BENT, Case
-from random_tracer import Bench, decibels
 
 import vcc
+from tests.physics.random_cameras import BENT, Case
+from tests.physics.random_tracer import Bench, decibels
 from vcc.shapes import kernels, patterns, surfaces
 from vcc.store import save_store
 

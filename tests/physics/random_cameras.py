@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from random_tracer import Bench, Plane, Scene
 
 import vcc
+from tests.physics.random_tracer import Bench, Plane, Scene
 from vcc.base.units import m, mm
 from vcc.shapes import kernels, patterns, surfaces
 

@@ -23,9 +23,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from brute_force import Scene, psnr
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
+
+from tests.physics.brute_force import Scene, psnr
 
 Array = NDArray[np.float64]
 Function = Callable[[Array, Array], Array]

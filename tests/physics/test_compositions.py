@@ -10,9 +10,9 @@ import warnings
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 from vcc.base.affine import Affine
 from vcc.base.units import m, mm
 from vcc.shapes.kernels import Gaussian

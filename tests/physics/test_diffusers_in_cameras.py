@@ -15,8 +15,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, Texture, ThinLensCamera, psnr, round_stop, views
-from ray_oracle import (
+from scipy.integrate import quad
+from scipy.signal import convolve2d
+
+import vcc
+from tests.physics.brute_force import Layer, Scene, Texture, ThinLensCamera, psnr, round_stop, views
+from tests.physics.ray_oracle import (
     Bench,
     Thin,
     agree,
@@ -30,11 +34,7 @@ from ray_oracle import (
     round_hat,
     square,
 )
-from scipy.integrate import quad
-from scipy.signal import convolve2d
-from two_planes import TwoPlanes
-
-import vcc
+from tests.physics.two_planes import TwoPlanes
 from vcc.base.units import m, mm
 from vcc.shapes.kernels import Gaussian, Samples, TopHat
 from vcc.shapes.patterns import Circle, CosineSum

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, square_stop, views
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, square_stop, views
 from vcc.base.units import m, mm, um
 from vcc.shapes.patterns import Circle, CosineSum
 

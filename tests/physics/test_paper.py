@@ -11,10 +11,10 @@ import itertools
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, cosines, psnr, views
 from scipy.ndimage import affine_transform
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, cosines, psnr, views
 from vcc import Affine
 from vcc.base.units import m, mm
 from vcc.shapes.patterns import CosineSum

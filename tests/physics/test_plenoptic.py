@@ -17,11 +17,23 @@ from functools import cache
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, ThinLensCamera, psnr, round_stop, views
-from ray_oracle import Bench, Thin, agree, cells, disc, grown, lens, nearest_centre, normal, round_hat, square
-from two_planes import TwoPlanes
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, ThinLensCamera, psnr, round_stop, views
+from tests.physics.ray_oracle import (
+    Bench,
+    Thin,
+    agree,
+    cells,
+    disc,
+    grown,
+    lens,
+    nearest_centre,
+    normal,
+    round_hat,
+    square,
+)
+from tests.physics.two_planes import TwoPlanes
 from vcc.base.units import m, mm, um
 from vcc.shapes.kernels import Gaussian, TopHat
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from laws import LAWS, Check, brute_force, granted
-from random_cameras import AFFINE, BENT, KINDS, drawn
-from random_tracer import Bench, Plane, Scene, Table
 
 import vcc
+from tests.physics.laws import LAWS, Check, brute_force, granted
+from tests.physics.random_cameras import AFFINE, BENT, KINDS, drawn
+from tests.physics.random_tracer import Bench, Plane, Scene, Table
 from vcc.base.units import mm
 
 SLOW = {"stores"}

@@ -11,12 +11,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
-from ray_oracle import Bench, Thin, agree, cells, cosine_sheet, disc, lens, normal, square
 from scipy.integrate import quad
-from two_planes import TwoPlanes
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
+from tests.physics.ray_oracle import Bench, Thin, agree, cells, cosine_sheet, disc, lens, normal, square
+from tests.physics.two_planes import TwoPlanes
 from vcc.base.errors import ResultWarning
 from vcc.base.units import m, mm
 from vcc.shapes.kernels import Gaussian

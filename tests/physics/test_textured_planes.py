@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 from vcc.base.units import m, mm
 
 FOCAL_LENGTH, DIAMETER = 50 * mm, 16 * mm

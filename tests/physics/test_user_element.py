@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 import torch
-from brute_force import Layer, Scene, views
-from ray_oracle import Bench, Thin, agree, disc, lens
-from two_planes import TwoPlanes
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, views
+from tests.physics.ray_oracle import Bench, Thin, agree, disc, lens
+from tests.physics.two_planes import TwoPlanes
 from vcc.base.units import m, mm, nm
 from vcc.plan.how import How
 from vcc.run.drive import drive

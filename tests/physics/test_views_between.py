@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, ThinLensCamera, cosines, psnr, round_stop, views
 from vcc.base.units import m, mm
 
 FOCAL_LENGTH, SPACING, SLOPE, FOCUS = 50 * mm, 1 * mm, 1e-3, 1 * m

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from brute_force import Layer, Scene, cosines, views
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, cosines, views
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,13 @@ times agree to the square of the steps.
 from __future__ import annotations
 
 import dataclasses
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import vcc
+from tests.physics.random_cameras import drawn
 from vcc import patterns
 from vcc.plan.choice import compile_best
 from vcc.plan.decisions import ANEW, Decisions
@@ -25,9 +24,6 @@ from vcc.run.drive import drive
 from vcc.shapes.polygon_areas import polygon_mean
 from vcc.shapes.sheets import Product, Shifted
 from vcc.units import mm, um
-
-sys.path.append(str(Path(__file__).parents[1] / "physics"))
-from random_cameras import drawn
 
 STEPS = (3e-6, 3e-5, 3e-4)
 """Two decades of steps, as shares of what `scale` gives."""

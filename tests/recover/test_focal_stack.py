@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vcc
-from command_line import run
+from tests.command_line import run
 from vcc.base.affine import Affine
 from vcc.base.measures import psnr
 from vcc.recover.focal_stack import FocalStack, focal_stack, focus_distances

@@ -8,21 +8,17 @@ of h harmonics of the aperture, which is what the method can hold; in focus it i
 
 from __future__ import annotations
 
-import sys
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import vcc
+from tests.physics.brute_force import Layer, Scene, Texture, ThinLensCamera, psnr, square_stop, views
 from vcc.base.errors import InputError
 from vcc.base.units import m, mm, short, um
 from vcc.recover.heterodyne import HeterodyneGeometry, decode_heterodyne, heterodyne_calibration
 from vcc.shapes.patterns import CosineSum
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "physics"))
-from brute_force import Layer, Scene, Texture, ThinLensCamera, psnr, square_stop, views
 
 F, FOCUS, STOP, SIZE = 50 * mm, 1 * m, 10 * mm, 8 * mm
 D = 1 / (1 / F - 1 / FOCUS)

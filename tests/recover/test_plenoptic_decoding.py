@@ -7,7 +7,6 @@ lenslets that image the main lens sharply, its value is the mean over that lensl
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -16,13 +15,11 @@ import numpy as np
 import pytest
 
 import vcc
+from tests.physics.brute_force import psnr
+from tests.physics.two_planes import TwoPlanes
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import m, mm, um
 from vcc.recover.plenoptic import LensletGrid, decode_plenoptic, find_lenslets
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "physics"))
-from brute_force import psnr
-from two_planes import TwoPlanes
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "plenoptic_raw"
 real = pytest.mark.skipif(not DATA.is_dir(), reason=f"real recordings are not here: {DATA}")

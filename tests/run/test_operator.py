@@ -8,23 +8,20 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from dots import dot_error
 from scipy.sparse.linalg import lsqr
 
 import vcc
+from tests.physics.random_cameras import AFFINE, KINDS, drawn
+from tests.run.dots import dot_error
 from vcc.base.units import mm
 from vcc.run.drive import Drive
 from vcc.run.operator import Operator
 from vcc.shapes.patterns import CosineSum
 from vcc.store import save_store
-
-sys.path.append(str(Path(__file__).parents[1] / "physics"))
-from random_cameras import AFFINE, KINDS, drawn
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

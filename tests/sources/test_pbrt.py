@@ -11,7 +11,7 @@ import shutil
 import numpy as np
 import pytest
 
-from command_line import run
+from tests.command_line import run
 from vcc import InputError
 from vcc.base.units import mm
 from vcc.sources import CameraArray

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import vcc
+from tests.command_line import run as run_command
 from vcc import InputError
 from vcc.base.units import mm
 from vcc.sources import CameraArray
@@ -114,12 +115,12 @@ def test_a_failure_keeps_what_is_done_and_the_same_call_goes_on(tmp_path, focus)
 def test_a_kill_keeps_what_is_done(tmp_path):
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "from test_synthesis import CAMERAS, Numbers\n"
+        "from tests.sources.test_synthesis import CAMERAS, Numbers\n"
         "from vcc.sources.synthesis import synthesize\n"
         "synthesize(Numbers(stops_at=(1, 0), killed=True), CAMERAS, sys.argv[2], dtype='float32')\n"
     )
     path = tmp_path / "killed.zarr"
-    killed = subprocess.run([sys.executable, "-c", code, str(Path(__file__).parent), str(path)])
+    killed = subprocess.run([sys.executable, "-c", code, str(Path(__file__).parents[2]), str(path)])
     assert killed.returncode == -signal.SIGKILL
     second = Numbers()
     assert np.array_equal(synthesize(second, CAMERAS, path, dtype="float32").read().values, whole())
@@ -178,8 +179,6 @@ def test_another_dtype_is_refused():
 
 
 def run(*arguments):
-    from command_line import run as run_command  # the process that is killed does not find it
-
     return run_command("synth", *arguments)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import vcc
-from command_line import KNOWN, refused, run, write_views
+from tests.command_line import KNOWN, refused, run, write_views
 from vcc.cli.options import memory_size
 from vcc.store import create_store, open_store
 

@@ -19,7 +19,7 @@ import pytest
 import zarr
 
 import vcc
-from lock_holder import LOCKS
+from tests.lock_holder import LOCKS
 from vcc.base.affine import Affine
 from vcc.files import parts
 from vcc.files.transfer import decode

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from tests.fuzz import readers, seeds
 from tests.fuzz.readers import Read
 from tests.fuzz.seeds import Maker

@@ -7,10 +7,10 @@ from typing import Any
 
 import h5py
 import numpy as np
+
 from tests.fuzz import seeds
 from tests.fuzz.bombs.bomb import Bomb
 from tests.fuzz.seeds import Maker
-
 from vcc.formats import lftoolbox
 
 GROUP, EXTERNAL, EXTERNAL_BYTES, LOOP = (

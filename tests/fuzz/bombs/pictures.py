@@ -13,6 +13,7 @@ from typing import Any
 import imagecodecs
 import numpy as np
 import tifffile
+
 from tests.fuzz import readers, seeds
 from tests.fuzz.bombs.bomb import Bomb, all_views, npy, view, written, zeros_deflated, zip_of, zip_of_deflated
 from tests.fuzz.seeds import Maker

@@ -1,0 +1,1 @@
+"""Tests of `vcc`; what several share is imported from here by its full name."""
