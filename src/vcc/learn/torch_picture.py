@@ -154,12 +154,17 @@ class _Call:
                     of_fields[m] = part.samples if n == 0 else of_fields[m] + part.samples
                 total = total + replace(part, samples=None)
             pulled.append(chain.pull(one, total.numbers) if wanted else {})
-        return np.stack(of_fields) if samples else None, {
+        return _stacked(of_fields) if samples else None, {
             name: np.stack([one[name] for one in pulled])
             if name in self.several
             else sum(one[name] for one in pulled)
             for name in wanted
         }
+
+
+def _stacked(arrays: list[Any]) -> Any:
+    """Arrays with an axis in front; one alone, which may be large, is not copied."""
+    return arrays[0][None] if len(arrays) == 1 else np.stack(arrays)
 
 
 def _refuse(samples: Samples) -> None:
