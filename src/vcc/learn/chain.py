@@ -84,7 +84,9 @@ class Chain:
         return self._at(values or {}).plan
 
     def followed(self, values: Values | None = None) -> dict[str, tuple[str, ...]]:
-        """For each parameter the names of the plan's numbers (`Plan.numbers`) that follow it.
+        """For each parameter the names of the plan's numbers (`Plan.numbers`) whose derivatives to it are not 0.
+
+        Those of even functions are missing where such a function begins (`vcc.learn.verdicts.following` has them).
 
         Args:
             values: as for `plan`.
@@ -118,7 +120,8 @@ class Chain:
             By the names of these parameters, float64, each of its parameter's shape.
 
         Raises:
-            InputError: values at which a parameter cannot be followed, or rays that run into an edge there.
+            InputError: values at which a parameter cannot be followed. Edges that cut rays were looked for when
+                the chain was made, not here.
         """
         weights = {name: np.asarray(cotangent, dtype=np.float64) for name, cotangent in cotangents.items()}
         made, found = self._at(values), {}
