@@ -65,3 +65,26 @@ def test_repr_says_shape_pitch_and_missing_rays():
     assert "4×6" in repr(image())
     assert "missing" not in repr(image())
     assert "12.5% of the rays missing" in repr(Image(np.zeros((4, 6)), FRAME, missing_rays=0.125))
+
+
+def test_numpy_sees_the_values_and_copies_them_only_where_asked():
+    picture = image()
+    assert np.asarray(picture) is picture.values
+    assert np.shares_memory(np.array(picture, copy=False), picture.values)
+    copied = np.array(picture)
+    assert not np.shares_memory(copied, picture.values)
+    np.testing.assert_array_equal(copied, picture.values)
+    assert np.asarray(picture, dtype=np.float64).dtype == np.float64
+    with pytest.raises(ValueError, match="copy"):
+        np.array(picture, dtype=np.float64, copy=False)
+    assert np.mean(picture) == picture.values.mean()
+
+
+def test_numpy_sees_the_values_of_other_libraries():
+    values = torch.ones((4, 6), requires_grad=True)
+    seen = np.asarray(Image(values, FRAME))
+    np.testing.assert_array_equal(seen, np.ones((4, 6)))
+    shared = np.array(Image(values, FRAME), copy=False)
+    assert shared.ctypes.data == values.detach().data_ptr()
+    with pytest.raises(ValueError, match="copy"):
+        np.array(Image(torch.ones((4, 6)).to(torch.bfloat16), FRAME), copy=False)

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 from array_api_compat import array_namespace
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import short
-from vcc.fields.sampled import IMAGE_AXES, Index, indices, taken, to_numpy
-from vcc.files.pictures import Exposure, SavedPicture, save_picture
+from vcc.fields.sampled import IMAGE_AXES, Index, as_array, indices, taken, to_numpy
+from vcc.files.destination import Target
+from vcc.files.pictures import Exposure, SavedPicture, coded_picture, save_picture
 from vcc.files.stated import clipping, light_of, read_stated, unknown
 from vcc.files.statement import CameraMark, Quantity, Statement
 from vcc.optics.train import Train
@@ -85,13 +86,36 @@ class Image:
         """The values as a float32 NumPy array, wherever they are."""
         return to_numpy(self.values).astype(np.float32, copy=False)
 
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """The values, for ``numpy.asarray(image)``: as light lands on the sensor, not copied where that can be."""
+        return as_array(self.values, dtype, copy)
+
+    def to_srgb(self, exposure: Exposure = "auto", *, upright: bool = True, bits: int = 8) -> NDArray[Any]:
+        """The picture as screens show it: the sRGB codes that `save` writes to a PNG.
+
+        Args:
+            exposure: as in `save`.
+            upright: as in `save`.
+            bits: 8 or 16.
+
+        Returns:
+            uint8 or uint16, shape (rows, columns) of one channel, else (rows, columns, 3).
+
+        Raises:
+            InputError: an exposure that is not a finite number above 0, other bits, values that are not finite, or
+                neither 1 nor 3 channels.
+        """
+        values = (self.upright() if upright else self).to_numpy()
+        return coded_picture(values, exposure, bits, "in sRGB, which").codes
+
     def save(
         self,
-        path: str | PathLike[str],
+        path: Target,
         *,
         exposure: Exposure = "auto",
         upright: bool = True,
         bits: int | None = None,
+        format: str | None = None,
     ) -> SavedPicture:
         """Write the picture; the ending of ``path`` chooses the format.
 
@@ -103,25 +127,27 @@ class Image:
         Each file says what its numbers are (`vcc.files.statement`), and `load_image` gives the picture back.
 
         Args:
-            path: where to.
+            path: where to; or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
             exposure: the factor that brings the values to the range 0…1 of an sRGB file. "auto" takes 1 over the
                 99.5th percentile of the luminance: the brightest 0.5 % of the pixels may clip. It is returned, so
                 that a second picture can be written with the same.
             upright: turn a real image (which lies upside down on the sensor) so that people see it upright.
             bits: bits per sample for PNG and TIFF.
+            format: of a buffer: "png", "tif", "exr" or "npy".
 
         Returns:
             The path, the exposure used, the share of clipped pixels, and all that in words. The file appears
             whole or not at all.
 
         Raises:
-            InputError: an unknown ending, a folder that does not exist or cannot be written to, an exposure that
-                is not a finite number above 0 (or not 1, for .exr and .npy), bits that the format does not have,
-                values that are not finite, or a number of channels that the format cannot show.
+            InputError: an unknown ending or format, a buffer without a format, a folder that does not exist or
+                cannot be written to, an exposure that is not a finite number above 0 (or not 1, for .exr and
+                .npy), bits that the format does not have, values that are not finite, or a number of channels that
+                the format cannot show.
         """
         shown = self.upright() if upright else self
-        values = shown.to_numpy()
-        return save_picture(values, path, statement=shown._statement(), exposure=exposure, bits=bits)
+        values, said = shown.to_numpy(), shown._statement()
+        return save_picture(values, path, statement=said, exposure=exposure, bits=bits, format=format)
 
     def _statement(self) -> Statement:
         """What the values are, for a file."""

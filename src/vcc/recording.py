@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from os import PathLike
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.units import short
+from vcc.fields.sampled import as_array
+from vcc.files.destination import Target
 from vcc.files.pictures import SavedPicture, save_numbers
 from vcc.files.stated import read_stated, unknown
 from vcc.files.statement import CameraMark, RawNumbers, Statement
@@ -85,17 +88,26 @@ class Recording(RawPicture):
         values = demosaic(self.irradiance(), electronics, method)
         return Image(values, self.frame, missing_rays=self.missing_rays, camera=self.camera)
 
-    def save(self, path: str | PathLike[str]) -> SavedPicture:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """The digital numbers, for ``numpy.asarray(recording)``, not copied where that can be."""
+        return as_array(self.values, dtype, copy)
+
+    def save(self, path: Target, *, format: str | None = None) -> SavedPicture:
         """Write the numbers untouched to a .tif, .png or .npy: linear, not scaled, upside down as recorded.
 
         The file also says, as JSON, what the numbers mean (exposure, gain, black level, filter, …; see
         `vcc.files.statement`), and `load_recording` gives the recording back.
 
+        Args:
+            path: where to; or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
+            format: of a buffer: "tif", "png" or "npy".
+
         Raises:
-            InputError: another ending, channels that the format cannot hold, or a place that cannot be written.
+            InputError: another ending or format, a buffer without a format, channels that the format cannot hold,
+                or a place that cannot be written.
         """
         words = f"{self.electronics.bit_depth}-bit raw, {self.electronics.filter_in_words}, {self._in_words()}"
-        return save_numbers(self.values, path, self._statement(), words)
+        return save_numbers(self.values, path, self._statement(), words, format)
 
     def _statement(self) -> Statement:
         """What the numbers are, for a file."""

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from pathlib import Path
@@ -275,3 +276,67 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
     file.write_text("")
     with pytest.raises(InputError, match="is a file, not"), atomic_path(file / "a.png"):
         pass
+
+
+# Into buffers, and as arrays
+
+
+@pytest.mark.parametrize("name", ["png", "tif", "exr", "npy", "PNG", ".tiff"])
+def test_a_buffer_gets_the_bytes_of_a_file(name: str, tmp_path: Path) -> None:
+    picture = image(np.random.default_rng(2).random((5, 7, 3), dtype=np.float32))
+    path, buffer = tmp_path / f"picture.{name.strip('.').lower()}", io.BytesIO()
+    in_file, in_buffer = picture.save(path), picture.save(buffer, format=name)
+    assert in_buffer.path is None
+    assert (in_buffer.exposure, in_buffer.clipped) == (in_file.exposure, in_file.clipped)
+    assert in_buffer.description.split(":")[1] == in_file.description.split(":")[1]
+    assert buffer.getvalue() == path.read_bytes()
+
+
+def test_buffers_of_open_files_are_written_where_they_stand(tmp_path: Path) -> None:
+    with (tmp_path / "two.png").open("wb") as file:
+        file.write(b"before")
+        image(np.ones((2, 3))).save(file, format="png")
+    assert (tmp_path / "two.png").read_bytes()[:10] == b"before\x89PNG"
+
+
+def test_nothing_is_written_to_a_buffer_of_what_cannot_be_written() -> None:
+    buffer = io.BytesIO()
+    with pytest.raises(InputError, match="5 channels"):
+        image(np.ones((2, 3, 5))).save(buffer, format="png")
+    assert buffer.getvalue() == b""
+
+
+@pytest.mark.parametrize(
+    ("target", "format", "message"),
+    [
+        (io.BytesIO(), None, r"add format=, png, tif, tiff, exr, npy$"),
+        (io.BytesIO(), "jpg", r'format="jpg": there are png'),
+        (io.StringIO(), "png", "takes text: use io.BytesIO"),
+        (3, None, "not to a int"),
+        ("picture.tif", "png", "does not go with picture.tif"),
+    ],
+)
+def test_where_pictures_cannot_go(target: object, format: str | None, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        image(np.ones((2, 3))).save(target, format=format)
+
+
+@pytest.mark.parametrize(("shape", "bits"), [((5, 7, 3), 8), ((5, 7), 16), ((5, 7, 1), 8)])
+@pytest.mark.parametrize("upright", [True, False])
+def test_srgb_is_what_is_saved(shape: tuple[int, ...], bits: int, upright: bool, tmp_path: Path) -> None:
+    picture = image(np.random.default_rng(3).random(shape, dtype=np.float32))
+    for exposure in ("auto", 0.3):
+        picture.save(tmp_path / "picture.png", bits=bits, upright=upright, exposure=exposure)
+        stored, _ = read_picture(tmp_path / "picture.png")
+        shown = picture.to_srgb(exposure, bits=bits, upright=upright)
+        assert shown.dtype == f"uint{bits}"
+        np.testing.assert_array_equal(shown, stored)
+
+
+def test_srgb_of_what_no_screen_shows_is_refused() -> None:
+    with pytest.raises(InputError, match="5 channels cannot be shown in sRGB, which has 1 or 3"):
+        image(np.ones((2, 3, 5))).to_srgb()
+    with pytest.raises(InputError, match=r"nan at index \(1, 2\)"):
+        image(np.array([[1, 1, 1], [1, 1, np.nan]])).to_srgb(upright=False)
+    with pytest.raises(InputError, match="not 12"):
+        image(np.ones((2, 3))).to_srgb(bits=12)

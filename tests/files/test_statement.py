@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import warnings
 from dataclasses import replace
@@ -322,3 +323,14 @@ def test_views_that_are_not_stored_alike_are_refused(tmp_path: Path) -> None:
     recording().save(tmp_path / NAMES[0])
     with pytest.raises(vcc.InputError, match="a raw recording is no view"):
         opened(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["tif", "png", "npy"])
+def test_a_recording_goes_into_a_buffer_and_is_an_array(name: str, tmp_path: Path) -> None:
+    made, buffer = recording(), io.BytesIO()
+    assert made.save(buffer, format=name).path is None
+    made.save(tmp_path / f"a.{name}")
+    assert buffer.getvalue() == (tmp_path / f"a.{name}").read_bytes()
+    assert np.asarray(made) is made.values
+    with pytest.raises(vcc.InputError, match="there are tif, tiff, png, npy"):
+        made.save(buffer, format="exr")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 
@@ -120,6 +122,16 @@ def test_films_hold_the_pictures(tmp_path, demo_stack, shape, ending):
         error = np.sqrt(np.mean((frame[: shape[0], : shape[1]] - codes) ** 2))
         # H.264 with half the chroma at rate factor 18, or 256 colours with dithering: some codes of 255
         assert error < 12
+
+
+def test_a_film_goes_into_a_buffer(tmp_path, demo_stack):
+    stack = FocalStack(demo_stack.pictures[:2, :16, :16], demo_stack.distances[:2], demo_stack.frame)
+    buffer = io.BytesIO()
+    assert stack.save(buffer, format="gif").startswith("gif in a buffer: 2 pictures")
+    stack.save(tmp_path / "stack.gif")
+    assert buffer.getvalue() == (tmp_path / "stack.gif").read_bytes()
+    with pytest.raises(vcc.InputError, match="add format=, mp4, gif"):
+        stack.save(io.BytesIO())
 
 
 def test_the_command_makes_pictures_and_films(tmp_path, demo_field):

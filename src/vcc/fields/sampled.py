@@ -12,6 +12,7 @@ from types import EllipsisType
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
@@ -85,6 +86,26 @@ def to_numpy(values: Any) -> np.ndarray[Any, Any]:
         return np.asarray(values)
     except (TypeError, ValueError, RuntimeError):
         return np.from_dlpack(values)
+
+
+def as_array(values: Any, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+    """What ``numpy.asarray`` is given of something whose numbers these are (``__array__``).
+
+    Args:
+        values: an array of any library.
+        dtype: None for their own.
+        copy: None copies where it must, False never, True always.
+
+    Raises:
+        ValueError: a copy is needed that is not allowed, as NumPy has it.
+    """
+    if copy is not False or isinstance(values, np.ndarray):
+        return np.array(to_numpy(values), dtype=dtype, copy=copy)
+    try:
+        shared = np.from_dlpack(values.detach() if hasattr(values, "detach") else values)
+    except (AttributeError, BufferError, RuntimeError, TypeError) as error:  # each library has its own refusal
+        raise ValueError(f"numbers of {type(values).__module__} cannot be had without a copy: {error}") from error
+    return np.array(shared, dtype=dtype, copy=False)
 
 
 def has_values(values: Any) -> bool:

@@ -10,11 +10,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.reading import check_file
 from vcc.files import transfer
-from vcc.files.atomic import atomic_path
+from vcc.files.destination import Destination, Target
 from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_png
 from vcc.files.statement import Statement, in_png, statement_of, tiff_tags, write_npy
 
@@ -150,7 +150,7 @@ class SavedPicture:
     """What was written: where, with which exposure, and a line that says so to a person.
 
     Args:
-        path: the file.
+        path: the file; None for a buffer.
         exposure: the factor between the image's values and what was stored (before the sRGB curve);
             pass it on for another picture, and the two can be compared.
         clipped: the share of the pixels, 0 to 1, in which a channel was brighter than the file can
@@ -158,7 +158,7 @@ class SavedPicture:
         description: one line for people.
     """
 
-    path: Path
+    path: Path | None
     exposure: float
     clipped: float
     description: str
@@ -166,59 +166,60 @@ class SavedPicture:
 
 def save_picture(
     values: NDArray[np.float32],
-    path: str | PathLike[str],
+    target: Target,
     *,
     statement: Statement,
     exposure: Exposure = "auto",
     bits: int | None = None,
+    format: str | None = None,
 ) -> SavedPicture:
     """Write linear values; the ending chooses the format: sRGB in PNG and TIFF, untouched in OpenEXR and .npy.
 
     Args:
         values: as they are to be seen, shape (rows, columns) or (rows, columns, channels).
-        path: where to.
+        target: where to.
         statement: what the values are; how they are written is added.
-        exposure: see `vcc.Image.save`, likewise the bits and what is returned.
+        exposure: see `vcc.Image.save`, likewise the bits, the format and what is returned.
         bits: see there.
+        format: see there.
 
     Raises:
         InputError: see there.
     """
-    path = Path(path)
-    ending = checks.ending("a picture", path, *WRITE_ENDINGS)
-    save = _save_linear if ending in (".exr", ".npy") else _save_display
-    return save(_grey_if_one(values), path, statement, exposure, bits)
+    place = Destination.of("a picture", target, format, WRITE_ENDINGS)
+    save = _save_linear if place.ending in (".exr", ".npy") else _save_display
+    return save(_grey_if_one(values), place, statement, exposure, bits)
 
 
 def save_numbers(
-    values: NDArray[Any], path: str | PathLike[str], statement: Statement, words: str
+    values: NDArray[Any], target: Target, statement: Statement, words: str, format: str | None = None
 ) -> SavedPicture:
     """Write a camera's raw numbers as they are: linear, not scaled, not turned.
 
     Args:
         values: uint8 or uint16, shape (rows, columns) or (rows, columns, channels).
-        path: where to, .tif, .tiff, .png or .npy.
+        target: where to, .tif, .tiff, .png or .npy.
         statement: what the numbers are; ``clipped`` is the share of the pixels that are saturated.
         words: the same for people.
+        format: of a buffer.
 
     Raises:
         InputError: another ending, a number of channels that the format does not have, or a place that cannot be
             written to.
     """
-    path = Path(path)
-    ending = checks.ending("raw numbers", path, *RAW_ENDINGS)
-    values = _grey_if_one(values)
+    place = Destination.of("raw numbers", target, format, RAW_ENDINGS)
+    ending, values = place.ending, _grey_if_one(values)
     if ending != ".npy" and values.ndim == 3 and values.shape[2] != 3:
         raise InputError(
             f"{ending} files have 1 or 3 channels, and this recording has {values.shape[2]}: use .npy"
         )
-    with atomic_path(path) as temporary:
+    with place.opened() as temporary:
         if ending == ".npy":
             write_npy(values, temporary, statement.text(values))
         else:
             write_codes(values, temporary, ending, statement)
-    description = f"{path}: {_size(values)}, {words}; {values.dtype} numbers as recorded, upside down"
-    return SavedPicture(path, 1.0, statement.clipped or 0.0, description)
+    description = f"{place.words}: {_size(values)}, {words}; {values.dtype} numbers as recorded, upside down"
+    return SavedPicture(place.path, 1.0, statement.clipped or 0.0, description)
 
 
 def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
@@ -264,56 +265,87 @@ def write_codes(
 
 
 def _save_linear(
-    values: NDArray[np.float32], path: Path, statement: Statement, exposure: Exposure, bits: int | None
+    values: NDArray[np.float32], place: Destination, statement: Statement, exposure: Exposure, bits: int | None
 ) -> SavedPicture:
-    ending = path.suffix.lower()
+    ending = place.ending
     if exposure not in ("auto", 1):
         raise InputError(
-            f"exposure={exposure} has no place in {path.name}: {ending} files hold the values untouched. "
+            f"exposure={exposure} has no place in {place.words}: {ending} files hold the values untouched. "
             "Leave it out, or write a .png or .tif"
         )
     if bits not in (None, 32):
         raise InputError(f"{ending} files hold 32-bit floating-point values, not {bits} bits")
-    with atomic_path(path) as temporary:
+    with place.opened() as temporary:
         (write_npy if ending == ".npy" else _write_exr)(values, temporary, statement.text(values))
-    size = _size(values)
-    return SavedPicture(path, 1.0, 0.0, f"{path}: {size}, linear float32, values untouched (exposure 1)")
+    words = f"{place.words}: {_size(values)}, linear float32, values untouched (exposure 1)"
+    return SavedPicture(place.path, 1.0, 0.0, words)
 
 
 def _save_display(
-    values: NDArray[np.float32], path: Path, statement: Statement, exposure: Exposure, bits: int | None
+    values: NDArray[np.float32], place: Destination, statement: Statement, exposure: Exposure, bits: int | None
 ) -> SavedPicture:
-    ending = path.suffix.lower()
+    ending = place.ending
     if bits is None:
         bits = 8 if ending == ".png" else 16
     if bits not in (8, 16):
         raise InputError(f"{ending} files are written with 8 or 16 bits per sample, not {bits}")
+    coded = coded_picture(values, exposure, bits, f"as {ending}, which")
+    automatic = exposure == "auto"
+    said = replace(statement, transfer="srgb", exposure=coded.exposure, automatic=automatic, clipped=coded.clipped)
+    with place.opened() as temporary:
+        write_codes(coded.codes, temporary, ending, said)
+    reason = " (auto: the 99.5th percentile of the luminance is white)" if automatic else ""
+    below = f", {coded.negative:.2%} below 0 and shown black" if coded.negative > 0 else ""
+    description = (
+        f"{place.words}: {_size(values)}, {bits}-bit sRGB, exposure {coded.exposure:.6g}{reason}, "
+        f"{coded.clipped:.2%} of the pixels clipped{below}"
+    )
+    return SavedPicture(place.path, coded.exposure, coded.clipped, description)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Coded(Brief):
+    """Linear light as screens show it.
+
+    Args:
+        codes: sRGB, uint8 or uint16, shape (rows, columns) or (rows, columns, 3).
+        exposure: the factor before the curve.
+        clipped: the share of the pixels, 0 to 1, in which a channel was too bright.
+        negative: the share in which one was below 0, and is black.
+    """
+
+    codes: NDArray[Any]
+    exposure: float
+    clipped: float
+    negative: float
+
+
+def coded_picture(values: NDArray[np.float32], exposure: Exposure, bits: int, where: str) -> Coded:
+    """Linear values exposed and coded as sRGB: what is stored for people, and shown.
+
+    Args:
+        values: shape (rows, columns) or (rows, columns, channels).
+        exposure: see `vcc.Image.save`.
+        bits: 8 or 16.
+        where: it is shown, for the errors, a clause that ends in "which".
+
+    Raises:
+        InputError: neither 1 nor 3 channels, values that are not finite, or an unusable exposure.
+    """
+    values = _grey_if_one(values)
     if values.ndim == 3 and values.shape[2] != 3:
         raise InputError(
-            f"an image of {values.shape[2]} channels cannot be shown as {ending}, which has 1 or 3: write it as "
-            ".npy or .exr, or choose channels, e.g. image[..., :3]"
+            f"an image of {values.shape[2]} channels cannot be shown {where} has 1 or 3: write it as .npy or "
+            ".exr, or choose channels, e.g. image[..., :3]"
         )
     finite = np.isfinite(values)
     if not finite.all():
-        where = tuple(int(n) for n in np.argwhere(~finite)[0])
-        raise InputError(
-            f"the image has {values[where]} at index {where}, which {ending} cannot hold; .npy and .exr can"
-        )
-    automatic = exposure == "auto"
-    factor = auto_exposure(values) if automatic else checked_exposure(exposure)
+        at = tuple(int(n) for n in np.argwhere(~finite)[0])
+        raise InputError(f"the image has {values[at]} at index {at}, which cannot be shown; .npy and .exr hold it")
+    factor = auto_exposure(values) if exposure == "auto" else checked_exposure(exposure)
     exposed = values * np.float32(factor)
     clipped = _share_beyond(exposed > 1 + 0.5 / (2**bits - 1))  # what rounds to white is not lost
-    negative = _share_beyond(exposed < 0)
-    said = replace(statement, transfer="srgb", exposure=factor, automatic=automatic, clipped=clipped)
-    with atomic_path(path) as temporary:
-        write_codes(transfer.encode(exposed, bits), temporary, ending, said)
-    reason = " (auto: the 99.5th percentile of the luminance is white)" if automatic else ""
-    below = f", {negative:.2%} below 0 and shown black" if negative > 0 else ""
-    description = (
-        f"{path}: {_size(values)}, {bits}-bit sRGB, exposure {factor:.6g}{reason}, "
-        f"{clipped:.2%} of the pixels clipped{below}"
-    )
-    return SavedPicture(path, factor, clipped, description)
+    return Coded(transfer.encode(exposed, bits), factor, clipped, _share_beyond(exposed < 0))
 
 
 def checked_exposure(exposure: Any) -> float:

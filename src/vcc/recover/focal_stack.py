@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,7 +18,7 @@ from vcc.base.errors import InputError
 from vcc.base.memory import check_memory, check_samples
 from vcc.base.progress import Progress, tell
 from vcc.files import transfer
-from vcc.files.atomic import atomic_path
+from vcc.files.destination import Destination, Target
 from vcc.files.pictures import auto_exposure, checked_exposure
 from vcc.formats import video
 from vcc.image import Image
@@ -142,30 +141,33 @@ class FocalStack(Brief):
 
     def save(
         self,
-        path: str | PathLike[str],
+        path: Target,
         *,
         frames_per_second: float = 8,
         exposure: float | Literal["auto"] = "auto",
         there_and_back: bool = True,
+        format: str | None = None,
     ) -> str:
         """Write the stack as a film for people: MP4 (H.264) or GIF, sRGB.
 
         Args:
             path: where to; ends in ``.mp4`` or ``.gif``. A GIF has 256 colours a frame, and plays over and over.
+                Or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
             frames_per_second: pictures a second, at most 50 in a GIF, whose clock counts hundredths of a second.
             exposure: factor before the sRGB curve, the same for all pictures; "auto" brings the 99.5th percentile
                 of the stack's luminance to white.
             there_and_back: append the pictures in reverse order, so that the film can be played over and over.
+            format: of a buffer: "mp4" or "gif".
 
         Returns:
             A line for people: what was written, with which exposure, and how much of it clipped.
 
         Raises:
-            InputError: another ending, an impossible rate, pictures of neither 1 nor 3 channels, no PyAV for an
-                MP4, or a place that cannot be written to.
+            InputError: another ending or format, a buffer without a format, an impossible rate, pictures of
+                neither 1 nor 3 channels, no PyAV for an MP4, or a place that cannot be written to.
         """
-        path = Path(path).expanduser()
-        _check_film(path, frames_per_second)
+        place = Destination.of("a focal stack", path, format, ENDINGS)
+        _check_rate(place.ending, frames_per_second)
         count, rows, columns = self.pictures.shape[:3]
         channels = self.pictures.reshape(count, rows, columns, -1)
         if channels.shape[3] not in (1, 3):
@@ -183,14 +185,14 @@ class FocalStack(Brief):
             encoded = transfer.encode(channels[number] * np.float32(factor), 8)
             return np.ascontiguousarray(np.broadcast_to(encoded, (rows, columns, 3)))
 
-        with atomic_path(path) as temporary:
-            if path.suffix.lower() == ".gif":
+        with place.opened() as temporary:
+            if place.ending == ".gif":
                 _write_gif(temporary, [codes(number) for number in way], frames_per_second)
             else:
-                _write_mp4(temporary, (codes(number) for number in way), frames_per_second, path)
+                _write_mp4(temporary, (codes(number) for number in way), frames_per_second, place.words)
         return (
-            f"{path}: {count} pictures of {columns}×{rows} pixels in {len(way)} frames, {frames_per_second:g} a "
-            f"second, exposure {factor:.6g}, {clipped:.2%} of the pixels clipped"
+            f"{place.words}: {count} pictures of {columns}×{rows} pixels in {len(way)} frames, "
+            f"{frames_per_second:g} a second, exposure {factor:.6g}, {clipped:.2%} of the pixels clipped"
         )
 
 
@@ -257,8 +259,7 @@ def focal_stack(
     return FocalStack(pictures, distances, frame)
 
 
-def _check_film(path: Path, frames_per_second: float) -> None:
-    ending = checks.ending("a focal stack", path, *ENDINGS)
+def _check_rate(ending: str, frames_per_second: float) -> None:
     if not 0 < frames_per_second <= (50 if ending == ".gif" else math.inf) or math.isinf(frames_per_second):
         raise InputError(
             f"frames_per_second is a number above 0{' and up to 50' if ending == '.gif' else ''}, not "
@@ -266,7 +267,7 @@ def _check_film(path: Path, frames_per_second: float) -> None:
         )
 
 
-def _write_mp4(path: Path, frames: Iterable[NDArray[np.uint8]], frames_per_second: float, told: Path) -> None:
+def _write_mp4(path: Path, frames: Iterable[NDArray[np.uint8]], frames_per_second: float, told: str) -> None:
     """An H.264 film; ``told`` is what to call the file in an error."""
     av = video.library()
     # The common chroma of H.264 goes by pairs of pixels.

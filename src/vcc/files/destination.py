@@ -1,0 +1,100 @@
+"""Where a file goes: to a path, whose ending says its format, or into a buffer, of which it is said."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import IO
+
+from vcc.base import checks
+from vcc.base.errors import InputError
+from vcc.files.atomic import atomic_path
+
+Target = str | PathLike[str] | IO[bytes]
+"""A path, or what bytes can be written to, such as ``io.BytesIO()`` or a file opened with "wb"."""
+
+
+@dataclass(frozen=True)
+class Destination:
+    """Where a file goes, and in which format.
+
+    Args:
+        ending: of the format, such as ".png".
+        path: of the file; None for a buffer.
+        buffer: what is written to; None for a path.
+    """
+
+    ending: str
+    path: Path | None = None
+    buffer: IO[bytes] | None = None
+
+    @classmethod
+    def of(cls, what: str, target: Target, format: str | None, endings: tuple[str, ...]) -> Destination:
+        """That of a picture, from what a user gave.
+
+        Args:
+            what: is written there, for the errors, such as "a picture".
+            target: a path or a buffer.
+            format: of a buffer, such as "png"; a path says it itself.
+            endings: of all formats that there are.
+
+        Raises:
+            InputError: neither a path nor a buffer of bytes, another format than these, a buffer without one, or a
+                path that ends otherwise.
+        """
+        asked = None if format is None else f".{format.lower().lstrip('.')}"
+        if isinstance(target, str | PathLike):
+            path = Path(target).expanduser()
+            ending = checks.ending(what, path, *endings)
+            if asked not in (None, ending):
+                raise InputError(
+                    f'format="{format}" does not go with {path.name}, whose ending says the format: leave it out, '
+                    "or give the file another ending"
+                )
+            return cls(ending, path=path)
+        if not hasattr(target, "write"):
+            raise InputError(
+                f"{what} is written to a path or into a buffer such as io.BytesIO(), not to a "
+                f"{type(target).__name__}"
+            )
+        if _takes_text(target):
+            raise InputError(f'{what} is bytes, and this buffer takes text: use io.BytesIO(), or open(…, "wb")')
+        formats = ", ".join(each[1:] for each in endings)
+        if asked is None:
+            raise InputError(
+                f"a buffer has no ending that says in which format {what} goes there: add format=, {formats}"
+            )
+        if asked not in endings:
+            raise InputError(f'{what} cannot be written as format="{format}": there are {formats}')
+        return cls(asked, buffer=target)
+
+    @property
+    def words(self) -> str:
+        """For a line that says what was written."""
+        return f"{self.ending[1:]} in a buffer" if self.path is None else str(self.path)
+
+    @contextmanager
+    def opened(self) -> Iterator[Path]:
+        """A temporary path to write to; what stands there goes where it belongs if all goes well, else nothing.
+
+        Raises:
+            InputError: what `vcc.files.atomic.atomic_path` refuses.
+        """
+        if self.path is not None:
+            with atomic_path(self.path) as temporary:
+                yield temporary
+            return
+        assert self.buffer is not None
+        with tempfile.TemporaryDirectory() as folder:
+            part = Path(folder) / f"part{self.ending}"
+            yield part
+            self.buffer.write(part.read_bytes())
+
+
+def _takes_text(buffer: object) -> bool:
+    return isinstance(buffer, io.TextIOBase)
