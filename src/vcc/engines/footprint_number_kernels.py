@@ -11,7 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from vcc.engines.compiled import compiled
-from vcc.engines.numba_kernels import divide, farthest, share_at
+from vcc.engines.footprint_tables import EntryMasks
+from vcc.engines.numba_kernels import columns_around, divide, farthest, masks_at, share_at
+from vcc.engines.splines import slopes_around
 from vcc.engines.vector_rows import (
     first_four_rows,
     four_dots,
@@ -49,16 +51,21 @@ def mix(tiles, gathered, span, channels, mixed):  # type: ignore[no-untyped-def]
     reaches.
 
     tiles: the raster as `turned` has it. gathered: `Gathered`. span: `Span`. mixed: (kinds, rows, values), rows a
-    multiple of eight, and more.
+    multiple of eight, and more. It is zero in columns of samples that another span has or that are not there, and
+    in the rows beyond.
     """
     first, shares = gathered
     step = np.int64(EIGHT * channels)
     eight = np.empty(EIGHT, np.float32)
+    stop = min(span.stop, first.size)
+    mixed[:, :, : (span.fresh - span.start) * channels] = 0
+    mixed[:, :, (stop - span.start) * channels :] = 0
+    mixed[:, EIGHT * len(tiles) :] = 0
     for kind in range(len(shares)):
         for tile in range(len(tiles)):
             line = tiles[tile].reshape(-1)
             out = mixed[kind, EIGHT * tile : EIGHT * (tile + 1)]
-            for k in range(span.fresh, min(span.stop, first.size)):
+            for k in range(span.fresh, stop):
                 for c in range(channels):
                     eight[:] = 0
                     mix_eight(line, step * first[k] + EIGHT * c, step, shares[kind], k, eight, 0)
@@ -77,7 +84,7 @@ def add_numbers(samples, a, used, fine, tables, masks, sought, channels, span, t
         fine: `FineSamples`, or None.
         tables: the raster as `mix` has it, `Reached`, `Pairs`, and the weight of each tap in what lines of masks
             say.
-        masks: `Meetings`.
+        masks: `MaskLines`, a value for each column of samples; of no mask, or of some.
         sought: `Sought`.
         channels: values a sample.
         span: `Span`.
@@ -115,18 +122,14 @@ def add_rows(  # type: ignore[no-untyped-def]
     # row, by all threads at once.
     firsts, shares, plain, index = reached.first, reached.shares, reached.plain.reshape(-1), reached.indices
     row_kind, column_kind, total_of = pairs.row, pairs.column, pairs.total
-    line, share, slope, counts = masks.line, masks.shares, masks.slopes, masks.reached
+    counts, index_k = reached.counts, span.indices
     texture, place, places = sought.texture, sought.place, sought.places
     lines, to_lines, slopes = masks.lines.reshape(-1), sought.lines.reshape(-1), sought.slopes.reshape(-1)
-    line_pitch, to_pitch, first_k, to, index_k = (
-        masks.lines.shape[1],
-        sought.lines.shape[1],
-        span.start,
-        span.to,
-        span.indices,
-    )
     planes, plane = mixed.reshape(-1), mixed.shape[1] * wide
-    count, width = len(line), shares.shape[3]
+    count, width = masks.row_step.size, shares.shape[3]
+    met = EntryMasks(masks.lines, np.empty((1, count, 3), np.int64), np.empty((1, count, 3), np.float32))
+    line, share = met.places, met.shares
+    mask_row, mask_row_step = masks.row, masks.row_step
     product, seen, rest, lit = (
         np.empty(wide, np.float32),
         np.empty(n, np.float32),
@@ -140,12 +143,12 @@ def add_rows(  # type: ignore[no-untyped-def]
         for x in range(at + AHEAD * pitch, at + AHEAD * pitch + wide, per_line):
             fetch(values, x)
         rows = counts[b, l]
-        if rows == 0:
+        if rows == 0 or not masks_at(masks, b, l, 0, met):
             continue
         y = firsts[b, l] * wide
         if count > 1 or sums > 0:
             for mask in range(count):
-                _through(lines, line, line_pitch, first_k, share, mask, b, l, n, through)
+                _through(lines, line, share, mask, span.start, n, through)
         if looks:
             _seen(planes, y, wide, plain, (b * firsts.shape[1] + l) * width, rows, values, at, product)
             _over_channels(product, channels, n, seen)
@@ -153,10 +156,11 @@ def add_rows(  # type: ignore[no-untyped-def]
                 if texture[mask] or place[mask]:
                     _without(seen, through, mask, count, n, rest)
                     if texture[mask]:
-                        _to_lines(rest, weight, line, share, mask, b, l, n, to, to_pitch, to_lines)
+                        _to_lines(rest, weight, line, share, mask, span.to, n, to_lines)
                     if place[mask]:
-                        _to_places(rest, lines, line_pitch, slopes, line, share, slope, b, l, mask, first_k, n,
-                                   index_k, index[l], places)  # fmt: skip
+                        steep = _steep(mask_row[mask, b] + mask_row_step[mask] * l, share, mask)
+                        _to_places(rest, lines, slopes, line, share, steep, b, mask, span.start, n, index_k,
+                                   index[l], places)  # fmt: skip
         if sums > 0:
             _lit(through, count, n, lit)
             _weighed(values, at, lit, channels, n, product)
@@ -175,22 +179,34 @@ def add_rows(  # type: ignore[no-untyped-def]
 
 
 @_inlined
-def _through(lines, line, pitch, start, share, mask, b, l, n, out):  # type: ignore[no-untyped-def]
+def _through(lines, line, share, mask, start, n, out):  # type: ignore[no-untyped-def]
     """out[mask · n + k]: the weights of a mask along a row of samples."""
-    first, second, third = _places(line, mask, b, l, pitch, start)
-    above, level, below = share[mask, b, l, 0], share[mask, b, l, 1], share[mask, b, l, 2]
+    first, second, third = _places(line, mask, start)
+    above, level, below = share[0, mask, 0], share[0, mask, 1], share[0, mask, 2]
     to = np.uint64(mask * n)
     for k in range(np.uint64(n)):
         out[to + k] = above * lines[first + k] + level * lines[second + k] + below * lines[third + k]
 
 
 @_inlined
-def _places(line, mask, b, l, pitch, start):  # type: ignore[no-untyped-def]
-    """Where three lines of a mask begin."""
+def _places(line, mask, start):  # type: ignore[no-untyped-def]
+    """Where in three lines of a mask a span begins."""
     return (
-        np.uint64(line[mask, b, l, 0] * pitch + start),
-        np.uint64(line[mask, b, l, 1] * pitch + start),
-        np.uint64(line[mask, b, l, 2] * pitch + start),
+        np.uint64(line[0, mask, 0] + start),
+        np.uint64(line[0, mask, 1] + start),
+        np.uint64(line[0, mask, 2] + start),
+    )
+
+
+@_inlined
+def _steep(place, share, mask):  # type: ignore[no-untyped-def]
+    """By how much what three lines of a mask count grows with the place in it."""
+    zero = np.float32(0)
+    first, second, third = slopes_around(place)
+    return (
+        first if share[0, mask, 0] != 0 else zero,
+        second if share[0, mask, 1] != 0 else zero,
+        third if share[0, mask, 2] != 0 else zero,
     )
 
 
@@ -267,35 +283,35 @@ def _weighed(values, at, lit, channels, n, out):  # type: ignore[no-untyped-def]
 
 
 @_inlined
-def _to_lines(seen, weight, line, share, mask, b, l, n, start, pitch, lines):  # type: ignore[no-untyped-def]
+def _to_lines(seen, weight, line, share, mask, start, n, lines):  # type: ignore[no-untyped-def]
     """What a row of samples says of the three lines that it meets."""
     parts = (
-        np.float32(weight * share[mask, b, l, 0]),
-        np.float32(weight * share[mask, b, l, 1]),
-        np.float32(weight * share[mask, b, l, 2]),
+        np.float32(weight * share[0, mask, 0]),
+        np.float32(weight * share[0, mask, 1]),
+        np.float32(weight * share[0, mask, 2]),
     )
-    first, second, third = _places(line, mask, b, l, pitch, start)
+    first, second, third = _places(line, mask, start)
     to_three_rows(seen, parts, (np.int64(first), np.int64(second), np.int64(third)), n, lines)
 
 
 @_inlined
 def _to_places(  # type: ignore[no-untyped-def]
-    seen, lines, pitch, slopes, line, share, slope, b, l, mask, first_k, n, indices, row, places
+    seen, lines, slopes, line, share, steep, b, mask, first_k, n, indices, row, places
 ):
     """What a row of samples says of where it meets a mask, added to the six sums of `Sought`."""
-    first, second, third = _places(line, mask, b, l, pitch, first_k)
-    at_first, at_second, at_third = share[mask, b, l, 0], share[mask, b, l, 1], share[mask, b, l, 2]
-    to_first, to_second, to_third = slope[mask, b, l, 0], slope[mask, b, l, 1], slope[mask, b, l, 2]
+    first, second, third = _places(line, mask, first_k)
+    at_first, at_second, at_third = share[0, mask, 0], share[0, mask, 1], share[0, mask, 2]
+    to_first, to_second, to_third = steep
     start = np.uint64(first_k)
     across, across_k, down, down_k = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
     for k in range(np.uint64(n)):
         light, index = seen[k], indices[start + k]
         slanted = at_first * slopes[first + k] + at_second * slopes[second + k] + at_third * slopes[third + k]
-        steep = to_first * lines[first + k] + to_second * lines[second + k] + to_third * lines[third + k]
+        sloped = to_first * lines[first + k] + to_second * lines[second + k] + to_third * lines[third + k]
         across += light * slanted
         across_k += light * slanted * index
-        down += light * steep
-        down_k += light * steep * index
+        down += light * sloped
+        down_k += light * sloped * index
     places[b, mask, 0] += across
     places[b, mask, 1] += across_k
     places[b, mask, 2] += np.float64(across) * row
@@ -305,28 +321,33 @@ def _to_places(  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def look_up_columns(texture, points, counts, out):  # type: ignore[no-untyped-def]
-    """out[r, k] = Σ counts[n, k] · texture[r, points[n, k]], three points each."""
+def slopes_at_columns(texture, column, out):  # type: ignore[no-untyped-def]
+    """out[r, k]: by how much texture[r] grows at column[k], as `numba_kernels.sample_mask_columns` looks it up."""
+    points, counts = columns_around(column, texture.shape[1])
+    left, here, right = points[0], points[1], points[2]
+    for k in range(column.size):
+        for n, slope in enumerate(slopes_around(column[k])):
+            counts[n, k] = slope if counts[n, k] != 0 else 0
+    before, at, after = counts[0], counts[1], counts[2]
     for r in range(len(texture)):
         line, to = texture[r], out[r]
-        for k in range(points.shape[1]):
-            to[k] = (
-                counts[0, k] * line[points[0, k]]
-                + counts[1, k] * line[points[1, k]]
-                + counts[2, k] * line[points[2, k]]
-            )
+        for k in range(column.size):
+            to[k] = before[k] * line[left[k]] + at[k] * line[here[k]] + after[k] * line[right[k]]
 
 
 @_compiled
-def give_back_columns(lines, points, counts, texture):  # type: ignore[no-untyped-def]
-    """texture[r, points[n, k]] += counts[n, k] · lines[r, k]: the transpose of `look_up_columns`."""
+def give_back_columns(lines, column, texture):  # type: ignore[no-untyped-def]
+    """The transpose of `numba_kernels.sample_mask_columns`, added to a texture, float64."""
+    points, counts = columns_around(column, texture.shape[1])
+    left, here, right = points[0], points[1], points[2]
+    before, at, after = counts[0], counts[1], counts[2]
     for r in range(len(lines)):
         line, to = lines[r], texture[r]
-        for k in range(points.shape[1]):
+        for k in range(column.size):
             value = line[k]
-            to[points[0, k]] += counts[0, k] * value
-            to[points[1, k]] += counts[1, k] * value
-            to[points[2, k]] += counts[2, k] * value
+            to[left[k]] += before[k] * value
+            to[here[k]] += at[k] * value
+            to[right[k]] += after[k] * value
 
 
 # --- where rows and columns do not part ---

@@ -15,7 +15,7 @@ there are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -25,15 +25,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
-from vcc.base.lookup import three_around
 from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
 from vcc.engines import footprint_number_kernels as kernels
 from vcc.engines import footprint_tables as tables
-from vcc.engines.footprint_samples import FineGrid, MaskColumns, MaskPiece, blocks, textures
+from vcc.engines.footprint_axes import axes
+from vcc.engines.footprint_samples import FineGrid, MaskColumns, MaskPiece, blocks, no_masks, textures
 from vcc.engines.vector_sums import EIGHT, LANES
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import REACH, reach_in_pixels, share_slopes, shares
+from vcc.plan.footprints.shares import REACH
 
 Array = NDArray[np.float64]
 
@@ -119,63 +119,6 @@ def _of_masks(core: Footprints, wanted: Collection[str]) -> tuple[NDArray[np.boo
     return np.array(found[0], dtype=bool), np.array(found[1], dtype=bool)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Axis(Brief):
-    """Samples along one axis, and the pixels that they reach.
-
-    Args:
-        origin: pixel coordinate of sample 0 of each tap, (taps,).
-        step: pixels from a sample to the next, before division.
-        index: of the samples, (samples,): fractions where they are divided.
-        refine: finer samples for each one.
-        pixels: how many there are.
-        opening: see `Footprints`.
-        interpolation: see `Footprints`.
-    """
-
-    origin: Array
-    step: float
-    index: Array
-    refine: int
-    pixels: int
-    opening: float
-    interpolation: str
-
-    def table(self, kinds: Sequence[str]) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-        """First pixel and count (taps, samples), and shares (taps, samples, kinds, width) of each kind."""
-        step = self.step / self.refine
-        position = self.origin[:, None] + self.step * self.index
-        reach = reach_in_pixels(self.interpolation, abs(step))
-        low = np.clip(np.ceil(position - reach), 0, self.pixels).astype(np.int64)
-        high = np.clip(np.floor(position + reach), -1, self.pixels - 1).astype(np.int64)
-        count = np.maximum(high - low + 1, 0)
-        first = np.minimum(low, self.pixels - 1)
-        width = -(-max(int(count.max(initial=0)), 1) // 4) * 4
-        pixel = (first[..., None] + np.arange(width)).astype(np.float64)
-        there = np.arange(width) < count[..., None]
-        made = np.zeros((*first.shape, len(kinds), width))
-        for number, share in enumerate(self.shares(kinds, pixel, position[..., None])):
-            made[..., number, :] = np.where(there, share, 0.0)
-        return first, count, made
-
-    def shares(self, kinds: Sequence[str], pixel: Array, position: Array) -> list[Array]:
-        """F of samples at positions in pixels, or how it grows with a number, by kind."""
-        given = self.interpolation, pixel, position, self.step / self.refine, self.opening
-        share, index = shares(*given), self.index[:, None]
-        place = size = opening = np.zeros(())
-        if set(kinds) - {"share", "along"}:
-            place, size, opening = share_slopes(*given)
-        found: dict[str, Callable[[], Array]] = {
-            "share": lambda: share,
-            "along": lambda: index * share,
-            "place": lambda: place,
-            "step": lambda: index * place + np.sign(self.step) / self.refine * size,
-            "opening": lambda: opening,
-            "sheared": lambda: share * (pixel - self.origin[:, None, None]) / self.step,
-        }
-        return [found[kind]() for kind in kinds]
-
-
 def _parts(first: NDArray[np.int64], rows: int) -> NDArray[np.int64]:
     """(parts, taps, 2): which rows of samples begin in each part of the raster; first ascends or descends."""
     part = first // PART
@@ -221,17 +164,13 @@ class _ByColumns:
         ordered = sorted((across.index(x), down.index(y), number) for y, x, number in pairs)
         columns, rows, totals = np.array(ordered, dtype=np.int64).reshape(-1, 3).T
         self.pairs = tables.Pairs(*map(np.ascontiguousarray, (rows, columns, totals)))
-        common = core.refine, core.opening, core.interpolation
-        self.index = [
-            first + np.arange(n) / core.refine
-            for first, n in ((fine.first_row, fine.rows), (fine.first_column, fine.columns))
-        ]
-        along_y = _Axis(core.y[:, 0], core.row_step, self.index[0], common[0], core.raster_shape[0], *common[1:])
-        along_x = _Axis(core.x[0], core.column_step, self.index[1], common[0], core.raster_shape[1], *common[1:])
-        first, self.count, shares = along_y.table(down)
+        along_y, along_x = axes(core, fine)
+        first, counts, shares = along_y.table(down, multiple=4)
         plain, parts = np.ascontiguousarray(shares[:, :, 0], dtype=np.float32), _parts(first, core.raster_shape[0])
-        self.reached = tables.Reached(first, shares, plain, self.index[0], parts)
-        self.first, _, self.gathered = along_x.table(across)
+        self.reached = tables.Reached(first, counts, shares, plain, along_y.index, parts)
+        self.first, _, gathered = along_x.table(across)
+        self.gathered = np.ascontiguousarray(np.moveaxis(gathered, 2, 1), dtype=np.float32)
+        """(columns of taps, kinds, columns of samples, width)"""
         self.tiles = self.turned(np.asarray(raster, dtype=np.float32), self.gathered.shape[-1])
         self.masks = MaskColumns(core, fine, 1, 1, pool)
         self.texture, self.place = _of_masks(core, wanted)
@@ -239,7 +178,7 @@ class _ByColumns:
             np.zeros(mask.texture.shape) if self.texture[n] else None for n, mask in enumerate(core.masks)
         ]
         self.lines, self.slopes = (np.zeros((0, 0), dtype=np.float32) for _ in range(2))
-        self.spans = _spans(self.index[1])
+        self.spans = _spans(along_x.index)
         # Which columns of samples the spans hold, one span after the other.
         held = np.concatenate([np.arange(span.start, span.stop) for span in self.spans])
         self.held = np.minimum(held, fine.columns - 1)
@@ -278,7 +217,7 @@ class _ByColumns:
         samples: tables.Samples,
         a: int,
         used: NDArray[np.intp],
-        masks: tables.Meetings,
+        masks: tables.MaskLines,
         sought: tables.Sought,
         span: tables.Span,
     ) -> tuple[Array, Array]:
@@ -290,10 +229,10 @@ class _ByColumns:
         if self.core.refine > 1:
             whole = self.fine.tables((span.stop - span.start) * self.channels)
             fine = whole._replace(first_column=whole.first_column[some], column_shares=whole.column_shares[some])
-        shares = np.ascontiguousarray(np.moveaxis(self.gathered[a], 0, 1), dtype=np.float32)
+        shares = self.gathered[a]
         length = (span.stop - span.start) * self.channels
         height = EIGHT * len(self.tiles) + self.reached.shares.shape[3]
-        mixed = np.zeros((shares.shape[0], height, length), dtype=np.float32)
+        mixed = np.empty((len(shares), height, length), dtype=np.float32)
         kernels.mix(self.tiles, tables.Gathered(self.first[a], shares), span, self.channels, mixed)
         given = mixed, self.reached, self.pairs, self.weights[:, a] * self.core.scale
         kernels.add_numbers(
@@ -301,38 +240,23 @@ class _ByColumns:
         )
         return totals, places
 
-    def masks_at(self, a: int) -> tuple[tables.Meetings, tables.Sought]:
+    def masks_at(self, a: int) -> tuple[tables.MaskLines, tables.Sought]:
         """Where a column of view taps meets masks, and room for what is sought of them."""
-        found = self.masks.at(a, max(self.fine.columns, LANES))
-        lines = np.zeros((0, 0), dtype=np.float32) if found is None else found.lines
-        shape = (len(self.core.masks), *self.count.shape, 3)
-        line = np.zeros(shape, dtype=np.int64)
-        shares, slopes = np.zeros((2, *shape), dtype=np.float32)
-        count = self.count
-        for n in range(len(self.core.masks)):
-            assert found is not None
-            place = found.row[n][:, None] + found.row_step[n] * np.arange(self.fine.rows)
-            three = three_around(place, int(found.rows[n]))
-            line[n] = np.moveaxis(three[0], 0, -1) + found.begin[n][:, None, None]
-            shares[n], slopes[n] = (np.moveaxis(each, 0, -1) for each in three[1:])
-            count = np.where((place > -1.5) & (place < found.rows[n] + 0.5), count, 0)
+        met = self.masks.at(a, self.held.size) or no_masks()
         if self.texture.any():
-            if len(self.lines) < len(lines):
-                self.lines = np.zeros((len(lines), self.held.size), dtype=np.float32)
+            if len(self.lines) < len(met.lines):
+                self.lines = np.empty(met.lines.shape, dtype=np.float32)
             self.lines[:] = 0
         if self.place.any():
-            if self.slopes.shape != lines.shape:
-                self.slopes = np.zeros(lines.shape, dtype=np.float32)
+            if len(self.slopes) < len(met.lines):
+                self.slopes = np.zeros(met.lines.shape, dtype=np.float32)
             list(self.pool.map(self.look_up, self.masks.pieces))
-        sought = tables.Sought(self.lines, self.slopes, self.texture, self.place, np.zeros((0, 0, 6)))
-        return tables.Meetings(lines, line, shares, slopes, count), sought
+        return met, tables.Sought(self.lines, self.slopes, self.texture, self.place, np.zeros((0, 0, 6)))
 
     def look_up(self, piece: MaskPiece) -> None:
         """The slopes of some lines of a mask."""
-        texture = self.masks.textures[piece.mask]
-        points, _, slopes = three_around(piece.columns, texture.shape[1])
-        out = self.slopes[piece.to : piece.to + piece.stop - piece.start]
-        kernels.look_up_columns(texture[piece.start : piece.stop], points, slopes.astype(np.float32), out)
+        some = self.masks.textures[piece.mask][piece.start : piece.stop]
+        kernels.slopes_at_columns(some, piece.columns, self.slopes[piece.to : piece.to + len(some)])
 
     def give_back(self) -> None:
         """Add what was said of the masks' lines to their textures."""
@@ -347,9 +271,8 @@ class _ByColumns:
         """Add what was said of some lines to the texture."""
         texture = self.textures[piece.mask]
         assert texture is not None
-        points, counts, _ = three_around(piece.columns[self.held], texture.shape[1])
-        lines = self.lines[piece.to : piece.to + piece.stop - piece.start]
-        kernels.give_back_columns(lines, points, counts, texture[piece.start : piece.stop])
+        some = texture[piece.start : piece.stop]
+        kernels.give_back_columns(self.lines[piece.to : piece.to + len(some)], piece.columns[self.held], some)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -149,6 +149,13 @@ class MaskColumns:
         return tables.MaskLines(self.lines, begin, self.rows, row, self.row_step, self.shared)
 
 
+def no_masks() -> tables.MaskLines:
+    """The lines of no mask, for kernels that take some or none."""
+    whole, places = np.zeros(0, dtype=np.int64), np.zeros((0, 1))
+    lines = np.zeros((0, 1), dtype=np.float32)
+    return tables.MaskLines(lines, places.astype(np.int64), whole, places, places[:, 0], 1)
+
+
 def blocks(
     core: Footprints, values: NDArray[Any], by_column: bool
 ) -> Iterator[tuple[tables.Samples, tuple[int, int]]]:

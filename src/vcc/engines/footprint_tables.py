@@ -330,6 +330,7 @@ class Reached(NamedTuple):
 
     Args:
         first: (rows of taps, rows of samples) int64.
+        counts: (rows of taps, rows of samples) int64, how many rows.
         shares: (rows of taps, rows of samples, kinds, width), zero where there is none; the width a multiple of
             four.
         plain: float32, those of the first kind.
@@ -340,6 +341,7 @@ class Reached(NamedTuple):
     """
 
     first: NDArray[np.int64]
+    counts: NDArray[np.int64]
     shares: Array
     plain: NDArray[np.float32]
     indices: Array
@@ -379,7 +381,7 @@ class Span(NamedTuple):
         start: the first.
         stop: after the last.
         fresh: the first that no span before it has.
-        to: where in lines of `Sought` they begin.
+        to: where in lines of `Sought.lines` they begin.
         indices: float32, of all columns of samples.
     """
 
@@ -390,35 +392,16 @@ class Span(NamedTuple):
     indices: NDArray[np.float32]
 
 
-class Meetings(NamedTuple):
-    """Where the rows of samples of one column of view taps meet masks: three lines of each.
-
-    Args:
-        lines: (lines, columns of samples) float32, masks' weights at the columns of the samples.
-        line: (masks, taps, rows of samples, 3) int64, which lines.
-        shares: likewise, float32, what each counts.
-        slopes: likewise, by how much that grows from a row of the mask to the next.
-        reached: (taps, rows of samples) int64, how many rows of the raster each reaches, where it is not dark.
-    """
-
-    lines: NDArray[np.float32]
-    line: NDArray[np.int64]
-    shares: NDArray[np.float32]
-    slopes: NDArray[np.float32]
-    reached: NDArray[np.int64]
-
-
 class Sought(NamedTuple):
     """What is wanted of masks, and where it goes.
 
     Args:
-        lines: (lines, columns of all spans) float32, to which is added what masks' lines say; see `MaskLines`.
-        slopes: like the masks' lines, by how much they grow from a column of theirs to the next.
+        lines: like those of `MaskLines`, but by the columns of all spans: to which is added what they say.
+        slopes: like those of `MaskLines`, by how much they grow from a column of theirs to the next.
         texture: (masks,) whether lines are wanted.
         place: (masks,) whether places are.
         places: (taps, masks, 6) sums that places follow from: of the slope along columns, times k, times l, and
-            the
-            same of the slope along rows.
+            the same of the slope along rows.
     """
 
     lines: NDArray[np.float32]

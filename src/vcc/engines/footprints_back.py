@@ -20,10 +20,11 @@ from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
 from vcc.engines import footprint_back_kernels as kernels
 from vcc.engines import footprint_tables as tables
-from vcc.engines.footprint_samples import FineGrid, MaskColumns, textures
+from vcc.engines.footprint_axes import Axis, axes
+from vcc.engines.footprint_samples import FineGrid, MaskColumns, no_masks, textures
 from vcc.engines.vector_sums import EIGHT
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import REACH, Taps, taps
+from vcc.plan.footprints.shares import REACH, Taps
 
 BAND_BYTES = 2**19
 """Of what is mixed for the rows of samples that are made at once: it stays in the second-level cache."""
@@ -89,15 +90,9 @@ class _ByColumns(_Back):
     def run(self, progress: Progress | None) -> None:
         """Fill the gradient."""
         core, fine = self.core, self.fine
-        rows, columns = core.raster_shape
-        start_y = core.y[:, 0] + core.row_step * fine.first_row
-        start_x = core.x[0] + core.column_step * fine.first_column
-        row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
-        down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
-        across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
-        self.down, self.sideways = _spread(down, fine.rows), _spread(across, fine.columns)
+        self.down, self.sideways = (_spread(axis) for axis in axes(core, fine))
         self.tiles = _eight_side_by_side(self.raster, self.sideways.shares.shape[2])
-        self.mixed = np.empty((rows, self.n), dtype=np.float32)
+        self.mixed = np.empty((core.raster_shape[0], self.n), dtype=np.float32)
         self.masks = MaskColumns(core, fine, 1, 1, self.pool)
         self.weights = (core.weights * core.scale).astype(np.float32)
         done = 0
@@ -111,7 +106,7 @@ class _ByColumns(_Back):
         """Add what a column of view taps reads."""
         mix = partial(kernels.mix_back, self.tiles, self.sideways, a, self.channels)
         list(self.pool.map(lambda band: mix(band, self.mixed), self.pieces(len(self.tiles))))
-        masks = self.masks.at(a, self.fine.columns) or _no_masks()
+        masks = self.masks.at(a, self.fine.columns) or no_masks()
         flat = self.gradient.reshape(-1)
 
         def add(piece: tuple[tables.Readers, tables.Band]) -> None:
@@ -180,10 +175,10 @@ def _bands(rows: int, height: int) -> list[tables.Band]:
     return [tables.Band(start, min(start + height, rows)) for start in range(0, rows, height)]
 
 
-def _spread(gathered: Taps, samples: int) -> tables.Spread:
-    """Where so many samples' light goes, of a table of what pixels gather."""
-    found = gathered.by_sample(samples)
-    return tables.Spread(found.first, found.weights)
+def _spread(axis: Axis) -> tables.Spread:
+    """Where samples' light goes."""
+    first, _, shares = axis.table()
+    return tables.Spread(first, np.ascontiguousarray(shares[:, :, 0], dtype=np.float32))
 
 
 def _division(fine: FineGrid, pitch: int) -> tuple[tables.FineSamples, tables.Spread]:
@@ -194,14 +189,8 @@ def _division(fine: FineGrid, pitch: int) -> tuple[tables.FineSamples, tables.Sp
         whole = np.ones((fine.rows, 1), dtype=np.float32)
         return tables.FineSamples(rows, whole, none, nothing, pitch), tables.Spread(none, nothing)
     across = fine.divided_as[1]
-    shares = Taps(across.first, across.shares.astype(np.float32))
-    return fine.tables(pitch), _spread(shares, fine.samples[1])
-
-
-def _no_masks() -> tables.MaskLines:
-    whole, places = np.zeros(0, dtype=np.int64), np.zeros((0, 1))
-    lines = np.zeros((0, 1), dtype=np.float32)
-    return tables.MaskLines(lines, places.astype(np.int64), whole, places, places[:, 0], 1)
+    of_samples = Taps(across.first, across.shares).by_sample(fine.samples[1])
+    return fine.tables(pitch), tables.Spread(of_samples.first, of_samples.weights)
 
 
 def _eight_side_by_side(raster: Weights, beyond: int) -> Weights:

@@ -271,29 +271,29 @@ def divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untyped
                     out[k * channels + c] = total
 
 
+@_inlined
+def columns_around(column, columns):  # type: ignore[no-untyped-def]
+    """Three of so many columns around each place, (3, places), and what they count there, float32.
+
+    Around the columns it is dark, by weights of zero on columns that exist.
+    """
+    points, counts = np.empty((3, column.size), np.uint64), np.empty((3, column.size), np.float32)
+    last = columns - 1
+    for k in range(column.size):
+        c, before, at, after = three_around(min(max(column[k], -2.0), columns + 1.0))
+        for n, count in enumerate((before, at, after)):
+            points[n, k] = min(max(c + n - 1, 0), last)
+            counts[n, k] = count if 0 <= c + n - 1 <= last else 0
+    return points, counts
+
+
 @_compiled
 def sample_mask_columns(texture, column, repeat, out):  # type: ignore[no-untyped-def]
     """out[r, k · repeat + c] = texture[r] at column[k], by quadratic B-splines, zero outside."""
-    rows, columns = texture.shape
-    left, here, right = (
-        np.empty(column.size, np.uint64),
-        np.empty(column.size, np.uint64),
-        np.empty(column.size, np.uint64),
-    )
-    before, at, after = (
-        np.zeros(column.size, np.float32),
-        np.zeros(column.size, np.float32),
-        np.zeros(column.size, np.float32),
-    )
-    last = columns - 1
-    for k in range(column.size):
-        # Dark columns around the texture, by weights of zero on columns that exist.
-        c, first, second, third = three_around(min(max(column[k], -2.0), columns + 1.0))
-        left[k], here[k], right[k] = min(max(c - 1, 0), last), min(max(c, 0), last), min(max(c + 1, 0), last)
-        before[k] = first if 0 <= c - 1 <= last else 0
-        at[k] = second if 0 <= c <= last else 0
-        after[k] = third if 0 <= c + 1 <= last else 0
-    for r in range(rows):
+    points, counts = columns_around(column, texture.shape[1])
+    left, here, right = points[0], points[1], points[2]
+    before, at, after = counts[0], counts[1], counts[2]
+    for r in range(len(texture)):
         line, to = texture[r], out[r]
         if repeat == 1:
             for k in range(column.size):
