@@ -18,8 +18,10 @@ from vcc.engines.vector_rows import (
     first_four_rows,
     four_dots,
     last_four_rows,
+    last_four_rows_of_threes,
     more_four_rows,
     only_four_rows,
+    only_four_rows_of_threes,
     to_three_rows,
     weigh_ones,
     weigh_threes,
@@ -132,7 +134,7 @@ def add_rows(  # type: ignore[no-untyped-def]
     mask_row, mask_row_step = masks.row, masks.row_step
     product, seen, rest, lit = (
         np.empty(wide, np.float32),
-        np.empty(n, np.float32),
+        np.empty(wide, np.float32),
         np.empty(n, np.float32),
         np.ones(n, np.float32),
     )
@@ -150,8 +152,7 @@ def add_rows(  # type: ignore[no-untyped-def]
             for mask in range(count):
                 _through(lines, line, share, mask, span.start, n, through)
         if looks:
-            _seen(planes, y, wide, plain, (b * firsts.shape[1] + l) * width, rows, values, at, product)
-            _over_channels(product, channels, n, seen)
+            _seen(planes, y, wide, plain, (b * firsts.shape[1] + l) * width, rows, values, at, channels, seen)
             for mask in range(count):
                 if texture[mask] or place[mask]:
                     _without(seen, through, mask, count, n, rest)
@@ -211,37 +212,34 @@ def _steep(place, share, mask):  # type: ignore[no-untyped-def]
 
 
 @_inlined
-def _seen(planes, y, wide, plain, first, rows, values, at, out):  # type: ignore[no-untyped-def]
-    """out[x] = values[at + x] · Σ plain[first + t] · planes[y + t · wide + x], the rows taken in fours."""
+def _seen(planes, y, wide, plain, first, rows, values, at, channels, out):  # type: ignore[no-untyped-def]
+    """out[k] = Σ values[at + x] · Σ plain[first + t] · planes[y + t · wide + x] over the channels x of sample k.
+
+    The rows are taken in fours. out: room for all channels.
+    """
     for t in range(0, rows, 4):
         four = plain[first + t], plain[first + t + 1], plain[first + t + 2], plain[first + t + 3]
         place = y + t * wide
-        if rows <= 4:
-            only_four_rows(planes, place, wide, four, values, at, wide, out)
+        if t + 4 < rows:
+            if t == 0:
+                first_four_rows(planes, place, wide, four, values, at, wide, out)
+            else:
+                more_four_rows(planes, place, wide, four, values, at, wide, out)
+        elif channels == 3:
+            if t == 0:
+                only_four_rows_of_threes(planes, place, wide, four, values, at, wide, out)
+            else:
+                last_four_rows_of_threes(planes, place, wide, four, values, at, wide, out)
         elif t == 0:
-            first_four_rows(planes, place, wide, four, values, at, wide, out)
-        elif t + 4 < rows:
-            more_four_rows(planes, place, wide, four, values, at, wide, out)
+            only_four_rows(planes, place, wide, four, values, at, wide, out)
         else:
             last_four_rows(planes, place, wide, four, values, at, wide, out)
-
-
-@_inlined
-def _over_channels(product, channels, n, seen):  # type: ignore[no-untyped-def]
-    """The sums over the channels of samples."""
-    if channels == 1:
-        for k in range(np.uint64(n)):
-            seen[k] = product[k]
-    elif channels == 3:
-        for k in range(np.uint64(n)):
-            at = k * np.uint64(3)
-            seen[k] = product[at] + product[at + np.uint64(1)] + product[at + np.uint64(2)]
-    else:
-        for k in range(n):
+    if channels != 1 and channels != 3:
+        for k in range(wide // channels):
             total = np.float32(0)
             for c in range(channels):
-                total += product[k * channels + c]
-            seen[k] = total
+                total += out[k * channels + c]
+            out[k] = total
 
 
 @_inlined

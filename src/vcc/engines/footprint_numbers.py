@@ -30,10 +30,18 @@ from vcc.base.workers import Workers
 from vcc.engines import footprint_number_kernels as kernels
 from vcc.engines import footprint_tables as tables
 from vcc.engines.footprint_axes import axes
-from vcc.engines.footprint_samples import FineGrid, MaskColumns, MaskPiece, blocks, no_masks, textures
-from vcc.engines.vector_sums import EIGHT, LANES
+from vcc.engines.footprint_samples import (
+    FineGrid,
+    MaskColumns,
+    MaskPiece,
+    blocks,
+    no_masks,
+    on_raster,
+    textures,
+    view_of,
+)
+from vcc.engines.vector_sums import EIGHT, LANES, room
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import REACH
 
 Array = NDArray[np.float64]
 
@@ -185,9 +193,8 @@ class _ByColumns:
 
     def turned(self, raster: NDArray[np.float32], width: int) -> NDArray[np.float32]:
         """The raster, eight rows side by side, with zeros beyond the last column."""
-        tiles = np.zeros(
-            (-(-len(raster) // EIGHT), raster.shape[1] + width * self.channels, EIGHT), dtype=np.float32
-        )
+        tiles = room(-(-len(raster) // EIGHT), raster.shape[1] + width * self.channels, EIGHT)
+        tiles[:] = 0
         list(self.pool.map(lambda tile: kernels.turned(raster, tile, tiles), range(len(tiles))))
         return tiles
 
@@ -232,7 +239,7 @@ class _ByColumns:
         shares = self.gathered[a]
         length = (span.stop - span.start) * self.channels
         height = EIGHT * len(self.tiles) + self.reached.shares.shape[3]
-        mixed = np.empty((len(shares), height, length), dtype=np.float32)
+        mixed = room(len(shares), height, length)
         kernels.mix(self.tiles, tables.Gathered(self.first[a], shares), span, self.channels, mixed)
         given = mixed, self.reached, self.pairs, self.weights[:, a] * self.core.scale
         kernels.add_numbers(
@@ -245,11 +252,12 @@ class _ByColumns:
         met = self.masks.at(a, self.held.size) or no_masks()
         if self.texture.any():
             if len(self.lines) < len(met.lines):
-                self.lines = np.empty(met.lines.shape, dtype=np.float32)
+                self.lines = room(*met.lines.shape)
             self.lines[:] = 0
         if self.place.any():
             if len(self.slopes) < len(met.lines):
-                self.slopes = np.zeros(met.lines.shape, dtype=np.float32)
+                self.slopes = room(*met.lines.shape)
+                self.slopes[:] = 0  # and so beyond the samples' last column
             list(self.pool.map(self.look_up, self.masks.pieces))
         return met, tables.Sought(self.lines, self.slopes, self.texture, self.place, np.zeros((0, 0, 6)))
 
@@ -326,11 +334,7 @@ def _sheared(
 ) -> _Sums:
     """The sums where rows and columns do not part, view tap by view tap."""
     fine = FineGrid(core)
-    grid = tables.Grid(
-        core.step, core.shear, core.row_step, core.column_step, core.refine, fine.first_column, fine.first_row
-    )
-    name = core.interpolation
-    footprint = tables.Footprint(list(REACH).index(name), REACH[name], core.opening)
+    grid, footprint = on_raster(core, fine)
     masks = textures(core)
     # Each piece of the raster has textures of its own, as many as there is room for.
     pieces = int(np.clip(TEXTURE_BYTES // (8 * max(masks.values.size, 1)), 1, PIECES))
@@ -343,9 +347,8 @@ def _sheared(
     for b, a in zip(*np.nonzero(core.weights), strict=True):
         tell(progress, done, total)
         done += int(weights[b, a] != 0)
-        place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
         samples = fine.divided(values[core.view_rows[b], core.view_columns[a]].reshape(*core.samples, -1))
-        view = tables.View(samples, weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
+        view = view_of(core, b, a, samples, weights)
 
         def add(piece: int, view: tables.View = view, b: int = b, a: int = a) -> None:
             to = found[piece, b, a], places[piece, b, a], gradients[piece]

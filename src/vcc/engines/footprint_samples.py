@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
-from vcc.engines.vector_sums import LANES, SHORTEST
+from vcc.engines.vector_sums import LANES, SHORTEST, room
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import TIE, Division
+from vcc.plan.footprints.shares import REACH, TIE, Division
 
 MASK_LINES = 64
 """Lines of a mask that a thread samples at once."""
@@ -138,7 +138,8 @@ class MaskColumns:
                 total += high - low
         line = pitch // self.shared
         if self.lines.shape[0] < total:
-            self.lines = np.zeros((total, line), dtype=np.float32)  # and zero beyond the samples' last column
+            self.lines = room(total, line)
+            self.lines[:] = 0  # and so beyond the samples' last column
 
         def sample(piece: MaskPiece) -> None:
             texture = self.textures[piece.mask][piece.start : piece.stop]
@@ -187,8 +188,27 @@ def blocks(
         yield tables.Samples(column.reshape(-1), begin, none, pitch, channels), (a, a + 1)
 
 
+# --- where rows and columns do not part ---
+
+
+def on_raster(core: Footprints, fine: FineGrid) -> tuple[tables.Grid, tables.Footprint]:
+    """How samples lie on the raster, and what the footprint of each is there."""
+    first = fine.first_column, fine.first_row
+    grid = tables.Grid(core.step, core.shear, core.row_step, core.column_step, core.refine, *first)
+    name = core.interpolation
+    return grid, tables.Footprint(list(REACH).index(name), REACH[name], core.opening)
+
+
+def view_of(
+    core: Footprints, b: int, a: int, samples: NDArray[np.float32], weights: NDArray[np.float64]
+) -> tables.View:
+    """A view tap with its samples, divided if need be, and its weight among those of all taps."""
+    place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
+    return tables.View(samples, weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
+
+
 def textures(core: Footprints) -> tables.Textures:
-    """The masks' textures in one array, for plans in which rows and columns do not part."""
+    """The masks' textures in one array."""
     size = np.array([mask.texture.shape for mask in core.masks], dtype=np.int64).reshape(-1, 2)
     values = np.zeros((len(core.masks), *size.max(axis=0, initial=1)), dtype=np.float32)
     for texture, mask in zip(values, core.masks, strict=True):

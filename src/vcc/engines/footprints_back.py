@@ -21,10 +21,10 @@ from vcc.base.workers import Workers
 from vcc.engines import footprint_back_kernels as kernels
 from vcc.engines import footprint_tables as tables
 from vcc.engines.footprint_axes import Axis, axes
-from vcc.engines.footprint_samples import FineGrid, MaskColumns, no_masks, textures
-from vcc.engines.vector_sums import EIGHT
+from vcc.engines.footprint_samples import FineGrid, MaskColumns, no_masks, on_raster, textures, view_of
+from vcc.engines.vector_sums import EIGHT, room
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import REACH, Taps
+from vcc.plan.footprints.shares import Taps
 
 BAND_BYTES = 2**19
 """Of what is mixed for the rows of samples that are made at once: it stays in the second-level cache."""
@@ -92,7 +92,7 @@ class _ByColumns(_Back):
         core, fine = self.core, self.fine
         self.down, self.sideways = (_spread(axis) for axis in axes(core, fine))
         self.tiles = _eight_side_by_side(self.raster, self.sideways.shares.shape[2])
-        self.mixed = np.empty((core.raster_shape[0], self.n), dtype=np.float32)
+        self.mixed = room(core.raster_shape[0], self.n)
         self.masks = MaskColumns(core, fine, 1, 1, self.pool)
         self.weights = (core.weights * core.scale).astype(np.float32)
         done = 0
@@ -142,17 +142,7 @@ class _Sheared(_Back):
     def run(self, progress: Progress | None) -> None:
         """Fill the gradient."""
         core, fine = self.core, self.fine
-        grid = tables.Grid(
-            core.step,
-            core.shear,
-            core.row_step,
-            core.column_step,
-            core.refine,
-            fine.first_column,
-            fine.first_row,
-        )
-        name = core.interpolation
-        footprint = tables.Footprint(list(REACH).index(name), REACH[name], core.opening)
+        grid, footprint = on_raster(core, fine)
         masks = textures(core)
         mixed = np.empty((len(self.raster), fine.columns, self.channels), dtype=np.float32)
         lines = self.pieces(len(self.raster))
@@ -160,8 +150,7 @@ class _Sheared(_Back):
         nothing = np.zeros((1, 1, 1), dtype=np.float32)
         for done, (b, a) in enumerate(zip(*np.nonzero(core.weights), strict=True)):
             tell(progress, done, core.taps_used)
-            place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
-            view = tables.View(nothing, core.weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
+            view = view_of(core, b, a, nothing, core.weights)
             mix = partial(kernels.mix_sheared_back, self.raster, view, grid, footprint, fine.columns)
             list(self.pool.map(lambda band, mix=mix: mix(band, mixed), lines))
             flat = self.gradient[core.view_rows[b], core.view_columns[a]].reshape(-1)
@@ -198,4 +187,6 @@ def _eight_side_by_side(raster: Weights, beyond: int) -> Weights:
     rows, columns, channels = raster.shape
     tall = np.zeros((-(-rows // EIGHT) * EIGHT, (columns + beyond) * channels), dtype=np.float32)
     tall[:rows, : columns * channels] = raster.reshape(rows, -1)
-    return np.ascontiguousarray(tall.reshape(-1, EIGHT, tall.shape[1]).swapaxes(1, 2))
+    tiles = room(len(tall) // EIGHT, tall.shape[1], EIGHT)
+    tiles[:] = tall.reshape(-1, EIGHT, tall.shape[1]).swapaxes(1, 2)
+    return tiles

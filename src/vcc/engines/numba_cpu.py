@@ -17,21 +17,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.progress import Progress, part_of, tell
+from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import ray_transpose, rays_compiled, sharpening_kernels
 from vcc.engines.footprint_columns import ByColumns, band_height, bands
 from vcc.engines.footprint_numbers import numbers_back
-from vcc.engines.footprint_samples import FineGrid, textures
+from vcc.engines.footprint_samples import FineGrid, on_raster, textures, view_of
 from vcc.engines.footprints_back import samples_back
 from vcc.engines.footprints_of_many import rasters
 from vcc.engines.ray_numbers import ray_numbers_back
 from vcc.engines.vector_sums import EIGHT
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import REACH
 from vcc.plan.protocol import Gradient, Partial
 from vcc.plan.rays.model import Rays
 
@@ -84,11 +83,11 @@ def footprints_back(
     progress: Progress | None = None,
 ) -> Gradient:
     """What a raster's weights say of samples, float32, and of numbers; see `vcc.plan.protocol.BackRunner`."""
-    parts = int(samples) + bool(wanted)
     core.check_wanted(wanted)
-    return Gradient(
-        samples_back(core, values.shape, raster, threads, part_of(progress, 0, parts)) if samples else None,
-        numbers_back(core, values, raster, wanted, threads, part_of(progress, parts - 1, parts)) if wanted else {},
+    return Gradient.of(
+        partial(samples_back, core, values.shape, raster, threads) if samples else None,
+        partial(numbers_back, core, values, raster, wanted, threads) if wanted else None,
+        progress,
     )
 
 
@@ -115,14 +114,10 @@ def rays_back(
     Of a part of a core that is run with a border of dark views (`vcc.run.drive`), the border's samples are given
     what rays carry to them, too: that belongs to the neighbours, and is left to them.
     """
-    parts = int(samples) + bool(wanted)
-    return Gradient(
-        ray_transpose.scattered(core, values.shape, raster, beside, threads, part_of(progress, 0, parts))
-        if samples
-        else None,
-        ray_numbers_back(core, values, raster, wanted, beside, threads, part_of(progress, parts - 1, parts))
-        if wanted
-        else {},
+    return Gradient.of(
+        partial(ray_transpose.scattered, core, values.shape, raster, beside, threads) if samples else None,
+        partial(ray_numbers_back, core, values, raster, wanted, beside, threads) if wanted else None,
+        progress,
     )
 
 
@@ -220,24 +215,14 @@ def _sheared(
     """The raster (rows, columns × channels) where rows and columns do not part."""
     raster = np.zeros((*core.raster_shape, channels), dtype=np.float32)
     fine = FineGrid(core)
-    grid = tables.Grid(
-        core.step,
-        core.shear,
-        core.row_step,
-        core.column_step,
-        core.refine,
-        fine.first_column,
-        fine.first_row,
-    )
-    footprint = tables.Footprint(list(REACH).index(core.interpolation), REACH[core.interpolation], core.opening)
+    grid, footprint = on_raster(core, fine)
     masks = textures(core)
     for done, (b, a) in enumerate(zip(*np.nonzero(core.weights), strict=True)):
         tell(progress, done, core.taps_used)
-        place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
         samples = fine.divided(values[core.view_rows[b], core.view_columns[a]].reshape(*core.samples, -1))
         if core.masks:
             samples = samples.copy()  # to be weighed
-        view = tables.View(samples, core.weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
+        view = view_of(core, b, a, samples, core.weights)
         if core.masks:
             list(pool.map(partial(kernels.weigh_samples, view, grid, masks), bands(len(samples))))
         add = partial(kernels.sheared_view, view, grid, footprint)

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.progress import Progress, part_of, tell
+from vcc.base.progress import Progress, tell
 from vcc.engines.rays import memory_of_rays, scattered, traced
 from vcc.engines.reference_back import divided, indices
 from vcc.engines.reference_back import footprints_back as footprints_back  # of the engine
@@ -77,12 +78,10 @@ def rays_back(
     Of a part of a core that is run with a border of dark views (`vcc.run.drive`), the border's samples are given
     what rays carry to them, too: that belongs to the neighbours, and is left to them.
     """
-    parts = int(samples) + bool(wanted)
-    return Gradient(
-        scattered(core, values.shape, raster, beside, part_of(progress, 0, parts)) if samples else None,
-        ray_numbers_back(core, values, raster, wanted, beside, threads, part_of(progress, parts - 1, parts))
-        if wanted
-        else {},
+    return Gradient.of(
+        partial(scattered, core, values.shape, raster, beside) if samples else None,
+        partial(ray_numbers_back, core, values, raster, wanted, beside, threads) if wanted else None,
+        progress,
     )
 
 

@@ -23,6 +23,7 @@ from vcc.engines.vector_sums import (
     constant,
     everywhere,
     floats,
+    parted,
     plus,
     samples_at,
 )
@@ -47,10 +48,13 @@ def _along(builder: Any, start: Any, length: Any, step: int, body: Callable[[Any
         body(x)
 
 
-def _four_rows(fresh: bool, last: bool) -> Any:
+def _four_rows(fresh: bool, last: bool = False, channels: int = 1) -> Any:
     @intrinsic
     def four_rows(typing_context, planes, place, step, shares, values, at, length, out):  # type: ignore[no-untyped-def]
         """out[x] = Σ shares[t] · planes[place + t · step + x] of four rows, or added to what is there.
+
+        The last of several times four rows multiplies that by samples, and adds up their three channels: into
+        out[x / 3].
 
         Args:
             typing_context: Numba's.
@@ -58,10 +62,10 @@ def _four_rows(fresh: bool, last: bool) -> Any:
             place: where the first row begins.
             step: from a row to the next.
             shares: four float32.
-            values: samples, by which the last of several times four rows are multiplied with what is there.
+            values: samples.
             at: where their row begins.
             length: how many.
-            out: the result.
+            out: the result. Of three channels out[x / 3] is written after what is there at x has been read.
         """
         place_kind, four = types.int64, types.UniTuple(types.float32, 4)
         signature = types.void(planes, place_kind, place_kind, four, values, place_kind, place_kind, out)
@@ -72,7 +76,7 @@ def _four_rows(fresh: bool, last: bool) -> Any:
             counts = [everywhere(builder, each) for each in cgutils.unpack_tuple(builder, shares)]
             begins = [builder.add(begin, builder.mul(constant(t), step)) for t in range(4)]
 
-            def mix(x: Any) -> None:
+            def mixed(x: Any) -> Any:
                 runs = [_run(builder, rows, builder.add(each, x)) for each in begins]
                 total = builder.fmul(counts[0], runs[0], flags=FLAGS)
                 for count, run in zip(counts[1:], runs[1:], strict=True):
@@ -83,9 +87,18 @@ def _four_rows(fresh: bool, last: bool) -> Any:
                     here = builder.gep(samples, [builder.add(at, x)])
                     sample = samples_at(context, builder, here, signature.args[4].dtype)
                     total = builder.fmul(total, sample, flags=FLAGS)
-                _keep(builder, total, to, x)
+                return total
 
-            _along(builder, constant(0), length, LANES, mix)
+            def mix(x: Any) -> None:
+                runs = [mixed(builder.add(x, constant(n * LANES))) for n in range(channels)]
+                if channels == 3:
+                    one, two, three = parted(builder, runs)
+                    both = builder.fadd(one, two, flags=FLAGS)
+                    _keep(builder, builder.fadd(both, three, flags=FLAGS), to, builder.udiv(x, constant(3)))
+                else:
+                    _keep(builder, runs[0], to, x)
+
+            _along(builder, constant(0), length, channels * LANES, mix)
             return context.get_dummy_value()
 
         return signature, generate
@@ -93,10 +106,12 @@ def _four_rows(fresh: bool, last: bool) -> Any:
     return four_rows
 
 
-first_four_rows = _four_rows(fresh=True, last=False)
-more_four_rows = _four_rows(fresh=False, last=False)
+first_four_rows = _four_rows(fresh=True)
+more_four_rows = _four_rows(fresh=False)
 last_four_rows = _four_rows(fresh=False, last=True)
 only_four_rows = _four_rows(fresh=True, last=True)
+last_four_rows_of_threes = _four_rows(fresh=False, last=True, channels=3)
+only_four_rows_of_threes = _four_rows(fresh=True, last=True, channels=3)
 
 
 @intrinsic

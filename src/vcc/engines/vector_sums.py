@@ -7,14 +7,17 @@ intermediate language, for any type of samples; the compiler makes of it what th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import llvmlite.binding
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 ROWS = 4
 """Rows of the raster that are summed at once."""
@@ -42,6 +45,16 @@ SHORTEST = max(RUN, RUN_OF_THREES)
 WIDE = ir.VectorType(ir.FloatType(), LANES)
 PLACE, NUMBER = ir.IntType(64), ir.IntType(32)
 FLAGS = ["contract"]
+
+
+def room(*shape: int) -> NDArray[np.float32]:
+    """An array whose first number stands where a vector may begin: one that lies across two lines of the cache
+    takes as long as two. NumPy's own arrays begin anywhere.
+    """
+    size = math.prod(shape)
+    wide = np.empty(size + LANES, dtype=np.float32)
+    start = -wide.ctypes.data // wide.itemsize % LANES
+    return wide[start : start + size].reshape(shape)
 
 
 def constant(number: int) -> Any:
@@ -223,14 +236,14 @@ def _totals(
     return [[builder.load(total) for total in row] for row in totals]
 
 
-def _whole_rows(vectors: int, repeat: int | None = None, parted: bool = False) -> Any:
+def _whole_rows(vectors: int, repeat: int | None = None, apart: bool = False) -> Any:
     run = vectors * LANES
 
     @intrinsic
     def sum_whole_rows(typing_context, values, entries, masks, sums, to, length):  # type: ignore[no-untyped-def]
         """sums[r, to + x] = Σ shares[e, r] · values[places[e] + x], for r = 0 … 3 and all x of a row.
 
-        Where sums are parted, each run of ``RUN_OF_THREES`` values has the sums of the first channel of its
+        Where channels are apart, each run of ``RUN_OF_THREES`` values has the sums of the first channel of its
         pixels, then those of the second and the third; and each begins behind the one before it, though the values
         of the last begin earlier, so as to end with the row.
 
@@ -256,8 +269,8 @@ def _whole_rows(vectors: int, repeat: int | None = None, parted: bool = False) -
                 here = builder.select(builder.icmp_signed("<", x, last), x, last)
                 totals = _totals(context, builder, signature, (values, entries, here), vectors, weighed)
                 for row, total in enumerate(totals):
-                    written = _parted(builder, total) if parted else total
-                    begin = builder.add(builder.add(to, builder.mul(constant(row), pitch)), x if parted else here)
+                    written = parted(builder, total) if apart else total
+                    begin = builder.add(builder.add(to, builder.mul(constant(row), pitch)), x if apart else here)
                     for k, each in enumerate(written):
                         pointer = builder.gep(sums, [builder.add(begin, constant(k * LANES))])
                         builder.store(each, builder.bitcast(pointer, WIDE.as_pointer()), align=4)
@@ -277,7 +290,7 @@ def _picked(builder: Any, three: Sequence[Any], lanes: Sequence[int]) -> Any:
     return builder.shuffle_vector(of_two, three[2], ir.Constant(kind, second))
 
 
-def _parted(builder: Any, three: Sequence[Any]) -> list[Any]:
+def parted(builder: Any, three: Sequence[Any]) -> list[Any]:
     """Pixels of three channels, channel by channel."""
     return [_picked(builder, three, [3 * n + c for n in range(LANES)]) for c in range(3)]
 
@@ -294,8 +307,8 @@ add_masked_rows_of_threes = _rows_adder(3, repeat=3)
 sum_whole_rows = _whole_rows(VECTORS)
 sum_masked_whole_rows = _whole_rows(VECTORS, repeat=1)
 sum_masked_whole_rows_of_threes = _whole_rows(3, repeat=3)
-part_whole_rows = _whole_rows(3, parted=True)
-part_masked_whole_rows = _whole_rows(3, repeat=3, parted=True)
+part_whole_rows = _whole_rows(3, apart=True)
+part_masked_whole_rows = _whole_rows(3, repeat=3, apart=True)
 
 
 @intrinsic

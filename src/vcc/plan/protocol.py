@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, part_of
 from vcc.fields.grid import Block
 
 
@@ -74,6 +74,26 @@ class Gradient(Brief):
 
     samples: Any = None
     numbers: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        samples: Callable[[Progress | None], Any] | None,
+        numbers: Callable[[Progress | None], Mapping[str, NDArray[np.float64]]] | None,
+        progress: Progress | None,
+    ) -> Gradient:
+        """What is said of samples, and then what is said of numbers; None for what nobody asked.
+
+        Args:
+            samples: finds it, and calls the progress that it is given.
+            numbers: likewise.
+            progress: of both together.
+        """
+        parts = (samples is not None) + (numbers is not None)
+        return cls(
+            None if samples is None else samples(part_of(progress, 0, parts)),
+            {} if numbers is None else numbers(part_of(progress, parts - 1, parts)),
+        )
 
     def __add__(self, other: Gradient) -> Gradient:
         """What two rasters, or two parts of one, say of the same samples and numbers."""
