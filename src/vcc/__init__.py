@@ -79,6 +79,7 @@ _HOMES = {
 _MODULES = {
     "analysis",
     "gallery",
+    "jax",
     "kernels",
     "patterns",
     "plot",

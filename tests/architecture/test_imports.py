@@ -56,6 +56,7 @@ FACES = {
     "demo.scene",
     "errors",
     "formats.pictures",
+    "jax",
     "kernels",
     "operators",
     "patterns",
@@ -83,8 +84,11 @@ BY_NAME = {
 NEVER = {"torch", "deepinv", "jax", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""
 
-OF_TORCH = re.compile(r"torch|(learn|run)\.torch_\w+")
-"""But these: they are for programs that use PyTorch, and nothing else of ours imports them, but by name."""
+LEARNING = {
+    "torch": re.compile(r"torch|(learn|run)\.torch_\w+"),
+    "jax": re.compile(r"jax|learn\.jax_\w+"),
+}
+"""But these: they are for programs that use that library, and nothing else of ours imports them, but by name."""
 
 LATE = {
     "numba",
@@ -236,14 +240,17 @@ def test_only_those_listed_load_modules_by_name():
 @pytest.mark.parametrize("module", INSIDE)
 def test_heavy_libraries_are_never_imported(module):
     heavy = {name.split(".")[0] for name, _ in imports(MODULES[module])} & NEVER
-    assert not heavy - ({"torch", "deepinv"} if OF_TORCH.fullmatch(module) else set())
+    may = {library for library, modules in LEARNING.items() if modules.fullmatch(module)}
+    assert not heavy - may - ({"deepinv"} if "torch" in may else set())
 
 
-def test_what_imports_torch_is_imported_by_its_face_only():
+@pytest.mark.parametrize("library", LEARNING)
+def test_what_imports_a_library_that_learns_is_imported_by_its_face_only(library):
+    of_library = LEARNING[library]
     for module in INSIDE:
         imported = GRAPH[module] - (named(MODULES[module]) if module in BY_NAME else set())
-        of_torch = {target for target in imported if OF_TORCH.fullmatch(target)}
-        assert not of_torch or OF_TORCH.fullmatch(module), module
+        heavy = {target for target in imported if of_library.fullmatch(target)}
+        assert not heavy or of_library.fullmatch(module), module
 
 
 def test_importing_vcc_and_making_a_camera_loads_nothing_slow():

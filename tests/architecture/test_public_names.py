@@ -17,6 +17,7 @@ NAMES = {
     "vcc.formats.pictures": "read_picture",
     "vcc.formats.writing": "save_light_field",
     "vcc.gallery": "ENTRIES entries entry write_entry",
+    "vcc.jax": "CameraFunction",
     "vcc.kernels": "Gaussian Radial Samples TopHat",
     "vcc.operators": "masked projected resampled scattered",
     "vcc.patterns": "Bounded Cells Circle CosineSum Polygon mura",

@@ -271,13 +271,14 @@ def plain(name: str, value: object) -> None:
         return
     if getattr(value, "requires_grad", False) is True:
         what = "a tensor that requires a gradient, and would lose it here: give the number, without it, and learn"
+        learning = "vcc.torch.CameraModule"
     elif any(kind.__name__ == "Tracer" for kind in type(value).__mro__):
         what = "traced by JAX, and elements are made of numbers that are known: give the number, and learn"
+        learning = "vcc.jax.CameraFunction"
     else:
         return
     raise InputError(
-        f"{name} is {what} the parameter by its name, vcc.torch.CameraModule(camera, light_field, "
-        'learn=["element.parameter"])'
+        f'{name} is {what} the parameter by its name, {learning}(camera, light_field, learn=["element.parameter"])'
     )
 
 

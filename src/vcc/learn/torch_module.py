@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from vcc.advice.explain import explained
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.learn.parameters import SENSOR, Parameter, parameter, put, read
-from vcc.learn.scales import scale
+from vcc.learn.pictures import (
+    Work,
+    by_an_engine,
+    check_samples,
+    explained_while_learning,
+    kept_in,
+    listed,
+    several_of,
+)
 from vcc.learn.torch_constraints import INVERSES
 from vcc.learn.torch_electronics import exposed
-from vcc.learn.torch_picture import Work, pictures
+from vcc.learn.torch_picture import pictures
 from vcc.learn.verdicts import ELECTRONICS
 from vcc.optics.train import Train
 from vcc.plan.how import How
@@ -107,13 +113,13 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
     ) -> None:
         super().__init__()
         check_is_light_field(light_field)
-        names = _listed(learn)
+        names = listed(learn)
         for name in constraints or {}:
             if name not in names:
                 raise InputError(
                     f"{name} has constraints and is not learned: add it to learn=[…], or leave them out"
                 )
-        chosen = _checked(How.of(how, options))
+        chosen = by_an_engine(How.of(how, options))
         in_pictures = tuple(name for name in names if not name.startswith(ELECTRONICS))
         self._work = Work.of(camera, light_field, chosen, in_pictures)
         self._learned = {
@@ -121,7 +127,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
                 name,
                 _key(found := parameter(camera, name)),
                 found.array().shape,
-                2.0 ** round(math.log2(scale(camera, name))),
+                kept_in(camera, name),
                 _several(name, (constraints or {}).get(name, ())),
             )
             for name in names
@@ -174,12 +180,8 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         numbers = self._numbers(values)
         given = None if samples is None else _as_samples(samples, self._work.light_field.grid)
         in_pictures = {name: numbers[name] for name in self._work.chain.names}
-        several = {name for name, number in in_pictures.items() if number.ndim > len(self._learned[name].shape)}
-        counts = {len(in_pictures[name]) for name in several}
-        if len(counts) > 1:
-            raise InputError(
-                f"values for {', '.join(sorted(several))} have different numbers of pictures: {counts}"
-            )
+        shapes = {name: tuple(number.shape) for name, number in in_pictures.items()}
+        several = several_of(shapes, {name: self._learned[name].shape for name in shapes})
         return pictures(self._work, given, in_pictures, several)
 
     def values(self) -> dict[str, torch.Tensor]:
@@ -265,22 +267,8 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
 
     def explain(self) -> str:
         """The plan in words, and what planning again with what was learned would decide otherwise."""
-        work = self._work
-        arrays = self._as_arrays()
-        in_pictures = {name: arrays[name] for name in work.chain.names}
-        plan = work.chain.plan(in_pictures)
-        learned = "\n".join(
-            f"  {name}: {'×'.join(map(str, each.shape)) or 'a number'}, in steps of {each.scale:.3g}"
-            for name, each in self._learned.items()
-        )
-        otherwise = work.chain.replanned(in_pictures)
-        said = (
-            "Planning again would decide as it was decided."
-            if not otherwise
-            else f"Planning again (model.replan()) would decide otherwise: {', '.join(otherwise)}."
-        )
-        parts = [str(explained(put(work.camera, arrays), work.light_field, plan, work.how))]
-        return "\n\n".join([*parts, f"What is learned\n{learned or '  nothing'}", said])
+        scales = {name: each.scale for name, each in self._learned.items()}
+        return explained_while_learning(self._work, self._as_arrays(), scales, "model.replan()")
 
     def replan(self) -> None:
         """Decide anew, by what was learned, how the picture is made; parameters and their scales stay."""
@@ -323,32 +311,12 @@ def _undisturbed(function: Callable[..., torch.Tensor], *arguments: Any) -> torc
 # --- what is given ---
 
 
-def _listed(learn: Any) -> tuple[str, ...]:
-    if isinstance(learn, str):
-        raise InputError(f'learn is a list of names: write learn=["{learn}"]')
-    names = tuple(learn)
-    for name in names:
-        if not isinstance(name, str):
-            raise InputError(f"learn is a list of names of parameters, not of {type(name).__name__}")
-        if names.count(name) > 1:
-            raise InputError(f"{name} is listed {names.count(name)} times in learn: once will do")
-    return names
-
-
 def _several(name: str, constraints: Any) -> tuple[Constraint, ...]:
     listed = tuple(constraints) if isinstance(constraints, tuple | list) else (constraints,)
     for constraint in listed:
         if not callable(constraint):
             raise InputError(f"constraints of {name} are functions of tensors, not {type(constraint).__name__}")
     return listed
-
-
-def _checked(how: How) -> How:
-    if how.engine == "array_api":
-        raise InputError(
-            "engine='array_api' carries gradients to samples only: leave it out (numba), or pass 'reference', here"
-        )
-    return how if how.engine is not None else replace(how, engine="numba")
 
 
 def _key(found: Parameter) -> str:
@@ -362,12 +330,7 @@ def _as_numbers(value: Any, learned: _Learned) -> torch.Tensor:
         kind = value.dtype if isinstance(value, torch.Tensor) else type(value).__name__
         raise InputError(f"values for {learned.name} are a tensor of floating point, not {kind}")
     _check_device(f"values for {learned.name}", value)
-    lead = value.ndim - len(learned.shape)
-    if lead not in (0, 1) or tuple(value.shape[lead:]) != learned.shape or value.shape[:lead] == (0,):
-        raise InputError(
-            f"values for {learned.name} have the shape {learned.shape}, or that with an axis of pictures in "
-            f"front, not {tuple(value.shape)}"
-        )
+    several_of({learned.name: tuple(value.shape)}, {learned.name: learned.shape})
     return value
 
 
@@ -383,13 +346,7 @@ def _as_samples(samples: Any, grid: Grid) -> torch.Tensor:
             f"samples are {', '.join(str(kind).removeprefix('torch.') for kind in KINDS)}, not {samples.dtype}: "
             "convert them, samples.float()"
         )
-    if tuple(samples.shape[-len(grid.shape) :]) != grid.shape:
-        raise InputError(
-            f"samples have the shape {tuple(samples.shape)}, and the light field of this module has {grid.shape}, "
-            "with any number of axes in front for several of them"
-        )
-    if 0 in samples.shape:
-        raise InputError(f"samples of shape {tuple(samples.shape)} are none")
+    check_samples(tuple(samples.shape), grid)
     return samples
 
 
