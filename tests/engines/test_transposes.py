@@ -217,6 +217,7 @@ def test_the_way_back_through_what_is_done_before(name, shape):
     assert abs(np.vdot(ahead.astype(float), y) - np.vdot(x.astype(float), plain)) <= ROUNDING * size
     assert np.abs(found - plain).max() <= 1e-6 * np.abs(plain).max()
     assert NUMBA.prepared_back(BEFORE[name], y, 3).tobytes() == found.tobytes()
+    assert NUMBA.prepared_back(BEFORE[name], y, 3, written_over=True).tobytes() == found.tobytes()
 
 
 def test_bytes_are_weighed_by_the_caller_with_what_their_numbers_stand_for():

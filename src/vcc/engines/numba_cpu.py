@@ -132,13 +132,17 @@ def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: 
 
 
 def prepared_back(
-    before: Sequence[operators.Before], values: NDArray[np.floating], threads: int
+    before: Sequence[operators.Before],
+    values: NDArray[np.floating],
+    threads: int,
+    *,
+    written_over: bool = False,
 ) -> NDArray[np.floating]:
     """The transpose of `prepared`, float32; see `vcc.plan.protocol.Engine.prepared_back`."""
     for operator in reversed(before):
         match operator:
             case operators.SharpenViews(weights):
-                values = sharpening_kernels.given_back(weights, values, threads)
+                values = sharpening_kernels.given_back(weights, values, threads, written_over)
             case operators.BlurViews():
                 values = _blurred_back(operator, values, threads)
             case _:

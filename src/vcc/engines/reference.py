@@ -98,7 +98,9 @@ def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: 
     return values
 
 
-def prepared_back(before: Sequence[operators.Before], values: Array, threads: int) -> Array:
+def prepared_back(
+    before: Sequence[operators.Before], values: Array, threads: int, *, written_over: bool = False
+) -> Array:
     """The transpose of `prepared`, float64; see `vcc.plan.protocol.Engine.prepared_back`."""
     for operator in reversed(before):
         values = operator.transpose(values)

@@ -39,18 +39,23 @@ def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int |
     return kept
 
 
-def given_back(weights: tuple[int, int, int], values: NDArray[Any], threads: int) -> NDArray[np.float32]:
+def given_back(
+    weights: tuple[int, int, int], values: NDArray[Any], threads: int, written_over: bool = False
+) -> NDArray[np.float32]:
     """The transpose of `filtered`, float32: what weights of filtered samples say of the samples as given.
 
     Rounding is left out, and so is the unit of what 8 bits become: see `vcc.plan.protocol.Engine.prepared_back`.
     """
-    found = np.empty(values.shape, dtype=np.float32)
+    in_place = written_over and values.dtype == np.float32 and values[0, 0].flags.c_contiguous
+    found = values if in_place else np.empty(values.shape, dtype=np.float32)
     factors = (np.array(weights) * 2.0**-DIGITS).astype(np.float32)
     rows, channels = values.shape[2], values.shape[4] if values.ndim == 5 else 1
 
     def give_row(row: int) -> None:
         for column in range(values.shape[1]):
-            view = np.ascontiguousarray(values[row, column], dtype=np.float32).reshape(rows, -1)
+            view = values[row, column]
+            view = view.copy() if in_place else np.ascontiguousarray(view, dtype=np.float32)
+            view = view.reshape(rows, -1)
             give_back(view, found[row, column].reshape(rows, -1), channels, factors)
 
     with Workers(threads) as pool:

@@ -196,7 +196,9 @@ class Engine(Protocol):
         """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it."""
         ...
 
-    def prepared_back(self, before: Sequence[Any], values: Any, threads: int) -> Any:
+    def prepared_back(
+        self, before: Sequence[Any], values: Any, threads: int, *, written_over: bool = False
+    ) -> Any:
         """The transpose of `prepared`: of weights of the samples that a core takes, those of the samples given.
 
         The operators' ``transpose``, the last one first. Each is the adjoint of its operator on real numbers: what
@@ -208,6 +210,7 @@ class Engine(Protocol):
             before: the operators, in the order in which they are applied.
             values: weights (v, u, t, s[, channels]) of what comes out of the last one.
             threads: how many work at once.
+            written_over: whether ``values`` may be, as nobody needs them any more: new memory takes long.
 
         Returns:
             Of the shape of the samples that the first one takes: float32 (float64 by ``reference``).

@@ -269,7 +269,7 @@ class Backwards:
     def _before(self, block: Block, weights: NDArray[Any], samples: bool) -> tuple[Block, Gradient]:
         """What weights of a block's samples as the core takes them say of those that they are made of."""
         if self.drive.unit != 1:
-            weights = weights / self.drive.unit
+            weights /= self.drive.unit  # which an engine has made for nobody else
         grown, beside = self.drive.with_reach(block)
         if any(beside):
             weights = np.pad(weights, [(0, 0), (0, 0), beside, *[(0, 0)] * (weights.ndim - 3)])
@@ -283,7 +283,8 @@ class Backwards:
             if n in self.of_before:
                 numbers |= _named(f"before[{n}].", operator.pull(given[n], weights, self.of_before[n]))
             if n or samples:
-                weights = self.drive.engine.prepared_back((operator,), weights, self.drive.threads)
+                engine, threads = self.drive.engine, self.drive.threads
+                weights = engine.prepared_back((operator,), weights, threads, written_over=True)
         return grown, Gradient(weights.astype(self._kind, copy=False) if samples else None, numbers)
 
 
