@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from vcc.base.showing import answered_by
 from vcc.base.version import VERSION
 
 if TYPE_CHECKING:
@@ -93,6 +94,9 @@ _MODULES = {
 }
 
 __all__ = [*sorted(_HOMES), *sorted(_MODULES)]
+
+
+answered_by(lambda thing: importlib.import_module("vcc.notebook").exhibit(thing))
 
 
 def __getattr__(name: str) -> Any:

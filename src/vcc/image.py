@@ -13,6 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.fields.sampled import IMAGE_AXES, Index, as_array, indices, taken, to_numpy
 from vcc.files.destination import Target
@@ -23,7 +24,7 @@ from vcc.optics.train import Train
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Image:
+class Image(Shown):
     """Mean irradiance over each pixel, as light lands on the sensor.
 
     Args:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vcc.base.errors import InputError, warn_of_result
+from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.fields.sampled import as_array
 from vcc.files.destination import Target
@@ -26,7 +27,7 @@ from vcc.run.photon_transfer import photon_transfer as photon_transfer
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(RawPicture):
+class Recording(RawPicture, Shown):
     """The digital numbers that a sensor gave, as they are read out, and what is needed to understand them.
 
     Made by `vcc.Camera.expose` and `expose_image`; or of numbers kept in a file, with the camera's sensor

@@ -41,6 +41,7 @@ ROOMS = [
     "sources",
     "analysis",
     "recover",
+    "notebook",
     "showcase",
     "gallery",
     "demo",
@@ -67,7 +68,7 @@ FACES = {
 """Modules by which users import what stands in a folder: nothing of ours imports them."""
 
 BY_NAME = {
-    "": "names of `vcc` are loaded when they are first used",
+    "": "names of `vcc` are loaded when they are first used, and what shows things in notebooks, too",
     "base.late": "what the others load with",
     "store.compression": "a codec is a class of Zarr's, which takes long to load",
     "sources.planes": "pictures of planes are mixed by compiled loops",

@@ -8,6 +8,7 @@ import textwrap
 from vcc.advice import explain_footprints, explain_rays, explain_store
 from vcc.advice.limits import sampling_limits
 from vcc.advice.words import in_words
+from vcc.base.showing import Shown
 from vcc.fields.grid import SAMPLES_IN_WORDS, Grid
 from vcc.fields.samples import Samples
 from vcc.optics.train import Train
@@ -22,7 +23,7 @@ PLACES_END = 20
 """The column at which an element's words begin, behind its place on the axis."""
 
 
-class Explanation(str):
+class Explanation(Shown, str):
     """Text that shows itself plainly in a notebook or at the prompt."""
 
     __slots__ = ("expected_seconds", "plan")

@@ -12,6 +12,7 @@ from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
+from vcc.base.showing import Shown
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ _BATCH = 2**22
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OptimisedAperture(Brief):
+class OptimisedAperture(Brief, Shown):
     """The best pattern that a search met, and how it went.
 
     Args:

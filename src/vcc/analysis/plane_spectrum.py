@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.fields.sampled import to_numpy
 from vcc.image import Image
 from vcc.optics import Mask
@@ -24,7 +25,7 @@ BLOCK_BYTES = 2**24
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PlaneSpectrum:
+class PlaneSpectrum(Shown):
     """A 2-D spectrum: ∫∫ g(x, y) exp(−2πi (fx·x + fy·y)) dx dy at a grid of frequencies.
 
     Args:

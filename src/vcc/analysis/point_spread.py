@@ -19,6 +19,7 @@ from vcc.analysis.point_rays import MOST_CELLS, PointRays, Spot
 from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.camera import Camera
 
@@ -33,7 +34,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PointSpread:
+class PointSpread(Shown):
     """The picture of a point of light.
 
     Args:

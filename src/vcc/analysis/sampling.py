@@ -13,6 +13,7 @@ from vcc.advice.limits import GREEN_LIGHT, sampling_limits
 from vcc.advice.words import SamplingLimits
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.optics.train import Train
@@ -27,7 +28,7 @@ COLUMNS = 100
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SamplingAdvice(SamplingLimits):
+class SamplingAdvice(SamplingLimits, Shown):
     """Limits of sampling, of paraxial optics and of diffraction, of one camera and one light field.
 
     ``advice["disparity near"].value`` is a number; ``str(advice)`` tells all in words, ``advice.plot()`` draws it.

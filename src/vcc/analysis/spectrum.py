@@ -26,6 +26,7 @@ from vcc.analysis.plane_spectrum import PlaneSpectrum, transformed_along
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_samples
+from vcc.base.showing import Shown
 from vcc.fields.grid import Sample
 from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
 from vcc.light_field import LightField
@@ -40,7 +41,7 @@ ROUNDING = 2e-5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Spectrum:
+class Spectrum(Shown):
     """A light field's 4-D spectrum: complex amplitudes, and the frame of the samples that they come from.
 
     Args:

@@ -40,6 +40,24 @@ def parameters_in_words(thing: Any, leave_out: tuple[str, ...] = ()) -> str:
     return ", ".join(parts)
 
 
+def parameters_listed(thing: Any, leave_out: tuple[str, ...] = ()) -> list[tuple[str, str]]:
+    """All parameters of a dataclass that are given, defaults too: (name, value with its unit), in words.
+
+    Args:
+        thing: as for `parameters_in_words`.
+        leave_out: names of fields to pass over.
+    """
+    listed = []
+    for parameter in fields(thing):
+        value = getattr(thing, parameter.name)
+        if parameter.name in leave_out or value is None or (isinstance(value, str) and not value):
+            continue
+        said = {True: "yes", False: "no"}[value] if isinstance(value, bool) else ""
+        unit = parameter.metadata.get("unit")
+        listed.append((parameter.name.replace("_", " "), said or _value(value, unit)))
+    return listed
+
+
 class Brief:
     """A base of dataclasses (``repr=False``) whose arrays and long lists are told by shape and range."""
 

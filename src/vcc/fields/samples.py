@@ -13,6 +13,7 @@ import numpy as np
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
+from vcc.base.showing import Shown
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, check_frame, check_shape, told_along_u
 from vcc.fields.parallax import disparity_range
@@ -46,7 +47,7 @@ class Samples(Protocol):
         ...
 
 
-class OnGrid(ABC):
+class OnGrid(Shown, ABC):
     """What a light field says of itself by its grid, wherever its samples are."""
 
     @property

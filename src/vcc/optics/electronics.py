@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 
 PLANCK: Final = 6.62607015e-34
 """Planck's constant h, J·s; exact in the SI of 2019."""
@@ -29,7 +30,7 @@ _LETTERS: Final = "RGB"
 
 
 @dataclass(frozen=True)
-class Electronics:
+class Electronics(Shown):
     """How the pixels of a sensor turn light into numbers, in the terms of EMVA 1288.
 
     The defaults are those of a common monochrome machine-vision sensor (CMOS, global shutter, pixels of about

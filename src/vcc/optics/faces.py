@@ -19,6 +19,7 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.describe import kind_in_words, parameters_in_words
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.optics.deflections import Deflection, as_deflection
 from vcc.optics.scatter import Scatter
 from vcc.shapes.kernels import Kernel
@@ -104,7 +105,7 @@ def _check_thin(deflection: Affine) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Element(abc.ABC):
+class Element(Shown, abc.ABC):
     """An element on the axis. A new one is a frozen dataclass with parameters and one method, `faces`.
 
     Args:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.optics.electronics import Electronics
 
 
 @dataclass(frozen=True)
-class Sensor:
+class Sensor(Shown):
     """A flat sensor across the axis; a pixel records the mean irradiance over its sensitive area.
 
     Args:

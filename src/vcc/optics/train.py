@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.base.values import Value
 from vcc.optics.faces import Element, Faces
@@ -155,7 +156,7 @@ def about(middle: tuple[float, float], ray_map: Affine) -> Affine:
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Train(Value):
+class Train(Value, Shown):
     """Elements along an axis and a sensor behind them: all that is true of a camera without computing a picture.
 
     A light field given to it is taken to lie at the entrance plane, z = 0. Trains of equal elements and sensors

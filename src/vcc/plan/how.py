@@ -11,6 +11,7 @@ from typing import Any, Literal, TypedDict, get_args
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.base.values import Value
 
 Method = Literal["auto", "footprints", "rays"]
@@ -44,7 +45,7 @@ class Options(TypedDict, total=False):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class How(Value):
+class How(Value, Shown):
     """All that may be chosen about how a picture is made.
 
     Args:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.base.values import Value
 from vcc.fields.grid import Block, Grid
 from vcc.optics.train import Train
@@ -42,7 +43,7 @@ class MadeFor:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan(Value):
+class Plan(Value, Shown):
     """How to make the picture of a light field.
 
     Plans of equal content are equal, and can be keys of a cache.

@@ -5,6 +5,7 @@ writes a file. New figures belong to nobody but the caller: pyplot and its globa
 """
 
 from vcc.plot.camera_plot import focused_distance, plot_camera
+from vcc.plot.element_plot import plot_element
 from vcc.plot.phase_space import phase_space_stages, plot_phase_space, plot_phase_space_stages
 from vcc.plot.phase_space_rays import PhaseSpacePicture
 
@@ -13,6 +14,7 @@ __all__ = [
     "focused_distance",
     "phase_space_stages",
     "plot_camera",
+    "plot_element",
     "plot_phase_space",
     "plot_phase_space_stages",
 ]

@@ -160,10 +160,10 @@ def plot_camera(
         else:
             axes, beside = style.new_axes(11.5, 4.8, 1, 2, width_ratios=(2.4, 1))
     pen = Pen(axes, axis, -half, half, 0.016 * (camera.sensor.z - start))
-    _set_limits(axes, start, camera.sensor.z, half, across)
-    _draw_axis(axes)
+    set_limits(axes, start, camera.sensor.z, half, across)
+    draw_optical_axis(axes)
     for point, path in zip(points, paths, strict=True):
-        _draw_paths(axes, point, path, axis)
+        draw_paths(axes, point, path, axis)
     for element in camera.elements:
         draw_element(pen, element, _beam(element, paths, axis))
     draw_sensor(pen, camera.sensor)
@@ -188,7 +188,7 @@ def plot_camera(
 
 
 @dataclass(frozen=True)
-class _Point:
+class ScenePoint:
     """A point of the scene: its distance in metres, its place off the axis as a slope, its look."""
 
     distance: float
@@ -197,13 +197,13 @@ class _Point:
     label: str
 
 
-def _points(camera: Train, distances: Sequence[float] | None, axis: int) -> list[_Point]:
+def _points(camera: Train, distances: Sequence[float] | None, axis: int) -> list[ScenePoint]:
     colours = (style.BLUE, style.ORANGE, style.GREEN)
     if distances is not None:
         for distance in distances:
             checks.above_zero("an object distance", distance, unit="m", infinite=True)
         return [
-            _Point(distance, 0.0, colours[number % 3], f"point {_away(distance)}")
+            ScenePoint(distance, 0.0, colours[number % 3], f"point {_away(distance)}")
             for number, distance in enumerate(distances)
         ]
     matrix = camera.rays_at(camera.sensor.z, before=True).matrix
@@ -212,12 +212,12 @@ def _points(camera: Train, distances: Sequence[float] | None, axis: int) -> list
     far = math.inf if focus is None else focus
     near = _rounded(1 / (NEAR_BLUR / reach + 1 / far))
     points = [
-        _Point(far, 0.0, style.BLUE, f"{'in focus' if focus else 'not in focus'}: {_away(far)}"),
-        _Point(near, 0.0, style.ORANGE, f"nearer: {_away(near)}"),
+        ScenePoint(far, 0.0, style.BLUE, f"{'in focus' if focus else 'not in focus'}: {_away(far)}"),
+        ScenePoint(near, 0.0, style.ORANGE, f"nearer: {_away(near)}"),
     ]
     if focus is not None:
         landing = 0.3 * camera.sensor.size[1 - axis]
-        points.append(_Point(far, landing / reach, style.GREEN, f"in focus, off the axis: {_away(far)}"))
+        points.append(ScenePoint(far, landing / reach, style.GREEN, f"in focus, off the axis: {_away(far)}"))
     return points
 
 
@@ -229,7 +229,7 @@ def _away(distance: float) -> str:
     return "parallel light" if math.isinf(distance) else f"{short(distance, digits=3)} away"
 
 
-def _scene_length(camera: Train, points: list[_Point]) -> float:
+def _scene_length(camera: Train, points: list[ScenePoint]) -> float:
     """How much of the scene's side to draw, metres: a piece, or up to points that are close."""
     shown = SCENE_SHARE * (camera.sensor.z or 10 * mm)
     near = [point.distance for point in points if point.distance < 2.5 * shown]
@@ -238,7 +238,7 @@ def _scene_length(camera: Train, points: list[_Point]) -> float:
 
 def _trace_point(
     camera: Train,
-    point: _Point,
+    point: ScenePoint,
     light_field: InMemory | None,
     axis: int,
     rays: int,
@@ -250,7 +250,7 @@ def _trace_point(
     return trace(camera, bundle, max(start, -point.distance), split_along=axis)
 
 
-def _entrance(camera: Train, point: _Point, light_field: InMemory | None, axis: int) -> tuple[float, float]:
+def _entrance(camera: Train, point: ScenePoint, light_field: InMemory | None, axis: int) -> tuple[float, float]:
     """From where to where on the entrance plane the rays of a point go, metres."""
     if light_field is not None:
         ends = np.array(light_field.shape[1::-1]) - 0.5
@@ -299,18 +299,20 @@ def _beam(element: Element, paths: list[Paths], axis: int) -> float:
     return highest
 
 
-def _set_limits(axes: Axes, start: float, end: float, half: float, across: str) -> None:
+def set_limits(axes: Axes, start: float, end: float, half: float, across: str) -> None:
+    """Axes from so far before the camera to its end, metres, with a margin."""
     length = end - start
     axes.set_xlim((start - 0.02 * length) / mm, (end + 0.06 * length) / mm)
     up = -1 if across == "y" else 1  # y points down
     axes.set_ylim(-1.12 * up * half / mm, 1.12 * up * half / mm)
 
 
-def _draw_axis(axes: Axes) -> None:
+def draw_optical_axis(axes: Axes) -> None:
+    """The line on which elements stand."""
     axes.axhline(0, color=style.QUIET, linewidth=0.8, linestyle=(0, (8, 3, 1, 3)), zorder=0)
 
 
-def _draw_paths(axes: Axes, point: _Point, paths: Paths, axis: int, width: float = 1.1) -> None:
+def draw_paths(axes: Axes, point: ScenePoint, paths: Paths, axis: int, width: float = 1.1) -> None:
     """Each ray piece by piece, fainter where it lost light; a dot where one is stopped."""
     z, heights = paths.z / mm, paths.positions[..., axis] / mm
     for height, shares, first in zip(heights, paths.shares, paths.starts, strict=True):
@@ -356,7 +358,7 @@ def _draw_magnified(
     axes: Axes,
     camera: Train,
     stage: Stage,
-    points: list[_Point],
+    points: list[ScenePoint],
     light_field: InMemory | None,
     axis: int,
 ) -> None:
@@ -371,7 +373,7 @@ def _draw_magnified(
     inset.set_xlim((stage.z - 0.45 * gap) / mm, (camera.sensor.z + 0.12 * gap) / mm)
     inset.set_ylim(*((low / mm, high / mm) if axis == 0 else (high / mm, low / mm)))
     pen = Pen(inset, axis, low, high, 0.035 * gap)
-    _draw_axis(inset)
+    draw_optical_axis(inset)
     to_array = camera.rays_at(stage.z)
     for point in points:
         # Off the axis so far that its light goes through the next cell.
@@ -381,7 +383,7 @@ def _draw_magnified(
         ends = _trace_point(camera, point, light_field, axis, 2, 0.0)
         at_array = ends.positions[:, int(np.argmax(ends.z >= stage.z)), axis]
         number = int(np.clip(RAYS_A_CELL * np.ptp(at_array) / pitch, RAYS, 20 * RAYS))
-        _draw_paths(inset, point, _trace_point(camera, point, light_field, axis, number, 0.0), axis, width=0.9)
+        draw_paths(inset, point, _trace_point(camera, point, light_field, axis, number, 0.0), axis, width=0.9)
     for element in camera.elements:
         if element.z >= stage.z:
             draw_element(pen, element)

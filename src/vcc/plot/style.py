@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -34,6 +37,19 @@ def black_tones() -> Any:
     return LinearSegmentedColormap.from_list("black", [(0.1, 0.1, 0.1, 1.0), (0.1, 0.1, 0.1, 0.0)])
 
 
+_by_itself: ContextVar[bool] = ContextVar("figures that pyplot does not know of", default=False)
+
+
+@contextmanager
+def by_itself() -> Iterator[None]:
+    """New figures within belong to the caller alone, in notebooks, too: they do not show themselves."""
+    before = _by_itself.set(True)
+    try:
+        yield
+    finally:
+        _by_itself.reset(before)
+
+
 def new_axes(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:
     """Axes on a new figure.
 
@@ -51,7 +67,7 @@ def new_axes(width: float, height: float, rows: int = 1, columns: int = 1, **opt
         Axes, or a (rows, columns) array of them if ``squeeze=False`` is given.
     """
     shape: dict[str, Any] = {"figsize": (width, height), "dpi": 100, "layout": "constrained"}
-    if "matplotlib.pyplot" in sys.modules or _in_notebook():
+    if not _by_itself.get() and ("matplotlib.pyplot" in sys.modules or _in_notebook()):
         from matplotlib import pyplot
 
         return pyplot.figure(**shape).subplots(rows, columns, **options)

@@ -16,6 +16,7 @@ from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
+from vcc.base.showing import Shown
 from vcc.recover.blur import Blur, Borders, channels_first, channels_last
 from vcc.recover.recorded import numbers_of
 
@@ -37,7 +38,7 @@ _MISFIT = 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Deblurred(Brief):
+class Deblurred(Brief, Shown):
     """What a solver found, and how it ended.
 
     Args:

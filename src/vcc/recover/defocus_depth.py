@@ -20,6 +20,7 @@ from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.memory import check_memory
+from vcc.base.showing import Shown
 from vcc.camera import Camera
 from vcc.fields.sampled import to_numpy
 from vcc.image import Image
@@ -39,7 +40,7 @@ _SMALLEST_CHANGE = 0.01  # pixels by which the radii of neighbouring kernels mus
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DefocusDepth(Brief):
+class DefocusDepth(Brief, Shown):
     """The distances of the blocks of a picture.
 
     Args:

@@ -24,6 +24,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
 from vcc.base.progress import Progress
+from vcc.base.showing import Shown
 from vcc.fields.cross import Arm, arms, check_axes, moved, range_to_search
 from vcc.fields.grid import Grid
 from vcc.fields.plane_sweep import FINEST_STEP, NOISE, WINDOW, disparity_maps, plane_sweep
@@ -47,7 +48,7 @@ _ALIASED = np.float32(1e3)  # larger than the energy of any derivative
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DepthMap(Brief):
+class DepthMap(Brief, Shown):
     """Where what each pixel of one view shows is.
 
     Args:

@@ -17,6 +17,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory, check_samples
 from vcc.base.progress import Progress, tell
+from vcc.base.showing import Shown
 from vcc.files import transfer
 from vcc.files.destination import Destination, Target
 from vcc.files.pictures import auto_exposure, checked_exposure
@@ -32,7 +33,7 @@ _NOTHING_SHARP = 1e-12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AllInFocus(Brief):
+class AllInFocus(Brief, Shown):
     """What is sharp in any picture of a focal stack.
 
     Args:
@@ -49,7 +50,7 @@ class AllInFocus(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FocalStack(Brief):
+class FocalStack(Brief, Shown):
     """Pictures of one scene from one place, each focused on another distance.
 
     Args:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.camera import Camera
 from vcc.image import Image
 from vcc.optics import Biprism, Lens
@@ -29,7 +30,7 @@ _AHEAD = 0.05  # correlation by which the best match leads the next one, where i
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StereoDepth(Brief):
+class StereoDepth(Brief, Shown):
     """The distances of blocks of the half picture on the right of the sensor (x > 0, as light lands).
 
     Args:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base import checks
 from vcc.base.describe import Brief, kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
+from vcc.base.showing import Shown
 from vcc.base.values import Value
 from vcc.shapes.kernel_weights import FULL_STEP, axes_of, cells_on_lattice, deposited, refined, separable
 
@@ -32,7 +33,7 @@ FINEST_LATTICE = 512
 """A kernel that covers more steps than this is worked out on a coarser lattice, then interpolated."""
 
 
-class Kernel(abc.ABC):
+class Kernel(Shown, abc.ABC):
     """A probability density D(δs, δt) over changes of slope, zero beyond its reach; a frozen dataclass."""
 
     @property

@@ -23,6 +23,7 @@ from vcc.base.affine import Affine
 from vcc.base.describe import instead_of_name, kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
+from vcc.base.showing import Shown
 from vcc.base.units import text
 from vcc.base.values import Value
 
@@ -38,7 +39,7 @@ LONGEST_RASTER = 4 * RASTER_LIMIT
 """Points along the longer side of a raster that is no square."""
 
 
-class Pattern(abc.ABC):
+class Pattern(Shown, abc.ABC):
     """What a flat element transmits, by position. Final classes are frozen dataclasses of SI numbers."""
 
     @abc.abstractmethod

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
+from vcc.base.showing import Shown
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ RASTER = 257
 """Points a side at which slopes are looked at for their largest, where no closed form is known."""
 
 
-class Surface(abc.ABC):
+class Surface(Shown, abc.ABC):
     """The optical path that a thin plate adds, by position. Final classes are frozen dataclasses of SI numbers.
 
     Yours needs `path` and `slopes`; the rest follows.

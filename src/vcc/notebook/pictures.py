@@ -1,0 +1,178 @@
+"""Pictures for notebooks: no larger than a screen shows and a notebook's file bears."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.files.pictures import auto_exposure
+from vcc.files.transfer import encode
+from vcc.notebook.html import Panel
+from vcc.plot import style
+
+LARGEST_SIDE = 640
+"""Pixels of a picture; a larger one is averaged down by a whole factor."""
+MOST_BYTES = 450_000
+"""Of the PNG files of one exhibit, all together."""
+MAGNIFIED_TO = 320
+"""Pictures narrower than half of this are magnified by a whole factor, up to this."""
+GAP = 4
+"""Pixels between the pictures of a sheet."""
+COLOURS = 192
+"""Of a drawing."""
+DOTS = 160
+"""Dots per inch of drawings, which are shown at `SHOWN_DOTS`: sharp on screens of high density, too."""
+SHOWN_DOTS = 80
+
+Array = NDArray[Any]
+
+
+def averaged(values: Array, factor: int) -> NDArray[np.float32]:
+    """A picture of 1 pixel for each factor×factor; what is left over at the right and below is left out."""
+    rows, columns = (size // factor * factor for size in values.shape[:2])
+    cut = np.asarray(values[:rows, :columns], dtype=np.float32)
+    parts = cut.reshape(rows // factor, factor, columns // factor, factor, *cut.shape[2:])
+    return np.asarray(parts.mean(axis=(1, 3)), dtype=np.float32) if factor > 1 else cut
+
+
+def in_colour(values: Array) -> tuple[NDArray[np.float32], str]:
+    """Values of a picture in 1 or 3 channels, all of them finite, and what was done to get there, in words."""
+    words = []
+    values = np.asarray(values, dtype=np.float32)
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    if values.ndim == 3 and values.shape[2] != 3:
+        words.append(f"the mean of {values.shape[2]} channels")
+        values = values.mean(axis=2)
+    wrong = ~np.isfinite(values)
+    if wrong.any():
+        words.append(f"{wrong.mean():.2%} of the values are not finite, and shown black")
+        values = np.where(wrong, np.float32(0), values)
+    return values, ", ".join(words)
+
+
+def light_panel(values: Array, words: str = "", share: int = 1) -> Panel:
+    """A picture of light, exposed as `vcc.Image.save` does of itself.
+
+    Args:
+        values: linear and upright, shape (rows, columns[, channels]).
+        words: that the caption begins with.
+        share: how many pictures share the room of an exhibit.
+    """
+    shown, remark = in_colour(values)
+    exposure = auto_exposure(shown)
+    said = ", ".join(each for each in (words, remark, f"exposure {exposure:.4g}") if each)
+    return codes_panel(shown, lambda part: encode(part * np.float32(exposure), 8), said, share)
+
+
+def codes_panel(values: Array, code: Callable[[Array], Array], caption: str, share: int = 1) -> Panel:
+    """A picture of any numbers.
+
+    Args:
+        values: shape (rows, columns[, channels]).
+        code: makes uint8 of them.
+        caption: below it.
+        share: how many pictures share the room of an exhibit.
+    """
+    factor = max(-(-max(values.shape[:2]) // LARGEST_SIDE), 1)
+    while True:
+        codes = code(averaged(values, factor))
+        png = encoded(codes)
+        if len(png) <= MOST_BYTES // share or min(codes.shape[:2]) < 2:
+            break
+        factor += 1
+    if factor > 1:
+        caption += f"; {factor}×{factor} pixels as one"
+    panel = sized(png, codes.shape[1], caption)
+    # What was averaged to spare bytes is shown as large as it would have been.
+    return panel if factor == 1 else replace(panel, width=min(codes.shape[1] * factor, LARGEST_SIDE))
+
+
+def sized(png: bytes, columns: int, caption: str) -> Panel:
+    """A panel of a picture so many pixels wide, magnified where it is small."""
+    times = max(MAGNIFIED_TO // columns, 1)
+    return Panel(png, columns * times, caption, pixelated=times > 1)
+
+
+def encoded(codes: Array) -> bytes:
+    """A PNG file of uint8 codes, (rows, columns) or (rows, columns, 3 or 4)."""
+    import imagecodecs
+
+    return bytes(imagecodecs.png_encode(np.ascontiguousarray(codes), level=6))
+
+
+def sheet(pictures: Sequence[Sequence[Array | None]], exposure: float) -> Array:
+    """Pictures of light in rows and columns, RGBA codes; nothing at all between them and where one is missing.
+
+    Args:
+        pictures: linear and upright, 1 or 3 channels, of one shape; None for one that is not there.
+        exposure: the factor before the sRGB curve.
+    """
+    first = next(each for row in pictures for each in row if each is not None)
+    rows, columns = first.shape[:2]
+    made = np.zeros((len(pictures) * (rows + GAP) - GAP, len(pictures[0]) * (columns + GAP) - GAP, 4), np.uint8)
+    for number, row in enumerate(pictures):
+        for place, picture in enumerate(row):
+            if picture is None:
+                continue
+            codes = encode(picture * np.float32(exposure), 8)
+            down, right = number * (rows + GAP), place * (columns + GAP)
+            piece = made[down : down + rows, right : right + columns]
+            piece[..., :3] = codes if codes.ndim == 3 else codes[..., None]
+            piece[..., 3] = 255
+    return made
+
+
+def drawn(draw: Callable[[], Any], caption: str = "") -> Panel:
+    """A drawing by Matplotlib, which shows itself nowhere else.
+
+    Args:
+        draw: makes axes or a figure, by the functions of `vcc.plot`.
+        caption: below it.
+    """
+    with style.by_itself():
+        made = draw()
+    figure = getattr(made, "figure", None) or made
+    from PIL import Image
+
+    stream, small = BytesIO(), BytesIO()
+    figure.savefig(stream, format="png", dpi=DOTS, facecolor="white")
+    # A drawing has few colours, and takes half the bytes by numbers of them.
+    Image.open(stream).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(small, "png")
+    inches = figure.get_size_inches()[0]
+    return Panel(small.getvalue(), round(inches * SHOWN_DOTS), caption, paper=True)
+
+
+def map_panel(values: Array, label: str, caption: str = "", *, outliers: bool = True) -> Panel:
+    """Numbers by position in colours, with a scale.
+
+    Args:
+        values: shape (rows, columns); what is not finite is left white.
+        label: what the numbers are, with their unit.
+        caption: below it.
+        outliers: whether the scale leaves out the lowest and the highest 1 % of the numbers.
+    """
+
+    def draw() -> Any:
+        factor = max(-(-max(values.shape) // LARGEST_SIDE), 1)
+        numbers = np.asarray(values, dtype=np.float64)[::factor, ::factor]
+        numbers = np.where(np.isfinite(numbers), numbers, np.nan)
+        ends = (1, 99) if outliers else (0, 100)
+        low, high = np.nanpercentile(numbers, ends) if np.isfinite(numbers).any() else (0.0, 1.0)
+        rows, columns = numbers.shape
+        axes = style.new_axes(4.8, min(max(4.0 * rows / columns, 1.2), 4.4))
+        image = axes.imshow(numbers, cmap="viridis", vmin=low, vmax=high, interpolation="nearest")
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.spines[:].set_visible(False)
+        scale = axes.figure.colorbar(image, ax=axes, fraction=0.05, extend="neither")
+        scale.set_label(label, color=style.INK)
+        scale.outline.set_visible(False)
+        return axes
+
+    return drawn(draw, caption)

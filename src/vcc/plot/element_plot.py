@@ -1,0 +1,95 @@
+"""One element from the side, and what it does to parallel light."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vcc.base import checks
+from vcc.base.units import mm
+from vcc.optics import CellDeflection, Element, Faces
+from vcc.optics.sensor import Sensor
+from vcc.optics.train import Train
+from vcc.plot import style
+from vcc.plot.camera_plot import ScenePoint, draw_optical_axis, draw_paths
+from vcc.plot.elements import Pen, draw_element, half_size
+from vcc.plot.tracing import Paths, fan, trace
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+UNBOUNDED = 10 * mm
+"""Half the height of what is drawn of an element without a rim."""
+CELLS = 5
+"""Of an array, so many are drawn, and of its light what goes through them."""
+RAYS, RAYS_THAT_SPLIT, RAYS_A_CELL = 9, 5, 5
+ROOM_BEHIND = (1.5, 60.0)
+"""Bounds of how far rays are followed behind the element, in half heights of what is drawn."""
+
+
+def plot_element(element: Element, *, across: str = "x", axes: Axes | None = None) -> Axes:
+    """Draw an element from the side, and parallel light that goes through it to the right.
+
+    Of an element without a rim a piece 20 mm high is drawn, of an array of cells the five in its middle. Rays are
+    followed for about as far as the element brings them to a point or apart; z counts from the element.
+
+    Args:
+        element: what to draw, wherever it stands.
+        across: ``"x"`` or ``"y"``, the axis drawn upwards in the figure (y points down).
+        axes: where to draw; None makes a new figure.
+
+    Returns:
+        The axes; ``.figure.savefig(path)`` writes them to a file.
+
+    Raises:
+        InputError: another axis, or an element that returns what it must not.
+    """
+    checks.one_of("across", across, "xy")
+    axis = "xy".index(across)
+    element = replace(element, z=0.0, decentre=(0.0, 0.0))
+    half, rays = _part(element, axis)
+    paths = _traced(element, fan(np.linspace(-0.97 * half, 0.97 * half, rays), math.inf, 0.0, axis), half, axis)
+    end = float(paths.z[-1])
+    before = 0.4 * (end - element.length)
+    axes = style.new_axes(5.0, 2.9) if axes is None else axes
+    axes.set_xlim(-before / mm, end / mm)
+    reached = float(np.abs(paths.positions[:, :, axis]).max(initial=0.0))
+    highest = 1.12 * max(half, min(reached, 1.6 * half)) / mm
+    axes.set_ylim(*((-highest, highest) if axis == 0 else (highest, -highest)))
+    pen = Pen(axes, axis, -half, half, 0.03 * (end + before))
+    draw_optical_axis(axes)
+    paths = replace(paths, z=np.where(paths.z < 0, -before, paths.z))  # parallel: heights are the same there
+    draw_paths(axes, ScenePoint(math.inf, 0.0, style.BLUE, ""), paths, axis)
+    draw_element(pen, element, half)
+    style.tidy(axes, "z from the element [mm]", f"{across} [mm]")
+    return axes
+
+
+def _part(element: Element, axis: int) -> tuple[float, int]:
+    """Half the height of what is drawn, metres, and how many rays."""
+    half = half_size(element, axis)
+    faces = [part for part in element.parts() if isinstance(part, Faces)]
+    cells = next((part.bending for part in faces if isinstance(part.bending, CellDeflection)), None)
+    if cells is not None:
+        return min(half, CELLS * cells.lattice.pitch / 2), RAYS_A_CELL * CELLS
+    scatters = any(part.spread is not None for part in faces)
+    return half if math.isfinite(half) else UNBOUNDED, RAYS_THAT_SPLIT if scatters else RAYS
+
+
+def _traced(element: Element, bundle: np.ndarray, half: float, axis: int) -> Paths:
+    """Rays through the element and on, for as far as their change of slope takes to show."""
+
+    def through(room: float) -> Paths:
+        sensor = Sensor(z=element.length + room, shape=(1, 1), pitch=1.0)
+        return trace(Train([element], sensor), bundle, -half, split_along=axis)
+
+    one = through(half)
+    slopes = np.diff(one.positions[..., axis][:, -2:], axis=1)[:, 0] / half
+    steepest = float(np.abs(slopes[one.shares[:, -1] > 0]).max(initial=0.0))
+    height = half / CELLS if len(bundle) == RAYS_A_CELL * CELLS else half  # cells are brought to points one by one
+    wanted = 1.3 * height / steepest if steepest > 0 else 2 * half
+    nearest, farthest = (bound * height for bound in ROOM_BEHIND)
+    return through(min(max(wanted, nearest), farthest))
