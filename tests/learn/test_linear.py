@@ -14,7 +14,7 @@ import vcc
 from vcc.learn.chain import Chain
 from vcc.learn.parameters import put, read
 from vcc.plan.how import How
-from vcc.units import mm
+from vcc.units import mm, nm, um
 
 GENERATOR = np.random.default_rng(7)
 CODE = GENERATOR.uniform(0.2, 0.8, (2, 3))
@@ -38,6 +38,9 @@ LENS = vcc.Lens(focal_length=50 * mm, diameter=7 * mm)
 NARROW = vcc.Lens(focal_length=50 * mm, diameter=3 * mm)
 OTHER = vcc.Mask(pattern=GENERATOR.uniform(0.1, 0.9, (7, 6)), width=8 * mm, z=30 * mm)
 PLATE = vcc.PhasePlate(vcc.surfaces.HeightMap(GENERATOR.uniform(0, 2e-6, (4, 5)), 10 * mm), name="plate")
+ABERRATED = vcc.PhasePlate(
+    vcc.surfaces.Zernike((0.0, 0.0, 0.0, 200 * nm, 0.0, 100 * nm, 1 * um, 0.0, 0.0), 14 * mm), name="plate"
+)
 CODED = vcc.CodedDiffuser(
     vcc.kernels.Gaussian(1.0), 9 * mm, widths=GENERATOR.uniform(1e-3, 3e-3, (2, 2)), name="ground"
 )
@@ -62,6 +65,7 @@ CAMERAS = {
     ),
     "met by rays": ([NARROW, code(20 * mm)], "code.pattern", {"method": "rays", "samples": 8}),
     "a height map": ([NARROW, PLATE], "plate.surface.heights", {"samples": 8}),
+    "Zernike coefficients": ([NARROW, ABERRATED], "plate.surface.coefficients", {"samples": 8}),
     "a map of widths": ([NARROW, CODED], "ground.widths", {"samples": 8}),
 }
 

@@ -381,6 +381,24 @@ def test_it_explains_itself_and_says_when_it_would_decide_otherwise():
     np.testing.assert_allclose(model().detach().numpy(), picture, rtol=0, atol=3e-6 * picture.max())
 
 
+def test_other_rays_are_sent_where_it_is_asked_for():
+    model = module(["code.pattern"], method="rays", samples=16)
+    first = model().detach()
+    model.replan(seed=1)
+    other = model().detach()
+    assert not torch.equal(other, first)
+    again = vcc.How(method="rays", samples=16, seed=1)
+    np.testing.assert_allclose(other.numpy(), model.camera().capture(FIELD, again).values, rtol=1e-5)
+    model.replan()
+    assert torch.equal(model(), other)
+    with pytest.raises(InputError, match="there is no option sead: did you mean seed"):
+        model.replan(sead=2)
+    with pytest.raises(InputError, match="array_api"):
+        model.replan(engine="array_api")
+    model.replan(seed=0)
+    assert torch.equal(model(), first)
+
+
 def test_what_it_is_is_told():
     assert "learns code.pattern, main.focal_length, sensor.z; pictures of 7×8" in repr(module())
     assert "learns nothing" in repr(module([]))

@@ -270,10 +270,19 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         scales = {name: each.scale for name, each in self._learned.items()}
         return explained_while_learning(self._work, self._as_arrays(), scales, "model.replan()")
 
-    def replan(self) -> None:
-        """Decide anew, by what was learned, how the picture is made; parameters and their scales stay."""
+    def replan(self, **options: Any) -> None:
+        """Decide anew, by what was learned, how the picture is made; parameters and their scales stay.
+
+        Args:
+            options: as in `vcc.Camera.capture`, instead of those that the module has: ``replan(seed=step)`` sends
+                other rays, so that a camera does not learn by heart where the first ones went.
+
+        Raises:
+            InputError: as for the module.
+        """
         work = self._work
-        self._work = Work.of(self.camera(), work.light_field, work.how, work.chain.names)
+        how = _checked(How.of(work.how, options))
+        self._work = Work.of(self.camera(), work.light_field, how, work.chain.names)
 
     # --- the state ---
 

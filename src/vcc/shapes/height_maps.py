@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,20 +95,8 @@ class Sheet(Surface):
         values[inside] = spline(y[inside], x[inside], grid=False)
         return values
 
-    def paths_back(self, x: ArrayLike, y: ArrayLike, weights: tuple[ArrayLike, ArrayLike]) -> Array:
-        """What each optical path that is known adds to Σ weights[0]·Δs + Σ weights[1]·Δt over places of a grid.
-
-        The transpose of `slopes`, which is linear in the paths. A plate's heights are learned by it.
-
-        Args:
-            x: columns, (1, n), metres.
-            y: rows, (m, 1).
-            weights: two arrays (m, n).
-
-        Returns:
-            Of the shape in which paths are known, (rows, columns).
-        """
-        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
+        """See `Surface`; here to the optical paths that are known."""
         known_y, known_x, _ = self._samples()
         knots_y, knots_x, _ = self._spline.tck
         on_sheet = (np.abs(x) <= self.size[0] * 0.500001) & (np.abs(y) <= self.size[1] * 0.500001)
@@ -159,6 +147,10 @@ class _Table(Sheet):
     def factor(self) -> float:
         """The optical path for 1 of what is known."""
         return 1.0
+
+    def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
+        """See `Surface`."""
+        return self.factor * super().slopes_back(x, y, weights)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -217,6 +209,8 @@ class HeightMap(_Table):
         InputError: not a table of 4×4 or more finite numbers, a size of zero or less, or no glass (n ≤ 1).
     """
 
+    linear_in: ClassVar[str] = "heights"
+
     heights: NDArray[np.float64]
     width: float = field(metadata={"unit": "length"})
     height: float | None = field(default=None, metadata={"unit": "length"})
@@ -255,6 +249,8 @@ class PathMap(_Table):
     Raises:
         InputError: not a table of 4×4 or more finite numbers, or a size of zero or less.
     """
+
+    linear_in: ClassVar[str] = "paths"
 
     paths: NDArray[np.float64]
     width: float = field(metadata={"unit": "length"})

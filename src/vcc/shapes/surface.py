@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import abc
 import math
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,8 +29,14 @@ RASTER = 257
 class Surface(Shown, abc.ABC):
     """The optical path that a thin plate adds, by position. Final classes are frozen dataclasses of SI numbers.
 
-    Yours needs `path` and `slopes`; the rest follows.
+    Yours needs `path` and `slopes`; the rest follows. Where slopes are linear in a field of many numbers, name it
+    in ``linear_in`` and write `slopes_back`: they are then learned all at once, not by two plans for each of them.
+
+    Attributes:
+        linear_in: of the class, the field that `slopes` are linear in; None where there is no `slopes_back`.
     """
+
+    linear_in: ClassVar[str | None] = None
 
     @abc.abstractmethod
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
@@ -38,6 +45,19 @@ class Surface(Shown, abc.ABC):
     @abc.abstractmethod
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """(Δs, Δt) = (∂OPL/∂x, ∂OPL/∂y), which rays gain at positions x, y in metres (broadcast)."""
+
+    def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
+        """The transpose of `slopes`: what each number of ``linear_in`` adds to Σ weights[0]·Δs + Σ weights[1]·Δt.
+
+        Args:
+            x: columns of a grid of places, (1, n), metres.
+            y: rows, (m, 1).
+            weights: two arrays (m, n).
+
+        Returns:
+            Of the field's shape.
+        """
+        raise NotImplementedError(f"slopes of {type(self).__name__} are not stated to be linear in anything")
 
     @property
     def affine(self) -> Affine | None:

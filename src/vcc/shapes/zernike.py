@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.shapes.surface import Array, Surface, places
+
+ROWS_AT_ONCE = 16
+"""Of a grid of places: what is computed of some hundred columns stays in the cache."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,8 @@ class Zernike(Surface):
         InputError: no coefficients, one that is not finite, or a diameter of 0 or less.
     """
 
+    linear_in: ClassVar[str] = "coefficients"
+
     coefficients: tuple[float, ...] = field(metadata={"unit": "length"})
     diameter: float = field(metadata={"unit": "length"})
 
@@ -71,55 +76,48 @@ class Zernike(Surface):
             raise InputError(f"terms of a Zernike surface are numbered 1, 2, 3, … after Noll, not {list(terms)}")
         return cls(tuple(terms.get(j, 0.0) for j in range(1, max(terms) + 1)), diameter)
 
-    @cached_property
-    def _terms(self) -> list[tuple[float, int, int, bool]]:
-        """(coefficient and norm, k = (n − m)/2, m, whether it goes with the sine) of terms other than 0."""
-        found = []
-        for j, coefficient in enumerate(self.coefficients, start=1):
-            n, m = noll(j)
-            norm = math.sqrt(n + 1 if m == 0 else 2 * (n + 1))
-            if coefficient != 0:
-                found.append((coefficient * norm, (n - m) // 2, m, j % 2 == 1))
-        return found
-
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The sum of the terms, metres."""
         from scipy.special import eval_jacobi
 
-        # With w = (x + iy)/R, a term is its norm × Re or Im of wᵐ × a Jacobi polynomial P_k^(0, m) of 2ρ² − 1:
-        # no angle, no division by ρ, and evaluated by recurrence.
-        x, y = places(x, y)
-        w = (x + 1j * y) / (self.diameter / 2)
-        argument = 2 * (w.real**2 + w.imag**2) - 1
+        w, argument = self._within_disc(*places(x, y))
         total = np.zeros(w.shape)
-        for weight, k, m, sine in self._terms:
-            angular = w**m
-            total += weight * (angular.imag if sine and m else angular.real) * eval_jacobi(k, 0, m, argument)
+        for j, coefficient in self._terms:
+            term = _Term.of(j)
+            total += coefficient * term.norm * term.part(w**term.m) * eval_jacobi(term.k, 0, term.m, argument)
         return total
 
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """The sum of the terms' gradients, in closed form."""
-        from scipy.special import eval_jacobi
-
-        x, y = places(x, y)
-        radius = self.diameter / 2
-        w = (x + 1j * y) / radius
-        argument = 2 * (w.real**2 + w.imag**2) - 1
+        w, argument = self._within_disc(*places(x, y))
         s, t = np.zeros(w.shape), np.zeros(w.shape)
-        for weight, k, m, sine in self._terms:
-            sine = sine and m > 0
-            angular = w**m
-            harmonic = angular.imag if sine else angular.real
-            if m:  # d(wᵐ)/dx = m·wᵐ⁻¹ and d(wᵐ)/dy = i·m·wᵐ⁻¹
-                radial = weight * m * eval_jacobi(k, 0, m, argument)
-                slope = w ** (m - 1)
-                s += radial * (slope.imag if sine else slope.real)
-                t += radial * (slope.real if sine else -slope.imag)
-            if k:  # dP_k^(0, m)(z)/dz = (k + m + 1)/2 · P_(k−1)^(1, m+1)(z), with dz = 4(x dx + y dy)/R²
-                steepness = weight * harmonic * 2 * (k + m + 1) * eval_jacobi(k - 1, 1, m + 1, argument)
-                s += steepness * w.real
-                t += steepness * w.imag
-        return s / radius, t / radius
+        for j, coefficient in self._terms:
+            along_x, along_y = _Term.of(j).gradient(w, argument)
+            s += coefficient * along_x
+            t += coefficient * along_y
+        return s / (self.diameter / 2), t / (self.diameter / 2)
+
+    def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
+        """See `Surface`; here to the coefficients."""
+        found = np.zeros(len(self.coefficients))
+        for first in range(0, y.size, ROWS_AT_ONCE):
+            rows = slice(first, first + ROWS_AT_ONCE)
+            along_x, along_y = (np.ascontiguousarray(each[rows]) for each in weights)
+            w, argument = self._within_disc(*places(x, y[rows]))
+            for j in range(1, found.size + 1):
+                s, t = _Term.of(j).gradient(w, argument)
+                found[j - 1] += np.vdot(along_x, s) + np.vdot(along_y, t)
+        return found / (self.diameter / 2)
+
+    @property
+    def _terms(self) -> list[tuple[int, float]]:
+        """Noll's numbers of the terms other than 0, and their coefficients."""
+        return [(j, coefficient) for j, coefficient in enumerate(self.coefficients, start=1) if coefficient != 0]
+
+    def _within_disc(self, x: Array, y: Array) -> tuple[NDArray[np.complex128], Array]:
+        """w = (x + iy)/R, and 2ρ² − 1."""
+        radius = self.diameter / 2
+        return np.asarray((x + 1j * y) / radius, dtype=np.complex128), 2 * (x**2 + y**2) / radius**2 - 1
 
     @property
     def affine(self) -> Affine | None:
@@ -139,6 +137,52 @@ class Zernike(Surface):
         """The terms that are not 0, by Noll's numbers."""
         terms = [f"Z{j} {short(value)}" for j, value in enumerate(self.coefficients, start=1) if value != 0]
         return f"Zernike ({', '.join([*terms, f'diameter {short(self.diameter)}'])})"
+
+
+@dataclass(frozen=True)
+class _Term:
+    """One polynomial: its norm × Re or Im of wᵐ × a Jacobi polynomial P_k^(0, m) of 2ρ² − 1, w = (x + iy)/R.
+
+    So there is no angle and no division by ρ, and the rest is evaluated by recurrence.
+
+    Args:
+        norm: which makes it orthonormal.
+        k: (n − m)/2.
+        m: angular frequency.
+        sine: whether it goes with sin mθ.
+    """
+
+    norm: float
+    k: int
+    m: int
+    sine: bool
+
+    @classmethod
+    def of(cls, j: int) -> _Term:
+        """Noll's term j."""
+        n, m = noll(j)
+        return cls(math.sqrt(n + 1 if m == 0 else 2 * (n + 1)), (n - m) // 2, m, m > 0 and j % 2 == 1)
+
+    def part(self, angular: NDArray[np.complex128]) -> Array:
+        """Re or Im of wᵐ."""
+        return angular.imag if self.sine else angular.real
+
+    def gradient(self, w: NDArray[np.complex128], argument: Array) -> tuple[Array, Array]:
+        """Its derivatives to x/R and y/R."""
+        from scipy.special import eval_jacobi
+
+        k, m = self.k, self.m
+        s, t = np.zeros(w.shape), np.zeros(w.shape)
+        if m:  # d(wᵐ)/dx = m·wᵐ⁻¹ and d(wᵐ)/dy = i·m·wᵐ⁻¹
+            radial = self.norm * m * eval_jacobi(k, 0, m, argument)
+            slope = w ** (m - 1)
+            s += radial * self.part(slope)
+            t += radial * (slope.real if self.sine else -slope.imag)
+        if k:  # dP_k^(0, m)(z)/dz = (k + m + 1)/2 · P_(k−1)^(1, m+1)(z), with dz = 4(x dx + y dy)/R²
+            steepness = self.norm * self.part(w**m) * 2 * (k + m + 1) * eval_jacobi(k - 1, 1, m + 1, argument)
+            s += steepness * w.real
+            t += steepness * w.imag
+        return s, t
 
 
 def noll(j: int) -> tuple[int, int]:

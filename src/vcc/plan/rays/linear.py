@@ -10,9 +10,9 @@ from vcc.optics.diffuser import CodedDiffuser
 from vcc.optics.train import Stage
 from vcc.plan.decisions import Linear
 from vcc.plan.rays.steps import CellShares, Step, Texture, TextureUnbend
-from vcc.shapes.height_maps import HeightMap, PathMap
 from vcc.shapes.mean_back import is_values
 from vcc.shapes.patterns import Cells
+from vcc.shapes.surface import Surface
 
 
 def by_cells(cells: Cells, step: CellShares) -> Linear:
@@ -25,7 +25,7 @@ def by_cells(cells: Cells, step: CellShares) -> Linear:
 
 
 def by_surface(stage: Stage, step: TextureUnbend) -> Linear:
-    """A plate of measured or designed height: its slopes are those of a spline through the heights."""
+    """A plate whose slopes are linear in what its surface holds: heights of a spline, Zernike coefficients."""
     surface = getattr(stage.faces.bending, "surface", None)
     x, y = (
         start - middle + apart * np.arange(count)
@@ -39,12 +39,10 @@ def by_surface(stage: Stage, step: TextureUnbend) -> Linear:
     )
 
     def back(sheet: Any, weights: list[Any]) -> Any:
-        return sheet.factor * sheet.paths_back(x[None, :], y[:, None], (weights[0][..., 0], weights[0][..., 1]))
+        return sheet.slopes_back(x[None, :], y[:, None], (weights[0][..., 0], weights[0][..., 1]))
 
     return Linear(
-        lambda thing, field: (
-            thing is surface and isinstance(thing, HeightMap | PathMap) and field in ("heights", "paths")
-        ),
+        lambda thing, field: thing is surface and isinstance(thing, Surface) and field == thing.linear_in,
         lambda plan: _of_step(plan, step, "texture.values"),
         back,
     )
