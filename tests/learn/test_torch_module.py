@@ -391,9 +391,9 @@ def test_other_rays_are_sent_where_it_is_asked_for():
     np.testing.assert_allclose(other.numpy(), model.camera().capture(FIELD, again).values, rtol=1e-5)
     model.replan()
     assert torch.equal(model(), other)
-    with pytest.raises(InputError, match="there is no option sead: did you mean seed"):
+    with pytest.raises(vcc.InputError, match="there is no option sead: did you mean seed"):
         model.replan(sead=2)
-    with pytest.raises(InputError, match="array_api"):
+    with pytest.raises(vcc.InputError, match="array_api"):
         model.replan(engine="array_api")
     model.replan(seed=0)
     assert torch.equal(model(), first)
