@@ -281,7 +281,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
             InputError: as for the module.
         """
         work = self._work
-        how = _checked(How.of(work.how, options))
+        how = by_an_engine(How.of(work.how, options))
         self._work = Work.of(self.camera(), work.light_field, how, work.chain.names)
 
     # --- the state ---
