@@ -1,0 +1,30 @@
+/** The document in the address: deflated JSON, in the letters that addresses may have. */
+
+import type { BenchDocument } from "./protocol";
+
+async function through(bytes: Uint8Array, by: CompressionStream | DecompressionStream): Promise<Uint8Array> {
+  const stream = new Blob([bytes as BlobPart]).stream().pipeThrough(by as ReadableWritablePair<Uint8Array, Uint8Array>);
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+export async function written(document: BenchDocument): Promise<string> {
+  const json = new TextEncoder().encode(JSON.stringify(document));
+  const bytes = await through(json, new CompressionStream("deflate-raw"));
+  let letters = "";
+  for (const byte of bytes) letters += String.fromCharCode(byte);
+  return "#d=" + btoa(letters).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
+}
+
+/** The document of an address's fragment; null where there is none, or what is there is none. */
+export async function read(fragment: string): Promise<BenchDocument | null> {
+  const found = /^#d=([\w-]+)$/.exec(fragment);
+  if (!found) return null;
+  try {
+    const letters = atob(found[1]!.replaceAll("-", "+").replaceAll("_", "/"));
+    const bytes = Uint8Array.from(letters, (letter) => letter.charCodeAt(0));
+    const json = await through(bytes, new DecompressionStream("deflate-raw"));
+    return JSON.parse(new TextDecoder().decode(json)) as BenchDocument;
+  } catch {
+    return null;
+  }
+}

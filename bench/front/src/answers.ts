@@ -1,0 +1,85 @@
+/** What a host answers beside the picture, drawn: words, a point's picture, contrast by frequency, phase space. */
+
+import { html, svg, css, nothing } from "lit";
+
+import type { Answer } from "./bench";
+import { plain, short } from "./numbers";
+import type { Curve, Plane } from "./protocol";
+
+/** What can be asked, and how its tab is called. */
+export const QUESTIONS: [string, string][] = [
+  ["explain", "Explain"],
+  ["phase space", "Phase space"],
+  ["point spread", "Point spread"],
+  ["mtf", "MTF"],
+];
+/** Of these, what is answered for a point at some distance. */
+export const OF_A_POINT = ["point spread", "mtf"];
+
+const WIDE = 460;
+const HIGH = 230;
+const MARGIN = { left: 40, right: 12, top: 12, bottom: 38 };
+
+export function drawnAnswer({ message, pictures }: Answer) {
+  switch (message.what) {
+    case "explain":
+      return html`<pre>${message.words}</pre>`;
+    case "point spread":
+      return html`<p>${message.words}.</p><img class="point" src=${pictures[0] ?? ""} alt="Picture of a point ${away(message.distance)}, ${message.shape[1]} by ${message.shape[0]} pixels">`;
+    case "mtf":
+      return drawnCurves(message.across, message.down, away(message.distance));
+    case "phase space":
+      return html`<div class="planes">${message.planes.map((plane, number) => drawnPlane(plane, pictures[number] ?? ""))}</div>
+        <p class="quiet">Each plane: places across it from left to right, slopes of the rays there upwards.</p>`;
+  }
+}
+
+function away(distance: number | null): string {
+  return distance === null ? "infinitely far away" : `${short(distance, 3)} away`;
+}
+
+function drawnPlane(plane: Plane, picture: string) {
+  const words = plane.title;
+  return html`<figure><img src=${picture} alt="Phase space: ${words}"><figcaption>${words}<br>
+    <span class="quiet">${plain(plane.place[0] * 1e3, 3)} to ${plain(plane.place[1] * 1e3, 3)} mm · slopes ${plain(plane.slope[0], 2)} to ${plain(plane.slope[1], 2)}</span></figcaption></figure>`;
+}
+
+/** Contrast over frequency; both curves end where the longer one does. */
+function drawnCurves(across: Curve, down: Curve, words: string) {
+  const most = Math.max(across[across.length - 1]?.[0] ?? 1, down[down.length - 1]?.[0] ?? 1);
+  if (!(most > 0)) return html`<p>All light of a point ${words} falls into one pixel: its contrast is that of the pixel itself.</p>`;
+  const x = (frequency: number) => MARGIN.left + (frequency / most) * (WIDE - MARGIN.left - MARGIN.right);
+  const y = (contrast: number) => HIGH - MARGIN.bottom - contrast * (HIGH - MARGIN.top - MARGIN.bottom);
+  const line = (curve: Curve) => "M" + curve.map(([frequency, contrast]) => `${x(frequency).toFixed(1)} ${y(contrast).toFixed(1)}`).join("L");
+  const power = 10 ** Math.floor(Math.log10(most));
+  const step = power * (most < 2.5 * power ? 0.5 : most < 5 * power ? 1 : 2);
+  const ticks = Array.from({ length: Math.floor(most / step + 1e-9) + 1 }, (_, number) => number * step);
+  return html`<svg viewBox="0 0 ${WIDE} ${HIGH}" class="curves" role="img" aria-label="Contrast over frequency of a point ${words}">
+    ${[0, 0.25, 0.5, 0.75, 1].map((each) => svg`<path class="grid" d="M${MARGIN.left} ${y(each)}H${WIDE - MARGIN.right}"></path>
+      <text x=${MARGIN.left - 6} y=${y(each) + 4} text-anchor="end">${each}</text>`)}
+    ${ticks.map((each) => svg`<text x=${x(each)} y=${HIGH - MARGIN.bottom + 16} text-anchor="middle">${plain(each, 3)}</text>`)}
+    <text x=${(MARGIN.left + WIDE - MARGIN.right) / 2} y=${HIGH - 5} text-anchor="middle">cycles per millimetre on the sensor, of a point ${words}</text>
+    <path class="across" d=${line(across)}></path><path class="down" d=${line(down)}></path></svg>
+    <p class="key"><i class="across"></i>across <i class="down"></i>down${same(across, down) ? html`<span class="quiet"> (the same)</span>` : nothing}</p>`;
+}
+
+function same(one: Curve, other: Curve): boolean {
+  return one.length === other.length && one.every(([, contrast], number) => Math.abs(contrast - other[number]![1]) < 0.01);
+}
+
+export const answerStyles = css`
+  .point { width: min(100%, 320px); image-rendering: pixelated; background: #000; }
+  .planes { display: grid; grid-template-columns: repeat(auto-fill, minmax(170px, 1fr)); gap: 12px; margin-bottom: 10px; }
+  .planes img { width: 100%; aspect-ratio: 4 / 3; object-fit: fill; background: #000; display: block; }
+  figure { margin: 0; }
+  figcaption { margin-top: 4px; font-size: 12px; line-height: 1.35; }
+  .curves { width: 100%; max-width: 620px; display: block; }
+  .curves text { font-size: 11px; fill: var(--quiet); }
+  .curves path { fill: none; stroke-width: 1.8; }
+  .curves path.grid { stroke: var(--line); stroke-width: 1; }
+  .curves .across { stroke: var(--focused); }
+  .curves .down { stroke: var(--near); stroke-dasharray: 5 3; }
+  .key i { display: inline-block; width: 16px; height: 2px; vertical-align: 3px; margin-right: 5px; }
+  .key i.across { background: var(--focused); }
+  .key i.down { background: var(--near); margin-left: 14px; }
+`;

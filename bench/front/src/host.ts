@@ -1,0 +1,115 @@
+/** What carries messages: a WebSocket of the server, or the model of a notebook's widget. */
+
+import type { FromHost } from "./protocol";
+
+/** A message goes as JSON, its arrays of bytes beside it. */
+export interface Host {
+  send(message: object, buffers?: ArrayBuffer[]): void;
+  onmessage: (message: FromHost, buffers: DataView[]) => void;
+  onstate: (state: "open" | "closed") => void;
+  /** Begins; handlers are set before. */
+  start(): void;
+  /** Ends for good. */
+  close(): void;
+}
+
+/** One frame: length of the JSON (uint32, little-endian), the JSON, then the buffers, whose lengths the JSON has. */
+export function packed(message: object, buffers: ArrayBuffer[] = []): ArrayBuffer {
+  const json = new TextEncoder().encode(JSON.stringify({ ...message, buffers: buffers.map((each) => each.byteLength) }));
+  const total = buffers.reduce((sum, each) => sum + each.byteLength, 4 + json.length);
+  const frame = new Uint8Array(total);
+  new DataView(frame.buffer).setUint32(0, json.length, true);
+  frame.set(json, 4);
+  let at = 4 + json.length;
+  for (const each of buffers) {
+    frame.set(new Uint8Array(each), at);
+    at += each.byteLength;
+  }
+  return frame.buffer;
+}
+
+export function unpacked(frame: ArrayBuffer): { message: FromHost; buffers: DataView[] } {
+  const length = new DataView(frame).getUint32(0, true);
+  const message = JSON.parse(new TextDecoder().decode(new Uint8Array(frame, 4, length)));
+  let at = 4 + length;
+  const buffers = (message.buffers ?? []).map((size: number) => {
+    const view = new DataView(frame, at, size);
+    at += size;
+    return view;
+  });
+  return { message, buffers };
+}
+
+const FIRST_WAIT = 300;
+const LONGEST_WAIT = 3000;
+
+/** Connects to the server, and again whenever it was lost, a little later each time. */
+export class SocketHost implements Host {
+  onmessage: Host["onmessage"] = () => {};
+  onstate: Host["onstate"] = () => {};
+  private socket: WebSocket | null = null;
+  private wait = FIRST_WAIT;
+  private timer = 0;
+  private ended = false;
+
+  constructor(private readonly address: string) {}
+
+  start(): void {
+    const socket = new WebSocket(this.address);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.onopen = () => {
+      this.wait = FIRST_WAIT;
+      this.onstate("open");
+    };
+    socket.onmessage = (event) => {
+      const { message, buffers } = unpacked(event.data as ArrayBuffer);
+      this.onmessage(message, buffers);
+    };
+    socket.onclose = () => {
+      this.socket = null;
+      if (this.ended) return;
+      this.onstate("closed");
+      this.timer = window.setTimeout(() => this.start(), this.wait);
+      this.wait = Math.min(2 * this.wait, LONGEST_WAIT);
+    };
+  }
+
+  send(message: object, buffers: ArrayBuffer[] = []): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(packed(message, buffers));
+  }
+
+  close(): void {
+    this.ended = true;
+    window.clearTimeout(this.timer);
+    this.socket?.close();
+  }
+}
+
+/** What a widget's model has that is used here; anywidget's has more. */
+export interface WidgetModel {
+  send(content: object, callbacks?: undefined, buffers?: ArrayBuffer[]): void;
+  on(name: "msg:custom", handler: (message: FromHost, buffers: DataView[]) => void): void;
+  off(name: "msg:custom", handler: (message: FromHost, buffers: DataView[]) => void): void;
+}
+
+export class WidgetHost implements Host {
+  onmessage: Host["onmessage"] = () => {};
+  onstate: Host["onstate"] = () => {};
+  private readonly hears = (message: FromHost, buffers: DataView[]) => this.onmessage(message, buffers ?? []);
+
+  constructor(private readonly model: WidgetModel) {}
+
+  start(): void {
+    this.model.on("msg:custom", this.hears);
+    this.onstate("open");
+  }
+
+  send(message: object, buffers: ArrayBuffer[] = []): void {
+    this.model.send(message, undefined, buffers);
+  }
+
+  close(): void {
+    this.model.off("msg:custom", this.hears);
+  }
+}

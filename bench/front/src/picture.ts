@@ -1,0 +1,412 @@
+/** The picture on a canvas: zoomed and moved down to single pixels, compared with a pinned one, clicked to focus. */
+
+import { html, css, nothing } from "lit";
+
+import { plain } from "./numbers";
+import { Part, controls } from "./part";
+import { sign } from "./signs";
+
+type Compare = "alone" | "beside" | "wipe" | "difference";
+const MODES: [Compare, string][] = [["alone", "Picture"], ["beside", "Side by side"], ["wipe", "Wipe"], ["difference", "Difference ×4"]];
+const MOST_ZOOM = 64;
+const WHEEL = 0.0016;
+/** From so many pixels of the screen on, a pixel of the picture has an outline when it is pointed at. */
+const OUTLINED = 6;
+
+interface Place {
+  x: number;
+  y: number;
+}
+
+export class PictureView extends Part {
+  static override properties = {
+    ...Part.properties, zoom: { state: true }, compare: { state: true }, wipe: { state: true }, aiming: { state: true }, at: { state: true },
+    width: { state: true }, height: { state: true },
+  };
+  /** Times what fits. */
+  declare zoom: number;
+  declare compare: Compare;
+  declare wipe: number;
+  declare aiming: boolean;
+  /** The pixel that is pointed at. */
+  declare at: Place | null;
+  declare width: number;
+  declare height: number;
+  /** What stands in the middle, as a share of the picture. */
+  private middle: Place = { x: 0.5, y: 0.5 };
+  private readonly pointers = new Map<number, Place>();
+  private gesture: "pan" | "wipe" | null = null;
+  private travelled = 0;
+  private readonly scratch = document.createElement("canvas");
+  private readonly watch = new ResizeObserver(([entry]) => {
+    this.width = entry!.contentRect.width;
+    this.height = entry!.contentRect.height;
+  });
+
+  constructor() {
+    super();
+    this.zoom = 1;
+    this.compare = "alone";
+    this.wipe = 0.5;
+    this.aiming = false;
+    this.at = null;
+    this.width = this.height = 0;
+  }
+
+  override firstUpdated(): void {
+    this.watch.observe(this.renderRoot.querySelector(".stage")!);
+    // Lit's listeners of wheels are passive in some browsers.
+    this.canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    this.watch.disconnect();
+  }
+
+  private get canvas(): HTMLCanvasElement {
+    return this.renderRoot.querySelector("canvas")!;
+  }
+
+  /** Rows and columns of the full picture, the sensor's pixels. */
+  private get shape(): [number, number] {
+    const shape = this.bench.document?.camera.sensor["shape"];
+    return Array.isArray(shape) ? [Number(shape[0]), Number(shape[1])] : (this.bench.picture?.about.shape ?? [1, 1]);
+  }
+
+  private get mode(): Compare {
+    return this.bench.pinned ? this.compare : "alone";
+  }
+
+  /** Width of one of the pictures shown, and where each begins. */
+  private get paneWidth(): number {
+    return this.mode === "beside" ? this.width / 2 : this.width;
+  }
+
+  /** Pixels of the screen for one of the picture. */
+  private get unit(): number {
+    const [rows, columns] = this.shape;
+    return this.zoom * Math.min((this.paneWidth - 2) / columns, (this.height - 2) / rows);
+  }
+
+  private corner(): Place {
+    const [rows, columns] = this.shape;
+    return { x: this.paneWidth / 2 - this.middle.x * columns * this.unit, y: this.height / 2 - this.middle.y * rows * this.unit };
+  }
+
+  private pixelAt(place: Place): Place | null {
+    const [rows, columns] = this.shape;
+    const corner = this.corner();
+    const x = Math.floor(((this.mode === "beside" ? place.x % this.paneWidth : place.x) - corner.x) / this.unit);
+    const y = Math.floor((place.y - corner.y) / this.unit);
+    return x >= 0 && y >= 0 && x < columns && y < rows ? { x, y } : null;
+  }
+
+  // --- zoom and pan ---
+
+  private zoomTo(zoom: number, around: Place = { x: this.paneWidth / 2, y: this.height / 2 }): void {
+    const [rows, columns] = this.shape;
+    const fits = this.unit / this.zoom;
+    const next = Math.min(Math.max(zoom, 1), Math.max(MOST_ZOOM / fits, 1));
+    const before = this.unit;
+    this.zoom = next;
+    const after = this.unit;
+    const away = { x: around.x - this.paneWidth / 2, y: around.y - this.height / 2 };
+    this.middle = {
+      x: this.middle.x + (away.x / before - away.x / after) / columns,
+      y: this.middle.y + (away.y / before - away.y / after) / rows,
+    };
+    this.keepWithin();
+  }
+
+  private pan(dx: number, dy: number): void {
+    const [rows, columns] = this.shape;
+    this.middle = { x: this.middle.x - dx / this.unit / columns, y: this.middle.y - dy / this.unit / rows };
+    this.keepWithin();
+  }
+
+  private keepWithin(): void {
+    const [rows, columns] = this.shape;
+    const clamp = (value: number, room: number, size: number) =>
+      size <= room ? 0.5 : Math.min(Math.max(value, room / 2 / size), 1 - room / 2 / size);
+    this.middle = {
+      x: clamp(this.middle.x, this.paneWidth, columns * this.unit),
+      y: clamp(this.middle.y, this.height, rows * this.unit),
+    };
+    this.requestUpdate();
+  }
+
+  private wheel(event: WheelEvent): void {
+    event.preventDefault();
+    const place = this.placeOf(event);
+    this.zoomTo(this.zoom * Math.exp(-event.deltaY * WHEEL * (event.deltaMode === 1 ? 20 : 1)), { x: place.x % this.paneWidth, y: place.y });
+  }
+
+  private placeOf(event: MouseEvent): Place {
+    const box = this.canvas.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  }
+
+  // --- pointers and keys ---
+
+  private down(event: PointerEvent): void {
+    if (event.button !== 0) return;
+    const place = this.placeOf(event);
+    this.canvas.setPointerCapture(event.pointerId);
+    this.pointers.set(event.pointerId, place);
+    this.travelled = 0;
+    this.gesture = this.onWipe(place) ? "wipe" : "pan";
+  }
+
+  private onWipe(place: Place): boolean {
+    return this.mode === "wipe" && Math.abs(place.x - this.wipe * this.width) < 14;
+  }
+
+  private move(event: PointerEvent): void {
+    const place = this.placeOf(event);
+    const before = this.pointers.get(event.pointerId);
+    if (!before) {
+      this.point(this.pixelAt(place));
+      this.canvas.classList.toggle("wiping", this.onWipe(place));
+      return;
+    }
+    this.travelled += Math.hypot(place.x - before.x, place.y - before.y);
+    if (this.gesture === "wipe") this.wipe = Math.min(Math.max(place.x / this.width, 0), 1);
+    else if (this.pointers.size === 2) {
+      const other = [...this.pointers].find(([id]) => id !== event.pointerId)![1];
+      const apart = (one: Place) => Math.max(Math.hypot(one.x - other.x, one.y - other.y), 1);
+      this.zoomTo((this.zoom * apart(place)) / apart(before), { x: ((place.x + other.x) / 2) % this.paneWidth, y: (place.y + other.y) / 2 });
+    } else this.pan(place.x - before.x, place.y - before.y);
+    this.pointers.set(event.pointerId, place);
+  }
+
+  private up(event: PointerEvent): void {
+    const began = this.pointers.delete(event.pointerId);
+    if (!began || this.travelled > 4 || this.gesture === "wipe") return;
+    const pixel = this.pixelAt(this.placeOf(event));
+    this.point(pixel);
+    if (pixel && this.aiming) this.focusOn(pixel);
+  }
+
+  /** Pixels of the picture that the host has, which may be a coarse one. */
+  private inPicture({ x, y }: Place): Place {
+    const [rows, columns] = this.shape;
+    const [there, across] = this.bench.picture?.about.shape ?? [rows, columns];
+    return { x: Math.floor(((x + 0.5) * across) / columns), y: Math.floor(((y + 0.5) * there) / rows) };
+  }
+
+  private focusOn(pixel: Place): void {
+    this.bench.act({ do: "focus", ...this.inPicture(pixel) });
+  }
+
+  private point(pixel: Place | null): void {
+    if (pixel?.x === this.at?.x && pixel?.y === this.at?.y) return;
+    this.at = pixel;
+    if (pixel && this.bench.picture && !this.bench.picture.about.coarse) this.bench.askValue(pixel.x, pixel.y);
+  }
+
+  private key(event: KeyboardEvent): void {
+    const [rows, columns] = this.shape;
+    const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    if (arrow && !event.ctrlKey && !event.metaKey) {
+      const by = event.shiftKey ? 10 : 1;
+      const from = this.at ?? { x: Math.floor(columns / 2), y: Math.floor(rows / 2) };
+      const x = Math.min(Math.max(from.x + arrow[0]! * by, 0), columns - 1);
+      const y = Math.min(Math.max(from.y + arrow[1]! * by, 0), rows - 1);
+      this.point({ x, y });
+      if (this.zoom > 1) {
+        this.middle = { x: (x + 0.5) / columns, y: (y + 0.5) / rows };
+        this.keepWithin();
+      }
+    } else if (event.key === "+" || event.key === "=") this.zoomTo(this.zoom * 1.5);
+    else if (event.key === "-") this.zoomTo(this.zoom / 1.5);
+    else if (event.key === "0") this.zoomTo(1);
+    else if (event.key === "Enter" && this.at) this.focusOn(this.at);
+    else return;
+    event.preventDefault();
+  }
+
+  // --- drawing ---
+
+  protected override updated(): void {
+    const { canvas } = this;
+    const sharp = window.devicePixelRatio || 1;
+    const [wide, high] = [Math.round(this.width * sharp), Math.round(this.height * sharp)];
+    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+    const context = canvas.getContext("2d")!;
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.clearRect(0, 0, wide, high);
+    context.setTransform(sharp, 0, 0, sharp, 0, 0);
+    const now = this.bench.picture?.bitmap;
+    if (!now || !this.width) return;
+    const pinned = this.bench.pinned;
+    if (this.mode === "alone" || !pinned) this.put(context, now, 0, this.width);
+    else if (this.mode === "beside") {
+      this.put(context, pinned, 0, this.paneWidth - 1);
+      this.put(context, now, this.paneWidth, this.paneWidth);
+    } else if (this.mode === "wipe") {
+      const line = this.wipe * this.width;
+      this.put(context, pinned, 0, line, 0);
+      this.put(context, now, line, this.width - line, 0);
+      context.fillStyle = "rgb(0 0 0 / 50%)";
+      context.fillRect(line - 2, 0, 4, this.height);
+      context.fillStyle = "#fff";
+      context.fillRect(line - 1, 0, 2, this.height);
+      context.beginPath();
+      context.roundRect(line - 4, this.height / 2 - 16, 8, 32, 4);
+      context.fill();
+      context.strokeStyle = "rgb(0 0 0 / 50%)";
+      context.stroke();
+    } else this.put(context, this.difference(now, pinned), 0, this.width);
+    if (this.at && (this.unit >= OUTLINED || this.matchesFocus())) this.outline(context, this.at);
+  }
+
+  private matchesFocus(): boolean {
+    return this.canvas.matches(":focus-visible");
+  }
+
+  /** One picture within a piece of the canvas from `left` on; its origin there unless another is given. */
+  private put(context: CanvasRenderingContext2D, image: CanvasImageSource, left: number, width: number, origin = left): void {
+    const [rows, columns] = this.shape;
+    const corner = this.corner();
+    context.save();
+    context.beginPath();
+    context.rect(left, 0, width, this.height);
+    context.clip();
+    context.imageSmoothingEnabled = this.unit < 2;
+    context.imageSmoothingQuality = "high";
+    context.drawImage(image, origin + corner.x, corner.y, columns * this.unit, rows * this.unit);
+    context.restore();
+  }
+
+  /** |one − other|, four times as bright: no difference is black. */
+  private difference(one: ImageBitmap, other: ImageBitmap): HTMLCanvasElement {
+    const { scratch } = this;
+    const [rows, columns] = this.shape;
+    [scratch.width, scratch.height] = [columns, rows];
+    const context = scratch.getContext("2d")!;
+    context.drawImage(one, 0, 0, columns, rows);
+    context.globalCompositeOperation = "difference";
+    context.drawImage(other, 0, 0, columns, rows);
+    context.globalCompositeOperation = "lighter";
+    for (let doubled = 0; doubled < 2; doubled++) context.drawImage(scratch, 0, 0);
+    context.globalCompositeOperation = "source-over";
+    return scratch;
+  }
+
+  private outline(context: CanvasRenderingContext2D, { x, y }: Place): void {
+    const corner = this.corner();
+    const size = Math.max(this.unit, 5);
+    const spare = (size - this.unit) / 2;
+    for (const left of this.mode === "beside" ? [0, this.paneWidth] : [0]) {
+      const at: [number, number] = [left + corner.x + x * this.unit - spare, corner.y + y * this.unit - spare];
+      context.lineWidth = 3;
+      context.strokeStyle = "rgb(0 0 0 / 60%)";
+      context.strokeRect(...at, size, size);
+      context.lineWidth = 1.5;
+      context.strokeStyle = "#fff";
+      context.strokeRect(...at, size, size);
+    }
+  }
+
+  override render() {
+    const { bench } = this;
+    const about = bench.picture?.about;
+    return html`
+      <div class="bar" role="toolbar" aria-label="Picture">
+        <div class="group">
+          <button class="icon" title="Smaller (−)" aria-label="Zoom out" ?disabled=${this.zoom <= 1} @click=${() => this.zoomTo(this.zoom / 1.5)}>${sign("minus")}</button>
+          <button class="icon" title="Larger (+)" aria-label="Zoom in" @click=${() => this.zoomTo(this.zoom * 1.5)}>${sign("plus")}</button>
+          <button class="icon" title="All of it (0)" aria-label="The whole picture" @click=${() => this.zoomTo(1)}>${sign("whole")}</button>
+        </div>
+        <button aria-pressed=${this.aiming} title="Click into the picture to focus there: the sensor moves" @click=${() => (this.aiming = !this.aiming)}>${sign("aim")}Click to focus</button>
+        ${this.exposure()}
+        <label class="check" title="Noise of the sensor's electronics"><input type="checkbox" .checked=${bench.document?.noise ?? false}
+          @change=${(event: Event) => bench.set(["noise"], (event.target as HTMLInputElement).checked)}>Noise</label>
+        <span class="spring"></span>
+        <button aria-pressed=${bench.pinned !== null} ?disabled=${!about} title="Keep this picture to compare others with" @click=${() => this.pin()}>${sign("pin")}${bench.pinned ? "Unpin" : "Pin"}</button>
+        ${bench.pinned ? html`<select aria-label="Compare with the pinned picture" .value=${this.compare}
+          @change=${(event: Event) => (this.compare = (event.target as HTMLSelectElement).value as Compare)}>
+          ${MODES.map(([mode, words]) => html`<option value=${mode} ?selected=${mode === this.compare}>${words}</option>`)}</select>` : nothing}
+      </div>
+      <div class="stage">
+        <canvas ?data-aiming=${this.aiming} tabindex="0" role="application"
+          aria-label="The picture. Arrow keys move over its pixels, Enter focuses on one, plus, minus and 0 zoom."
+          @pointerdown=${this.down} @pointermove=${this.move} @pointerup=${this.up} @pointercancel=${this.up}
+          @pointerleave=${() => this.point(null)} @dblclick=${() => this.zoomTo(this.zoom > 1 ? 1 : 8)}
+          @focus=${() => this.requestUpdate()} @blur=${() => this.requestUpdate()} @keydown=${this.key}></canvas>
+        ${this.bench.without ? html`<p class="without">${this.bench.without}</p>` : this.captions()}
+        ${this.mode === "wipe" ? html`<input type="range" class="wipe" min="0" max="1" step="0.01" aria-label="Place of the wipe" .value=${String(this.wipe)}
+          @input=${(event: Event) => (this.wipe = Number((event.target as HTMLInputElement).value))}>` : nothing}
+      </div>
+      <div class="line">${this.reading()}<span class="spring"></span>${this.state()}</div>`;
+  }
+
+  private pin(): void {
+    const on = !this.bench.pinned;
+    this.bench.pin(on);
+    if (on && this.compare === "alone") this.compare = "wipe";
+  }
+
+  private exposure() {
+    const { bench } = this;
+    const fixed = bench.document?.exposure ?? null;
+    const white = bench.picture?.about.white ?? 0;
+    return html`<div class="group">
+      <label class="check" title="Brightness is kept as it is now, so that it does not jump"><input type="checkbox" .checked=${fixed !== null}
+        @change=${(event: Event) => bench.set(["exposure"], (event.target as HTMLInputElement).checked ? white : null)}>Fix exposure</label>
+      ${fixed === null ? nothing : html`
+        <button class="icon" aria-label="Darker" title="Darker" @click=${() => bench.set(["exposure"], fixed * Math.SQRT2)}>${sign("minus")}</button>
+        <button class="icon" aria-label="Brighter" title="Brighter" @click=${() => bench.set(["exposure"], fixed / Math.SQRT2)}>${sign("plus")}</button>`}
+    </div>`;
+  }
+
+  private captions() {
+    const psnr = this.bench.picture?.about.psnr;
+    const words = this.bench.picture?.about.same ? "the same" : psnr === null || psnr === undefined ? "" : `PSNR ${plain(psnr, 3)} dB`;
+    if (this.mode === "alone") return nothing;
+    if (this.mode === "difference") return html`<span class="caption left">difference ×4${words ? ` · ${words}` : ""}</span>`;
+    return html`<span class="caption left">pinned</span><span class="caption right">now${words ? ` · ${words}` : ""}</span>`;
+  }
+
+  private reading() {
+    const { value } = this.bench;
+    if (!this.at) return html`<span>${this.zoom > 1 ? `${plain(this.unit, 3)} : 1` : "Point at the picture to read a pixel."}</span>`;
+    const same = value && value.x === this.at.x && value.y === this.at.y;
+    const numbers = same ? value.irradiance.map((each) => plain(each, 4)).join("  ") : "…";
+    const recorded = same && value.recorded ? ` · DN ${value.recorded.map((each) => plain(each, 6)).join("  ")}` : "";
+    return html`<span role="status">column ${this.at.x}, row ${this.at.y} · ${numbers}${recorded}</span>`;
+  }
+
+  private state() {
+    const about = this.bench.picture?.about;
+    if (!about) return nothing;
+    return html`
+      ${about.missing > 0.0005 ? html`<span class="missing" title="Rays that the light field does not hold: pixels are darker there than they would be">${plain(100 * about.missing, 2)} % of the rays missing</span>` : nothing}
+      <span>${this.shape[1]} × ${this.shape[0]}${about.coarse ? ", coarse" : ""} · ${plain(about.took, 3)} ms</span>`;
+  }
+
+  static override styles = [
+    controls,
+    css`
+      :host { display: flex; flex-direction: column; min-height: 0; min-width: 0; }
+      .bar { display: flex; flex-wrap: wrap; align-items: center; gap: 2px 8px; padding: 6px 8px; }
+      .group { display: flex; align-items: center; gap: 2px; }
+      .spring { flex: 1; }
+      .stage { position: relative; flex: 1; min-height: 0; background: var(--stage); overflow: hidden; }
+      canvas { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: none; cursor: crosshair; }
+      canvas[data-aiming] { cursor: cell; }
+      canvas:focus-visible { outline-offset: -2px; }
+      .without { position: absolute; left: 10%; right: 10%; top: 40%; margin: 0; padding: 12px 16px; border-radius: 8px; background: var(--error-ground); white-space: pre-line; overflow-wrap: anywhere; }
+      .caption { position: absolute; top: 8px; padding: 2px 8px; border-radius: 4px; background: rgb(0 0 0 / 62%); color: #fff; font-size: 12px; pointer-events: none; }
+      .caption.left { left: 8px; } .caption.right { right: 8px; }
+      /* The line itself is dragged; the slider is there for keys, and seen when they are on it. */
+      .wipe { position: absolute; left: 0; right: 0; bottom: 6px; width: 100%; margin: 0; accent-color: var(--accent); pointer-events: none; opacity: 0; }
+      .wipe:focus-visible { opacity: 1; }
+      canvas.wiping { cursor: ew-resize; }
+      .line { display: flex; gap: 14px; min-height: 26px; align-items: center; padding: 0 10px; font-size: 12px; color: var(--quiet); white-space: nowrap; overflow: hidden; }
+      .line > span { overflow: hidden; text-overflow: ellipsis; white-space: pre; }
+      .line > .missing { color: var(--warn-ink); }
+    `,
+  ];
+}

@@ -1,0 +1,331 @@
+/** The whole bench: what is opened and kept above, the side and its parts, the picture. */
+
+import { html, css, nothing } from "lit";
+
+import { Part, controls, named } from "./part";
+import { EditorView } from "./editor";
+import { PictureView } from "./picture";
+import { SideView } from "./side";
+import { OF_A_POINT, QUESTIONS, answerStyles, drawnAnswer } from "./answers";
+import { sign } from "./signs";
+import { withUnit } from "./numbers";
+import type { Where } from "./protocol";
+
+type Beside = "parts" | "notes" | string;
+
+/** What can be taken away, and how the menu calls it. */
+const EXPORTS: [string, string][] = [
+  ["toml", "Camera file (TOML)"],
+  ["python", "Python program of this picture"],
+  ["png", "Picture (PNG)"],
+  ["exr", "Picture (OpenEXR, linear)"],
+];
+
+export class BenchView extends Part {
+  static override properties = { ...Part.properties, beside: { state: true } };
+  declare beside: Beside;
+  /** Of the point whose picture is asked for; empty for the one in focus. */
+  private distance = "";
+  private askedFor = "";
+  private askTimer = 0;
+
+  constructor() {
+    super();
+    this.beside = "parts";
+  }
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    this.bench.addEventListener("change", this.keepAnswer);
+    this.addEventListener("keydown", this.key);
+    // On a page of its own the bench undoes wherever the focus is.
+    if (this.bench.options.address) window.addEventListener("keydown", this.keyOutside);
+    this.addEventListener("type-place", this.typePlace);
+    this.addEventListener("show-notes", this.showNotes);
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    this.bench.removeEventListener("change", this.keepAnswer);
+    window.removeEventListener("keydown", this.keyOutside);
+    window.clearTimeout(this.askTimer);
+  }
+
+  private readonly keyOutside = (event: KeyboardEvent) => {
+    if (event.target === document.body) this.key(event);
+  };
+
+  private readonly typePlace = () => {
+    this.beside = "parts";
+    void this.updateComplete.then(() => this.renderRoot.querySelector<EditorView>("vcc-bench-editor")?.typePlace());
+  };
+
+  private readonly showNotes = () => {
+    this.beside = "parts";
+  };
+
+  private readonly key = (event: KeyboardEvent) => {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+    const letter = event.key.toLowerCase();
+    // In a field in which one is typing the browser's own undo is meant.
+    const typing = event.composedPath().some((each) => each instanceof HTMLElement && each.matches("[data-edited]"));
+    if (typing || (letter !== "z" && letter !== "y")) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.bench.act({ do: letter === "y" || event.shiftKey ? "redo" : "undo" });
+  };
+
+  // --- what is answered beside the parts ---
+
+  private show(beside: Beside): void {
+    this.beside = beside;
+    this.askedFor = "";
+    this.keepAnswer();
+  }
+
+  /** An answer that is open follows the camera, when it rests. */
+  private readonly keepAnswer = () => {
+    if (this.beside === "parts" || this.beside === "notes" || !this.bench.document) return;
+    const about = this.beside + JSON.stringify(this.bench.document);
+    if (about === this.askedFor) return;
+    const first = this.askedFor === "";
+    this.askedFor = about;
+    window.clearTimeout(this.askTimer);
+    this.askTimer = window.setTimeout(() => this.askAgain(), first ? 0 : 300);
+  };
+
+  private askAgain(): void {
+    if (this.beside === "parts" || this.beside === "notes") return;
+    const distance = this.distance.trim();
+    this.bench.question(this.beside, OF_A_POINT.includes(this.beside) && distance ? { distance: withUnit(distance, null, "m") } : {});
+  }
+
+  // --- drawing ---
+
+  override render() {
+    const { bench } = this;
+    return html`
+      <header>
+        <h1>vcc bench</h1>
+        <div class="group">
+          <button class="icon" title="Undo (Ctrl+Z)" aria-label="Undo" ?disabled=${!bench.canUndo} @click=${() => bench.act({ do: "undo" })}>${sign("undo")}</button>
+          <button class="icon" title="Redo (Ctrl+Shift+Z)" aria-label="Redo" ?disabled=${!bench.canRedo} @click=${() => bench.act({ do: "redo" })}>${sign("redo")}</button>
+        </div>
+        <span class="spring"></span>
+        ${bench.parts ? [this.opening(), this.keeping()] : nothing}
+      </header>
+      ${this.banner()}
+      <section class="bench" aria-label="Optical bench">
+        <vcc-bench-side .bench=${bench}></vcc-bench-side>
+      </section>
+      <section class="picture" aria-label="Picture" aria-busy=${bench.waiting || !bench.picture}><vcc-bench-picture .bench=${bench}></vcc-bench-picture></section>
+      <section class="beside" aria-label="Parts and answers">
+        ${this.tabs()}
+        ${this.pane()}
+      </section>
+      <div class="toasts" role="status" aria-live="polite">${this.toasts()}</div>`;
+  }
+
+  private banner() {
+    const { bench } = this;
+    if (bench.open) return nothing;
+    return html`<div class="banner" role="alert">${bench.wasOpen
+      ? "The server is gone. What you see stays; the bench goes on when the server is back."
+      : "Waiting for the server …"}</div>`;
+  }
+
+  private tabs() {
+    const { bench } = this;
+    const tabs: [Beside, string][] = [
+      ["parts", "Parts"],
+      ["notes", bench.notes.length ? `Notes ${bench.notes.length}` : "Notes"],
+      ...QUESTIONS,
+    ];
+    return html`<div class="tabs" role="tablist" aria-label="Beside the picture" @keydown=${(event: KeyboardEvent) => {
+        const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+        if (!by) return;
+        const at = tabs.findIndex(([name]) => name === this.beside);
+        this.show(tabs[(at + by + tabs.length) % tabs.length]![0]);
+        void this.updateComplete.then(() => this.renderRoot.querySelector<HTMLElement>('.tabs [aria-selected="true"]')?.focus());
+      }}>
+      ${tabs.map(([name, words]) => html`<button role="tab" id="beside-${name.replaceAll(" ", "-")}" aria-selected=${this.beside === name} aria-controls="pane"
+        tabindex=${this.beside === name ? 0 : -1} @click=${() => this.show(name)}>${words}</button>`)}
+    </div>`;
+  }
+
+  private pane() {
+    const { bench } = this;
+    const label = `beside-${this.beside.replaceAll(" ", "-")}`;
+    if (this.beside === "parts")
+      return html`<div id="pane" class="pane" role="tabpanel" aria-labelledby=${label}><vcc-bench-editor .bench=${bench}></vcc-bench-editor></div>`;
+    if (this.beside === "notes")
+      return html`<div id="pane" class="pane text" role="tabpanel" aria-labelledby=${label} tabindex="0">
+        ${bench.side?.words.map((words) => html`<p>${words}</p>`)}
+        ${bench.notes.length ? nothing : html`<p class="quiet">Nothing to note: no ray misses, and nothing is too fine for the light field or the sensor.</p>`}
+        ${bench.notes.map((note) => html`<p class="advice">${note.element === null ? nothing : html`<button class="link" @click=${() => bench.select(note.element!)}>${bench.partOf(note.element)?.label[0] ?? ""}</button>`}${note.words}</p>`)}</div>`;
+    const answer = bench.answer?.message.what === this.beside ? bench.answer : null;
+    return html`<div id="pane" class="pane text answer" role="tabpanel" aria-labelledby=${label} tabindex="0" aria-busy=${!answer}>
+      ${OF_A_POINT.includes(this.beside) ? html`<label class="distance">point at <input type="text" placeholder="in focus" .value=${this.distance}
+        @change=${(event: Event) => {
+          this.distance = (event.target as HTMLInputElement).value;
+          this.askAgain();
+        }}></label>` : nothing}
+      ${answer ? drawnAnswer(answer) : html`<p class="quiet">…</p>`}</div>`;
+  }
+
+  private toasts() {
+    const { bench } = this;
+    const { progress, refused } = bench;
+    return html`
+      ${refused && !this.saidAtField(refused.where) ? html`<div class="toast error"><span>${refused.words}</span><button @click=${() => bench.forgive()}>Close</button></div>` : nothing}
+      ${progress ? html`<div class="toast"><span>${progress.words}</span><progress aria-label=${progress.words} max=${progress.total} value=${progress.done}></progress></div>` : nothing}`;
+  }
+
+  /** Whether the field that was refused is shown, and says so itself. */
+  private saidAtField(where: Where | null): boolean {
+    const { selected } = this.bench;
+    if (!where || this.beside !== "parts" || selected === "light field") return false;
+    return this.bench.whereOf(selected).every((step, at) => where[at] === step) && where.length > (selected === "sensor" ? 1 : 2);
+  }
+
+  // --- menus ---
+
+  private opening() {
+    const { bench } = this;
+    return this.menu("Open", html`
+      <button role="menuitem" @click=${(event: Event) => ((event.currentTarget as Element).nextElementSibling as HTMLInputElement).click()}>Camera file …</button>
+      <input type="file" hidden accept=".toml" aria-label="Camera file" @change=${(event: Event) => void this.load(event.target as HTMLInputElement)}>
+      ${bench.parts!.gallery.length ? html`<hr>` : nothing}
+      ${bench.parts!.gallery.map((each) => html`<button role="menuitem" @click=${() => bench.act({ do: "load", gallery: each })}>${each}</button>`)}`);
+  }
+
+  private async load(input: HTMLInputElement): Promise<void> {
+    const file = input.files?.[0];
+    if (file) this.bench.act({ do: "load", toml: await file.text() });
+    input.value = "";
+  }
+
+  private keeping() {
+    return this.menu("Export", EXPORTS.map(([what, words]) => html`<button role="menuitem" @click=${() => this.bench.export(what)}>${words}</button>`));
+  }
+
+  private menu(words: string, items: unknown) {
+    return html`<details class="menu" @keydown=${(event: KeyboardEvent) => {
+        const details = event.currentTarget as HTMLDetailsElement;
+        if (event.key === "Escape") {
+          details.open = false;
+          details.querySelector("summary")!.focus();
+          event.stopPropagation();
+        }
+        const by = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+        if (!by || event.target instanceof HTMLInputElement) return;
+        event.preventDefault();
+        details.open = true;
+        const all = [...details.querySelectorAll<HTMLElement>('[role="menuitem"]')];
+        const at = all.indexOf(event.target as HTMLElement);
+        all[(at + by + all.length) % all.length]?.focus();
+      }}
+      @focusout=${(event: FocusEvent) => {
+        const details = event.currentTarget as HTMLDetailsElement;
+        if (event.relatedTarget && !details.contains(event.relatedTarget as Node)) details.open = false;
+      }}
+      @click=${(event: Event) => {
+        const details = event.currentTarget as HTMLDetailsElement;
+        const item = (event.target as Element).closest('[role="menuitem"]');
+        if (item && !item.nextElementSibling?.matches("input")) details.open = false;
+      }}>
+      <summary>${words}${sign("down")}</summary><div class="items">${items}</div></details>`;
+  }
+
+  static override styles = [
+    controls,
+    answerStyles,
+    css`
+      :host {
+        color-scheme: var(--bench-scheme, light dark);
+        --ground: light-dark(#fbfbf9, #17191b);
+        --well: light-dark(#ffffff, #101213);
+        --stage: light-dark(#ecece8, #0d0e0f);
+        --line: light-dark(#e2e2dd, #2c3034);
+        --edge: light-dark(#b5b5ae, #555b61);
+        --ink: light-dark(#1c1e20, #e9e8e4);
+        --quiet: light-dark(#5f6469, #a0a6ab);
+        --faint: light-dark(#a9abad, #5e6469);
+        --accent: light-dark(#005f99, #6cc0f5);
+        --hover: light-dark(rgb(0 0 0 / 5%), rgb(255 255 255 / 7%));
+        --chosen: light-dark(#e1eef7, #17354a);
+        --warn: light-dark(#e0a100, #e6b422);
+        --on-warn: #1c1e20;
+        --warn-ink: light-dark(#7a5600, #e6b422);
+        --warn-ground: light-dark(#fdf3d8, #36301c);
+        --error: light-dark(#b3261e, #ff9d94);
+        --error-ground: light-dark(#fdeceb, #3d1f1d);
+        --glass: light-dark(#cfe6f5, #29475b);
+        --glass-edge: light-dark(#4a7a9c, #7fb2d3);
+        --frost: light-dark(#e4e4dd, #4b4d4b);
+        --frost-edge: light-dark(#8a8a80, #a9a99c);
+        --focused: light-dark(#0072b2, #56b4e9);
+        --near: light-dark(#d55e00, #f0883e);
+        --far: light-dark(#a5457f, #d98bb9);
+        --aside: light-dark(#00805c, #2fc394);
+        --arrow: url("data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' width='8' height='6' fill='none' stroke='%23808588' stroke-width='1.5'%3E%3Cpath d='m1 1 3 3 3-3'/%3E%3C/svg%3E");
+        display: grid;
+        position: relative;
+        width: 100%;
+        height: 100%;
+        min-height: 0;
+        background: var(--ground);
+        text-align: start;
+      }
+      header { grid-area: header; display: flex; align-items: center; gap: 10px; padding: 0 8px 0 14px; height: 44px; border-bottom: 1px solid var(--line); position: relative; z-index: 3; }
+      h1 { margin: 0; font-size: 13px; font-weight: 600; letter-spacing: -0.01em; }
+      .group { display: flex; }
+      .spring { flex: 1; }
+      .bench { grid-area: bench; min-height: 0; min-width: 0; display: grid; border-bottom: 1px solid var(--line); }
+      .picture { grid-area: picture; min-height: 0; min-width: 0; display: grid; border-left: var(--aside-border, 1px) solid var(--line); }
+      .beside { grid-area: beside; min-height: 0; min-width: 0; display: flex; flex-direction: column; }
+      .tabs { display: flex; gap: 2px; padding: 6px 8px 0; overflow-x: auto; scrollbar-width: none; flex: none; border-bottom: 1px solid var(--line); }
+      .tabs button { border-radius: 6px 6px 0 0; height: 30px; color: var(--quiet); }
+      .tabs button[aria-selected="true"] { background: none; color: var(--ink); font-weight: 600; box-shadow: inset 0 -2px var(--accent); }
+      .pane { flex: 1; min-height: 0; display: grid; }
+      .pane.text { display: block; overflow: auto; padding: 10px 14px; }
+      .pane p { margin: 0 0 8px; }
+      .pane pre { margin: 0; font: 11.5px/1.5 ui-monospace, "SF Mono", "DejaVu Sans Mono", monospace; white-space: pre-wrap; }
+      .distance { display: flex; align-items: center; gap: 8px; margin-bottom: 10px; }
+      .distance input { width: 110px; }
+      .advice { padding: 7px 10px; border-radius: 6px; background: var(--warn-ground); white-space: pre-line; }
+      .link { height: auto; padding: 0 6px 0 0; font-weight: 600; text-decoration: underline; text-underline-offset: 2px; }
+      .banner { grid-area: banner; padding: 7px 14px; background: var(--warn-ground); border-bottom: 1px solid var(--line); }
+      .menu { position: relative; }
+      .items { position: absolute; right: 0; top: 32px; min-width: 210px; max-height: 420px; overflow-y: auto; padding: 5px; background: var(--well); border: 1px solid var(--line); border-radius: 8px; box-shadow: 0 6px 24px rgb(0 0 0 / 14%); display: grid; }
+      .items button { justify-content: start; }
+      .items hr { width: 100%; border: 0; border-top: 1px solid var(--line); margin: 4px 0; }
+      .toasts { position: absolute; left: 50%; bottom: 36px; translate: -50%; display: grid; gap: 8px; width: min(560px, 92%); pointer-events: none; z-index: 4; }
+      .toast { display: flex; align-items: center; justify-content: space-between; gap: 12px; padding: 8px 8px 8px 14px; border-radius: 8px; border: 1px solid var(--line); background: var(--well); box-shadow: 0 6px 24px rgb(0 0 0 / 14%); pointer-events: auto; overflow-wrap: anywhere; }
+      .toast.error { background: var(--error-ground); }
+    `,
+  ];
+}
+
+/** The frame in which a bench stands; its grid follows the width that it has, in a page or a cell. */
+export class BenchFrame extends Part {
+  override render() {
+    return html`<vcc-bench-view .bench=${this.bench}></vcc-bench-view>`;
+  }
+
+  static override styles = css`
+    :host { display: block; width: 100%; height: 100%; container-type: size; overflow: auto; }
+    vcc-bench-view { grid-template: "header header" auto "banner banner" auto "bench picture" minmax(180px, 44fr) "beside picture" 56fr / minmax(0, 46fr) minmax(0, 54fr); }
+    @container (max-width: 699px) {
+      vcc-bench-view { --aside-border: 0px; height: auto; min-height: 100%; grid-template: "header" auto "banner" auto "picture" min(112cqw, 480px) "bench" 230px "beside" minmax(320px, auto) / minmax(0, 1fr); }
+    }
+  `;
+}
+
+export function register(): void {
+  named("vcc-bench-side", SideView);
+  named("vcc-bench-picture", PictureView);
+  named("vcc-bench-editor", EditorView);
+  named("vcc-bench-view", BenchView);
+  named("vcc-bench", BenchFrame);
+}
