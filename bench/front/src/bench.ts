@@ -246,6 +246,7 @@ export class Bench extends EventTarget {
       case "pinned":
         this.pinned?.close();
         this.pinned = buffers[0] ? await decoded(buffers[0]) : null;
+        if (this.picture) this.picture.about = { ...this.picture.about, same: this.pinned !== null };
         break;
       case "value":
         this.value = message;
