@@ -1,10 +1,15 @@
 """Settings shared by all tests."""
 
+import os
 import sys
 from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
+
+# Tests run side by side: libraries that start a thread for each core in each of them (OpenMP, BLAS) wait for one
+# another most of the time, and busily. Read when they are loaded; workers of pytest-xdist and commands inherit it.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 # The same examples on every run, and no time limit for any of them: these machines can be slow.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
