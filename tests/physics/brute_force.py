@@ -32,8 +32,14 @@ class Texture:
 
     def __call__(self, x: Array, y: Array) -> Array:
         total = np.full(np.broadcast_shapes(np.shape(x), np.shape(y)), self.mean)
+        crossed = np.size(x) + np.size(y) < total.size
         for amplitude, fx, fy, phase in self.waves:
-            total += amplitude * np.cos(2 * np.pi * (fx * x + fy * y) + phase)
+            along, down = 2 * np.pi * fx * x + phase, 2 * np.pi * fy * y
+            if crossed:  # cos(a + b) = cos a·cos b − sin a·sin b: few cosines where x and y lie along axes
+                total += (amplitude * np.cos(along)) * np.cos(down)
+                total -= (amplitude * np.sin(along)) * np.sin(down)
+            else:
+                total += amplitude * np.cos(along + down)
         return total
 
 

@@ -287,7 +287,7 @@ def nearest_centre(
         down = (cosine * (y - offset[1]) - sine * (x - offset[0])) / pitch
         best = np.full(across.shape, np.inf)
         found = [np.zeros(across.shape) for _ in range(4)]
-        for near_row in (-1, 0, 1):
+        for near_row in (-1, 0, 1) if hexagonal else (0,):  # across a square lattice each axis is by itself
             row = np.rint(down / height) + near_row
             shift = 0.5 * (row % 2) if hexagonal else 0.0
             column = np.rint(across - shift)
