@@ -182,7 +182,8 @@ class DenserViews:
         bounds = kernels.march_bounds(view.ranges, way)
         ends = np.linspace(parallax.sign * float(nearness.min()), parallax.sign * float(nearness.max()), 17)
         steps = np.abs(np.diff(parallax.down(ends))).max() / max(np.abs(np.diff(ends)).max(), 1e-30)
-        march = March(way, max(abs(across), abs(down) * float(steps)), TEAR)
+        reach = float(max(abs(across), abs(down) * float(steps)))  # one type: kernels are compiled for each
+        march = March(way, reach, TEAR)
 
         def band(start: int) -> None:
             rows = (part[start : start + BAND] for part in found[1:])

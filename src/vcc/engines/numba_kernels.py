@@ -221,7 +221,8 @@ def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # typ
 @_inlined
 def _rows_needed(gathered, b, band, low):  # type: ignore[no-untyped-def]
     """(first, after the last) of the rows of samples of tap b that fall on a band; first is ``low`` for none."""
-    first, shares, high = gathered.first, gathered.shares, 0
+    # Not a literal 0: what is given it would be compiled twice, for literals and for numbers.
+    first, shares, high = gathered.first, gathered.shares, np.int64(0)
     for y in range(band.start, band.stop):
         for t in range(shares.shape[2]):
             if shares[b, y, t] != 0:
