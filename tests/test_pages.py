@@ -1,7 +1,8 @@
 """Every page is a script: its Python, camera files and commands run in the order in which they stand, as written.
 
 What a page takes for given, a reader's own light field, camera and files, is made small beside it. Renderers are
-stood in for: their command lines are read, and a quick pattern is rendered in place of their scenes.
+stood in for: their command lines are read, and a quick pattern is rendered in place of their scenes. Pages of notebooks
+hold what notebooks hold, which `tests/test_notebooks.py` runs.
 """
 
 import contextlib
@@ -26,7 +27,8 @@ from vcc.gallery.entry import Entry, Result
 from vcc.sources import CameraArray
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+NOTEBOOKS = ROOT / "docs" / "notebooks"
+PAGES = [ROOT / "README.md", *sorted(set((ROOT / "docs").rglob("*.md")) - set(NOTEBOOKS.glob("*.md")))]
 NOT_RUN = {
     "pip": "the test command has installed the package",
     "pytest": "this is run by it",

@@ -5,6 +5,4 @@
 small: HTML and the PNG beside it take at most 1.3 MB together, and mostly two or three tenths of one.
 """
 
-from vcc.notebook.exhibits import exhibit
-
-__all__ = ["exhibit"]
+from vcc.notebook.exhibits import exhibit as exhibit

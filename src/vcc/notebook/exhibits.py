@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from functools import singledispatch
 from typing import Any
 
@@ -26,6 +26,7 @@ from vcc.base.describe import kind_in_words, parameters_listed
 from vcc.base.errors import InputError
 from vcc.base.units import mm, short, um
 from vcc.fields.sampled import has_values
+from vcc.files.transfer import encode
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.notebook.contacts import contact_panel, strip_panel
@@ -71,7 +72,7 @@ def _parted(line: str) -> tuple[str, str]:
 @exhibit.register
 def _(image: Image) -> Exhibit:
     title, words = _parted(repr(image))
-    return Exhibit(title, words, _light(image, "" if image.inverted else "as it is"))
+    return Exhibit(title, words, _light(image))
 
 
 @exhibit.register
@@ -84,12 +85,11 @@ def _(recording: Recording) -> Exhibit:
     return Exhibit(*_parted(first), (panel,), text=rest)
 
 
-def _light(image: Image, words: str = "", share: int = 1) -> tuple[Panel, ...]:
+def _light(image: Image, share: int = 1) -> tuple[Panel, ...]:
     """A picture, turned upright; none where there is nothing to look at, as under a tracer."""
     if not has_values(image.values):
         return ()
-    said = words if not image.inverted else "turned upright"
-    return (light_panel(image.upright().to_numpy(), said, share),)
+    return (light_panel(image.upright().to_numpy(), "turned upright" if image.inverted else "", share),)
 
 
 # --- light fields ---
@@ -223,7 +223,8 @@ def _front(pattern: Pattern) -> Panel:
     """What a pattern lets through, from the front: x to the right, y down."""
     values, size = _transmission(pattern)
     caption = f"from the front, {size}; white lets all light through"
-    return codes_panel(values, lambda part: np.rint(np.clip(part, 0, 1) * 255).astype(np.uint8), caption, share=2)
+    panel = codes_panel(values, lambda part: np.rint(np.clip(part, 0, 1) * 255).astype(np.uint8), caption, share=2)
+    return replace(panel, framed=True)
 
 
 def _transmission(pattern: Pattern) -> tuple[NDArray[np.float64], str]:
@@ -272,7 +273,9 @@ def _(advice: SamplingAdvice) -> Exhibit:
 
 @exhibit.register
 def _(spread: PointSpread) -> Exhibit:
-    panel = light_panel(spread.values, "as light lands on the sensor")
+    brightest = float(spread.values.max()) or 1.0
+    caption = "as light lands on the sensor; the brightest pixel is white"
+    panel = codes_panel(spread.values, lambda part: encode(part / np.float32(brightest), 8), caption)
     outside = f", {spread.outside:.2%} of the light beside it" if spread.outside > 0 else ""
     title, words = _parted(repr(spread))
     return Exhibit(title, words + outside, (panel,))

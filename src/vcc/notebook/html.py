@@ -32,6 +32,7 @@ class Panel:
         caption: below it.
         pixelated: whether its pixels are to be seen as squares where it is magnified.
         paper: whether it is dark on nothing, and wants white paper below it.
+        framed: whether it has a frame, without which it could not be told from a white page.
     """
 
     png: bytes
@@ -39,6 +40,7 @@ class Panel:
     caption: str = ""
     pixelated: bool = False
     paper: bool = False
+    framed: bool = False
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,8 @@ def _panel(panel: Panel) -> str:
         looks += ";image-rendering:pixelated"
     if panel.paper:
         looks += ";background:#fff;border-radius:4px"
+    if panel.framed:
+        looks += f";outline:{_LINE}"
     caption = f'<figcaption style="font-size:90%;{_QUIET}">{_words(panel.caption)}</figcaption>'
     source = b64encode(panel.png).decode("ascii")
     image = f'<img alt="{_words(panel.caption)}" style="{looks}" src="data:image/png;base64,{source}"/>'
@@ -110,10 +114,8 @@ def _table(table: Table) -> str:
     rows = "".join(_row("td", row) for row in table.rows[:MOST_ROWS])
     more = len(table.rows) - MOST_ROWS
     left_out = f'<div style="{_QUIET}">… and {more} more</div>' if more > 0 else ""
-    return (
-        '<table style="border-collapse:collapse;margin:4px 0;table-layout:auto;font-size:inherit;width:auto">'
-        f"{headings}{rows}</table>{left_out}"
-    )
+    looks = "border-collapse:collapse;margin:4px 0;table-layout:auto;width:auto;font-size:inherit;color:inherit"
+    return f'<table style="{looks}">{headings}{rows}</table>{left_out}'
 
 
 def _row(kind: str, cells: Iterable[str], looks: str = "") -> str:
@@ -132,5 +134,5 @@ def _text(text: str) -> str:
         made.append(f"<b>{_words(line)}</b>" if heading else _words(line))
     return (
         '<pre style="margin:4px 0;white-space:pre-wrap;background:none;border:0;padding:0;color:inherit;'
-        f'line-height:1.4">{chr(10).join(made)}</pre>'
+        f'line-height:1.4;font-family:ui-monospace,Menlo,Consolas,monospace">{chr(10).join(made)}</pre>'
     )

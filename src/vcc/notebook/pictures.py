@@ -15,7 +15,7 @@ from vcc.files.transfer import encode
 from vcc.notebook.html import Panel
 from vcc.plot import style
 
-LARGEST_SIDE = 640
+LARGEST_SIDE = 720
 """Pixels of a picture; a larger one is averaged down by a whole factor."""
 MOST_BYTES = 450_000
 """Of the PNG files of one exhibit, all together."""
