@@ -118,13 +118,26 @@ def shown(made: dict[str, str], path: Path) -> list[str]:
 
     def moved(found: re.Match[str]) -> str:
         file = path.with_stem(f"{path.stem}-{len(kept)}")
-        file.write_bytes(base64.b64decode(found[1]))
+        write_small(base64.b64decode(found[1]), file)
         kept.append(file)
         return f'src="../{file.relative_to(HERE).as_posix()}"'
 
     kept: list[Path] = []
     text = re.sub(r'src="data:image/png;base64,([^"]+)"', moved, made["text/html"])
     return [f'<div class="cell">{text}</div>']
+
+
+def write_small(png: bytes, path: Path) -> None:
+    """A photograph with 256 colours, chosen by k-means and dithered, in half the bytes; others as they are."""
+    from PIL import Image  # comes with Matplotlib
+
+    picture = Image.open(io.BytesIO(png))
+    if picture.mode != "RGB" or len(png) < 50_000:
+        path.write_bytes(png)
+        return
+    palette = picture.quantize(256, kmeans=3)
+    # Dithering needs the palette beforehand: without it, Pillow leaves it out.
+    picture.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
 
 
 if __name__ == "__main__":

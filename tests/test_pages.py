@@ -1,8 +1,8 @@
 """Every page is a script: its Python, camera files and commands run in the order in which they stand, as written.
 
 What a page takes for given, a reader's own light field, camera and files, is made small beside it. Renderers are
-stood in for: their command lines are read, and a quick pattern is rendered in place of their scenes. Pages of notebooks
-hold what notebooks hold, which `tests/test_notebooks.py` runs.
+stood in for: their command lines are read, and a quick pattern is rendered in place of their scenes. Pages of
+notebooks hold what notebooks hold, which `tests/test_notebooks.py` runs.
 """
 
 import contextlib
