@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 import vcc
 from vcc.base.units import mm, um
 from vcc.plot import focused_distance, plot_camera, style
-from vcc.plot.elements import MOST_CELLS, Pen, magnification
+from vcc.plot.elements import MOST_CELLS, Span, magnification
 from vcc.plot.labels import label_of
 from vcc.shapes.surfaces import Cubic
 
@@ -214,7 +214,7 @@ def test_all_of_them_in_one_camera_and_off_the_axis(across):
     ],
 )
 def test_labels(element, expected):
-    pen = Pen(style.new_axes(3, 3), 0, -10 * mm, 10 * mm, 1 * mm)
+    pen = Span(0, -10 * mm, 10 * mm)
     assert label_of(element, pen) == expected
 
 

@@ -36,6 +36,7 @@ from vcc.files.camera_families import (
 from vcc.files.npy import read_npy
 from vcc.files.pictures import read_grey
 from vcc.files.toml_words import as_toml, in_toml
+from vcc.optics import Element
 from vcc.optics.focusing import focused_train
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
@@ -47,31 +48,122 @@ LIKELY = 0.75
 _ARRAY_LIKE = set(get_args(ArrayLike))
 
 
+@dataclasses.dataclass(frozen=True)
+class Beside:
+    """The files that a camera's tables may name.
+
+    Args:
+        folder: where they are found.
+        only: the names that may be opened; None opens any.
+        arrays: what is read already, by the names under which tables have it: as .npy files hold it.
+        opened: names that were opened, noted here.
+    """
+
+    folder: Path
+    only: frozenset[str] | None = None
+    arrays: Mapping[str, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
+    opened: set[str] = dataclasses.field(default_factory=set)
+
+    def path(self, name: str) -> Path:
+        """Where the file of a name stands.
+
+        Raises:
+            InputError: it is none that may be opened.
+        """
+        if self.only is not None and name not in self.only:
+            known = sorted(self.only | set(self.arrays))
+            raise InputError(
+                f"{in_toml(name)} is not among the files that may be read here"
+                f" ({listed(known) if known else 'none was named at the start'})"
+            )
+        self.opened.add(name)
+        return self.folder / expanded(name)
+
+    def exists(self, name: str) -> bool:
+        """Whether there is such a file; False of those that may not be opened."""
+        if name in self.arrays:
+            return True
+        return (self.only is None or name in self.only) and (self.folder / name).exists()
+
+
+@dataclasses.dataclass(frozen=True)
+class TrainAsWritten:
+    """What tables describe.
+
+    Args:
+        elements: in the order of the tables.
+        train: of them.
+    """
+
+    elements: tuple[Element, ...]
+    train: Train
+
+
 def read_train(path: str | PathLike[str]) -> Train:
     """The optical train that a TOML file describes; see `vcc.camera_file.load_camera`."""
     file = expanded(path)
     try:
         with reading(file, "a camera file"):
-            return _train_of(_read_toml(file), file)
+            return _train_of(_read_toml(file), f"{file}", Beside(file.parent), file.stem).train
     except InputError as error:
         raise InputError(as_toml(str(error))) from error.__cause__
 
 
-def _train_of(tables: Mapping[str, Any], file: Path) -> Train:
-    _check_keys(tables, {"elements", "sensor"}, {"sensor"}, f"{file}", "table")
+def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
+    """The tables of a camera file as they stand there, not looked at any further.
+
+    Raises:
+        InputError: no such file, or not TOML.
+    """
+    file = expanded(path)
+    with reading(file, "a camera file"):
+        return _read_toml(file)
+
+
+def tables_of_text(text: str, called: str = "the camera") -> dict[str, Any]:
+    """The tables of a camera file whose text is given.
+
+    Raises:
+        InputError: not TOML.
+    """
+    return _parsed(text, called)
+
+
+def train_of_tables(
+    tables: Mapping[str, Any], beside: Beside, called: str = "the camera", name: str = ""
+) -> TrainAsWritten:
+    """The optical train that tables describe: those of a camera file, or the same from elsewhere.
+
+    Args:
+        tables: ``elements`` and ``sensor``; only text, numbers, truth values, lists and tables of such.
+        beside: the files that they may name.
+        called: what a message calls the whole.
+        name: of the train.
+
+    Raises:
+        InputError: as `vcc.camera_file.load_camera`; a file that may not be opened.
+    """
+    try:
+        return _train_of(tables, called, beside, name)
+    except InputError as error:
+        raise InputError(as_toml(str(error))) from error.__cause__
+
+
+def _train_of(tables: Mapping[str, Any], called: str, beside: Beside, name: str) -> TrainAsWritten:
+    _check_keys(tables, {"elements", "sensor"}, {"sensor"}, called, "table")
     elements = tables.get("elements", [])
     if not isinstance(elements, list) or not all(isinstance(entry, dict) for entry in elements):
-        raise InputError(f"{file}: each element starts with a line [[elements]] of its own")
+        raise InputError(f"{called}: each element starts with a line [[elements]] of its own")
     if not isinstance(tables["sensor"], dict):
-        raise InputError(f"{file}: the sensor is a table that starts with a line [sensor]")
-    built = [_read_element(entry, number, file) for number, entry in enumerate(elements, start=1)]
-    given, place = dict(tables["sensor"]), f"{file}: sensor"
+        raise InputError(f"{called}: the sensor is a table that starts with a line [sensor]")
+    built = tuple(_read_element(entry, number, called, beside) for number, entry in enumerate(elements, start=1))
+    given, place = dict(tables["sensor"]), f"{called}: sensor"
     focus = _focus(given, place)
-    sensor = _build(Sensor, given, place, file.parent)
-    with checks.within(f"{file}"):
+    sensor = _build(Sensor, given, place, beside)
+    with checks.within(called):
         if focus is None:
-            return Train(built, sensor, name=file.stem)
-        return focused_train(built, sensor, focus, file.stem)
+            return TrainAsWritten(built, Train(built, sensor, name=name))
+        return TrainAsWritten(built, focused_train(built, sensor, focus, name))
 
 
 def _focus(given: dict[str, Any], place: str) -> float | None:
@@ -96,15 +188,19 @@ def _read_toml(file: Path) -> dict[str, Any]:
         content = read_bytes(file, "camera file").decode("utf-8")
     except UnicodeDecodeError:
         raise InputError(f"{file} is not a text file in UTF-8, as TOML is") from None
+    return _parsed(content, f"{file}")
+
+
+def _parsed(content: str, called: str) -> dict[str, Any]:
     try:
         return tomllib.loads(content)
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits
         reason = in_words(error) if isinstance(error, RecursionError) else error
-        raise InputError(f"{file} is not valid TOML: {reason}") from None
+        raise InputError(f"{called} is not valid TOML: {reason}") from None
 
 
-def _read_element(entry: Mapping[str, Any], number: int, file: Path) -> Any:
-    place = f"{file}: element {number}"
+def _read_element(entry: Mapping[str, Any], number: int, called: str, beside: Beside) -> Any:
+    place = f"{called}: element {number}"
     if "kind" not in entry:
         raise InputError(f"{place} has no kind: add kind = … with one of {listed(ELEMENT_KINDS)}")
     kind = _known(entry["kind"], ELEMENT_KINDS, f"{place}: kind")
@@ -113,11 +209,12 @@ def _read_element(entry: Mapping[str, Any], number: int, file: Path) -> Any:
     place = f"{place} ({entry['kind']}{named})"
     given = {key: value for key, value in entry.items() if key != "kind"}
     if kind not in FROM_FILES or not _comes_from_file(kind, given, place):
-        return _build(kind, given, place, file.parent)
+        return _build(kind, given, place, beside)
     form = FROM_FILES[kind]
-    built = _build(form, given, place, file.parent)
+    built = _build(form, given, place, beside)
     with checks.within(f"{place}: {first_field(form)}"):
-        return built.made(file.parent)
+        beside.path(getattr(built, first_field(form)))
+        return built.made(beside.folder)
 
 
 def _comes_from_file(kind: type, given: Mapping[str, Any], place: str) -> bool:
@@ -170,13 +267,13 @@ def _check_keys(
             raise InputError(f'{place} has no {noun} "{key}", which it needs')
 
 
-def _build(kind: type, given: Mapping[str, Any], place: str, folder: Path) -> Any:
+def _build(kind: type, given: Mapping[str, Any], place: str, beside: Beside) -> Any:
     """An object of a dataclass from the fields of a table."""
     fields = parameters_of(kind)
     _check_keys(given, fields, [name for name in fields if needed(fields[name])], place, "field")
     hints = get_type_hints(kind)
     values = {
-        name: _read_value(value, hints[name], unit_of(fields[name]), f"{place}: {name}", folder)
+        name: _read_value(value, hints[name], unit_of(fields[name]), f"{place}: {name}", beside)
         for name, value in given.items()
     }
     pattern = given.get("pattern")
@@ -190,7 +287,7 @@ def _takes_arrays(choices: tuple[Any, ...]) -> bool:
     return set(choices) >= _ARRAY_LIKE or any(np.ndarray in (choice, get_origin(choice)) for choice in choices)
 
 
-def _read_value(given: Any, hint: Any, unit: str | None, what: str, folder: Path) -> Any:
+def _read_value(given: Any, hint: Any, unit: str | None, what: str, beside: Beside) -> Any:
     """A value of a file as the type that a field wants."""
     choices = alternatives(hint)
     family, arrays = family_of(choices), _takes_arrays(choices)
@@ -200,33 +297,33 @@ def _read_value(given: Any, hint: Any, unit: str | None, what: str, folder: Path
         and not (isinstance(given, list) and items)
         and not (arrays and not isinstance(given, dict))
     ):
-        return _read_named(given, family, arrays, what, folder)
+        return _read_named(given, family, arrays, what, beside)
     if arrays:
-        _check_no_name(given, family, what, folder)
-        return read_array(given, unit, family is not None and family.base is Pattern, what, folder)
+        _check_no_name(given, family, what, beside)
+        return read_array(given, unit, family is not None and family.base is Pattern, what, beside)
     if items and (isinstance(given, list) or not {int, float, str} & set(choices)):
-        return _read_list(given, items, unit, what, folder)
+        return _read_list(given, items, unit, what, beside)
     for choice in choices:
         if choice is Affine:
-            return _read_affine(given, what, folder)
+            return _read_affine(given, what, beside)
         if get_origin(choice) is dict:
             entry = get_args(choice)[1]
             table = _checked_table(given, what)
-            return {key: _read_value(one, entry, unit, f"{what}: {key}", folder) for key, one in table.items()}
+            return {key: _read_value(one, entry, unit, f"{what}: {key}", beside) for key, one in table.items()}
         if dataclasses.is_dataclass(choice) and inspect.isclass(choice):
-            return _build(choice, _checked_table(given, what), what, folder)
+            return _build(choice, _checked_table(given, what), what, beside)
     if unit is not None:
         return units.parse(given, unit, what)
     return _read_plain(given, choices, what)
 
 
-def _check_no_name(given: Any, family: Family | None, what: str, folder: Path) -> None:
+def _check_no_name(given: Any, family: Family | None, what: str, beside: Beside) -> None:
     """Refuse the name of a pattern where text is that of a file."""
-    if family is None or not isinstance(given, str) or (folder / given).exists():
+    if family is None or not isinstance(given, str) or beside.exists(given):
         return
     if given in {**family.names, **family.arrays}:
         raise InputError(
-            f"{what}: there is no file {in_toml(given)} in {folder}; a {family.noun} is written by name: "
+            f"{what}: there is no file {in_toml(given)} in {beside.folder}; a {family.noun} is written by name: "
             f"{{ name = {in_toml(given)}, … }}"
         )
 
@@ -240,7 +337,7 @@ def _checked_table(given: Any, what: str) -> Mapping[str, Any]:
     return given
 
 
-def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, folder: Path) -> tuple[Any, ...]:
+def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, beside: Beside) -> tuple[Any, ...]:
     """A list of so many entries, or of any number where the hints are ``(float, ...)``."""
     if len(hints) == 2 and hints[1] is Ellipsis:
         wanted, fits = "", isinstance(given, list)
@@ -263,7 +360,7 @@ def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, 
             f"{what} is {in_toml(given)}: it is a list{wanted}, like [{', '.join([example] * len(hints))}]"
         )
     return tuple(
-        _read_value(value, hint, unit, f"{what}, number {number} of {len(hints)},", folder)
+        _read_value(value, hint, unit, f"{what}, number {number} of {len(hints)},", beside)
         for number, (value, hint) in enumerate(zip(given, hints, strict=True), start=1)
     )
 
@@ -279,7 +376,7 @@ def _read_plain(given: Any, choices: tuple[Any, ...], what: str) -> Any:
     raise InputError(f"{what} is {in_toml(given)}: it is {wanted or 'something that a camera file cannot hold'}")
 
 
-def _read_named(given: Any, family: Family, arrays: bool, what: str, folder: Path) -> Any:
+def _read_named(given: Any, family: Family, arrays: bool, what: str, beside: Beside) -> Any:
     """A thing by name; where a field takes arrays, also a name that stands for one."""
     if not isinstance(given, dict):
         raise InputError(f"{what} is {in_toml(given)}: write a {family.noun} by name, like {family.example}")
@@ -288,22 +385,26 @@ def _read_named(given: Any, family: Family, arrays: bool, what: str, folder: Pat
         raise InputError(f"{what} has no name: add name = … with one of {listed([*family.names, *extra])}")
     parameters = {key: value for key, value in given.items() if key != "name"}
     kind = _known(given["name"], {**family.names, **extra}, f"{what}: name")
-    built = _build(kind, parameters, f"{what} ({given['name']})", folder)
+    built = _build(kind, parameters, f"{what} ({given['name']})", beside)
     if kind not in extra.values():
         return built
     with checks.within(what):
         return built.made()
 
 
-def _read_affine(given: Any, what: str, folder: Path) -> Affine:
+def _read_affine(given: Any, what: str, beside: Beside) -> Affine:
     with checks.within(what):
-        return Affine(read_array(given, None, False, what, folder))
+        return Affine(read_array(given, None, False, what, beside))
 
 
-def read_array(given: Any, unit: str | None, transmission: bool, what: str, folder: Path) -> NDArray[np.float64]:
+def read_array(given: Any, unit: str | None, transmission: bool, what: str, beside: Beside) -> NDArray[np.float64]:
     """Numbers from a file beside the camera file, or rows of them; where they have a unit, each with its own."""
     if isinstance(given, str):
-        return _read_array_file(folder / expanded(given), given, unit, transmission, what)
+        if given in beside.arrays:
+            return beside.arrays[given]
+        with checks.within(what):
+            file = beside.path(given)
+        return _read_array_file(file, given, unit, transmission, what)
     with_units = given if unit is None else _with_units(given, unit, what)
     try:
         values = np.array(with_units, dtype=np.float64)

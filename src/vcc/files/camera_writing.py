@@ -31,7 +31,7 @@ from vcc.files.camera_families import (
     parameters_of,
     unit_of,
 )
-from vcc.files.camera_reading import read_array
+from vcc.files.camera_reading import Beside, read_array
 from vcc.optics import Element
 from vcc.optics.train import Train
 from vcc.shapes import patterns
@@ -43,6 +43,24 @@ def write_train(train: Train, path: str | PathLike[str]) -> None:
     import tomli_w
 
     file = expanded(path)
+    tables, arrays = tables_of_train(train, file)
+    for name, values in arrays.items():  # first, so that the camera file never names a missing one
+        with atomic_path(file.parent / name) as temporary, temporary.open("wb") as stream:
+            np.save(stream, values)
+    with atomic_path(file) as temporary:
+        temporary.write_text(tomli_w.dumps(tables), encoding="utf-8")
+
+
+def tables_of_train(train: Train, file: Path) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
+    """The tables of a camera file that describe an optical train, and the arrays that they name.
+
+    Args:
+        train: what to write.
+        file: the camera file: arrays are named after it, and files beside it that hold the same are named instead.
+
+    Raises:
+        InputError: what a file cannot hold.
+    """
     arrays: dict[str, NDArray[np.float64]] = {}
     tables = {
         "elements": [
@@ -52,11 +70,7 @@ def write_train(train: Train, path: str | PathLike[str]) -> None:
     }
     if not train.elements:
         del tables["elements"]
-    for name, values in arrays.items():  # first, so that the camera file never names a missing one
-        with atomic_path(file.parent / name) as temporary, temporary.open("wb") as stream:
-            np.save(stream, values)
-    with atomic_path(file) as temporary:
-        temporary.write_text(tomli_w.dumps(tables), encoding="utf-8")
+    return tables, arrays
 
 
 def _write_element(
@@ -173,7 +187,7 @@ class _Writer:
 
     def holds(self, source: str, values: NDArray[np.float64]) -> bool:
         try:
-            return np.array_equal(read_array(source, None, True, "", self.file.parent), values)
+            return np.array_equal(read_array(source, None, True, "", Beside(self.file.parent)), values)
         except InputError:
             return False
 

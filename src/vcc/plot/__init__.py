@@ -4,8 +4,9 @@ All functions draw on Matplotlib axes, given or new, and return them; `savefig` 
 writes a file. New figures belong to nobody but the caller: pyplot and its global state are not used.
 """
 
-from vcc.plot.camera_plot import focused_distance, plot_camera
+from vcc.plot.camera_plot import plot_camera
 from vcc.plot.element_plot import plot_element
+from vcc.plot.fans import focused_distance
 from vcc.plot.phase_space import phase_space_stages, plot_phase_space, plot_phase_space_stages
 from vcc.plot.phase_space_rays import PhaseSpacePicture
 

@@ -14,7 +14,7 @@ from vcc.optics import CellDeflection, Element, Faces
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.plot import style
-from vcc.plot.camera_plot import ScenePoint, draw_optical_axis, draw_paths
+from vcc.plot.camera_plot import draw_optical_axis, draw_paths
 from vcc.plot.elements import Pen, draw_element, half_size
 from vcc.plot.tracing import Paths, fan, trace
 
@@ -59,10 +59,10 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
     reached = float(np.abs(paths.positions[:, :, axis]).max(initial=0.0))
     highest = 1.12 * max(half, min(reached, 1.6 * half)) / mm
     axes.set_ylim(*((-highest, highest) if axis == 0 else (highest, -highest)))
-    pen = Pen(axes, axis, -half, half, 0.03 * (end + before))
+    pen = Pen(axis, -half, half, 0.03 * (end + before), axes)
     draw_optical_axis(axes)
     paths = replace(paths, z=np.where(paths.z < 0, -before, paths.z))  # parallel: heights are the same there
-    draw_paths(axes, ScenePoint(math.inf, 0.0, style.BLUE, ""), paths, axis)
+    draw_paths(axes, math.inf, paths, axis, style.BLUE)
     draw_element(pen, element, half)
     style.tidy(axes, "z from the element [mm]", f"{across} [mm]")
     return axes

@@ -43,27 +43,39 @@ POINTS = 801
 
 
 @dataclass(frozen=True)
-class Pen:
-    """Where and how large to draw.
+class Span:
+    """What of a camera's height is drawn.
 
     Args:
-        axes: in millimetres.
         axis: 0 draws x upwards, 1 draws y.
         low: the lowest height drawn, metres.
         high: the highest, metres.
-        thick: half the thickness of a lens, metres: thin elements have none, and are drawn with a symbol.
     """
 
-    axes: Axes
     axis: int
     low: float
     high: float
-    thick: float
 
     @property
     def half(self) -> float:
         """Half the height of the drawing, metres."""
         return (self.high - self.low) / 2
+
+
+@dataclass(frozen=True)
+class Pen(Span):
+    """Where and how large to draw.
+
+    Args:
+        axis: see `Span`, likewise low and high.
+        low: see there.
+        high: see there.
+        thick: half the thickness of a lens, metres: thin elements have none, and are drawn with a symbol.
+        axes: in millimetres.
+    """
+
+    thick: float
+    axes: Axes
 
     def fill(self, z: Any, height: Any, **options: Any) -> None:
         """A closed polygon; z and height in metres."""
@@ -223,7 +235,7 @@ def _draw_by_faces(pen: Pen, element: Element, faces: Faces) -> None:
         _draw_stop(pen, element.z, element.decentre[pen.axis], half)
 
 
-def drawn_range(pen: Pen, element: Element, half: float) -> tuple[float, float]:
+def drawn_range(pen: Span, element: Element, half: float) -> tuple[float, float]:
     """From which to which height, from its middle, an element is drawn, metres."""
     centre = element.decentre[pen.axis]
     margin = 0.02 * pen.half
@@ -262,26 +274,42 @@ def magnification(element: Element, faces: Faces, axis: int, bottom: float, top:
     return 1 if cells <= MOST_CELLS else math.ceil(cells / CELLS_INSTEAD)
 
 
-def _draw_glass(pen: Pen, element: Element, faces: Faces) -> None:
-    """Glass flat at the element's place; towards the scene it has the profile of its optical path."""
-    half = half_opening(faces, pen.axis)
-    low, high = drawn_range(pen, element, half)
+def glass_profile(span: Span, element: Element, faces: Faces) -> tuple[Array, Array] | None:
+    """The shape of a thin piece of glass that bends rays as an element does.
+
+    Args:
+        span: what is drawn.
+        element: the element.
+        faces: its faces, which bend.
+
+    Returns:
+        Heights from the element's middle, metres, and the depth of the glass there, 0 to 1; None where nothing of
+        it lies within the drawing.
+    """
+    low, high = drawn_range(span, element, half_opening(faces, span.axis))
     if high <= low:
-        return
+        return None
     if isinstance(faces.bending, CellDeflection):
-        height, depth = _cell_profile(
-            faces.bending, pen.axis, low, high, magnification(element, faces, pen.axis, pen.low, pen.high)
-        )
+        scale = magnification(element, faces, span.axis, span.low, span.high)
+        height, depth = _cell_profile(faces.bending, span.axis, low, high, scale)
     else:
         height = np.linspace(low, high, POINTS)
-        depth = _profile(faces, pen.axis, height)
+        depth = _profile(faces, span.axis, height)
     deepest = float(depth.max())
-    depth = pen.thick * (0.4 + 1.1 * (depth / deepest if deepest > 0 else depth))
-    centre = element.decentre[pen.axis]
+    return height, depth / deepest if deepest > 0 else depth
+
+
+def _draw_glass(pen: Pen, element: Element, faces: Faces) -> None:
+    """Glass flat at the element's place; towards the scene it has the profile of its optical path."""
+    profile = glass_profile(pen, element, faces)
+    if profile is None:
+        return
+    height, depth = profile
+    depth = pen.thick * (0.4 + 1.1 * depth)
     pen.glass(
         np.concatenate([[element.z], element.z - depth, [element.z]]),
-        centre + np.concatenate([[low], height, [high]]),
-        bounded=math.isfinite(half),
+        element.decentre[pen.axis] + np.concatenate([height[:1], height, height[-1:]]),
+        bounded=math.isfinite(half_opening(faces, pen.axis)),
     )
 
 
@@ -360,23 +388,45 @@ def _draw_sheet(pen: Pen, element: Element) -> None:
     pen.line([element.z, element.z], ends, color=style.GLASS_EDGE, linewidth=2, zorder=1)
 
 
-def _draw_mask(pen: Pen, element: Element, pattern: Pattern, scale: int = 1, over_glass: bool = False) -> None:
-    """The mask's middle row as a bar, black where it is opaque and white (on glass: nothing) where it is open."""
-    low, high = drawn_range(pen, element, pattern.size[pen.axis] / 2)
+def mask_bar(
+    span: Span, element: Element, pattern: Pattern, scale: int = 1, points: int = 1024
+) -> tuple[Array, Array] | None:
+    """The middle row of a mask as pieces that let through alike.
+
+    Args:
+        span: what is drawn.
+        element: the mask.
+        pattern: of it.
+        scale: by how much it is drawn larger, see `magnification`.
+        points: at which it is looked at.
+
+    Returns:
+        The edges of the pieces, metres on the drawing, and what each lets through, one fewer; None where nothing
+        of the mask lies within the drawing.
+    """
+    low, high = drawn_range(span, element, pattern.size[span.axis] / 2)
     if high <= low:
-        return
-    points = 1024 if scale == 1 and not over_glass else 4096
+        return None
     steps = (np.arange(points) + 0.5) / points
-    values = np.asarray(pattern(*along(pen.axis, (low + (high - low) * steps) / scale)))
+    values = np.asarray(pattern(*along(span.axis, (low + (high - low) * steps) / scale)))
     # Neighbours that are alike become one piece, so that a picture for print stays small.
     cuts = np.flatnonzero(np.diff(values)) + 1
-    edges = low + (high - low) * np.concatenate([[0.0], cuts / points, [1.0]]) + element.decentre[pen.axis]
+    edges = low + (high - low) * np.concatenate([[0.0], cuts / points, [1.0]]) + element.decentre[span.axis]
+    return edges, values[np.concatenate([[0], cuts])]
+
+
+def _draw_mask(pen: Pen, element: Element, pattern: Pattern, scale: int = 1, over_glass: bool = False) -> None:
+    """The mask's middle row as a bar, black where it is opaque and white (on glass: nothing) where it is open."""
+    bar = mask_bar(pen, element, pattern, scale, 1024 if scale == 1 and not over_glass else 4096)
+    if bar is None:
+        return
+    edges, values = bar
     wide = 0.45 * pen.thick
     sides = np.array([element.z - wide, element.z + (0 if over_glass else wide)])
     pen.axes.pcolormesh(
         sides / mm,
         edges / mm,
-        values[np.concatenate([[0], cuts])][:, None],
+        values[:, None],
         cmap=style.black_tones() if over_glass else "gray",
         vmin=0,
         vmax=1,

@@ -25,7 +25,7 @@ from vcc.optics import (
 )
 from vcc.optics.train import Train
 from vcc.plot import style
-from vcc.plot.elements import POINTS, Pen, along, drawn_range, half_opening, magnification
+from vcc.plot.elements import POINTS, Pen, Span, along, drawn_range, half_opening, magnification
 from vcc.plot.tracing import spread_along
 from vcc.shapes.surfaces import Surface
 
@@ -116,7 +116,7 @@ def _merged(things: list[tuple[float, str]]) -> list[tuple[float, str]]:
 # --- words ---
 
 
-def label_of(element: Element, pen: Pen) -> str:
+def label_of(element: Element, pen: Span) -> str:
     """What stands above an element: its kind and name, and what matters most of it."""
     first = f"{element.kind} {element.name}".strip()
     for kind, words in _WORDS.items():
@@ -136,20 +136,20 @@ def _number(value: float) -> str:
     return f"{value:.3g}".replace("-", "−")
 
 
-def _lens_words(lens: Any, pen: Pen) -> list[str]:
+def _lens_words(lens: Any, pen: Span) -> list[str]:
     return [f"f = {length_in_words(lens.focal_length)}"]
 
 
-def _prism_words(prism: Any, pen: Pen) -> list[str]:
+def _prism_words(prism: Any, pen: Span) -> list[str]:
     return [f"δ = {_number(prism.deflection[0])}, {_number(prism.deflection[1])}"]
 
 
-def _facet_words(prism: Any, pen: Pen) -> list[str]:
+def _facet_words(prism: Any, pen: Span) -> list[str]:
     sides = f"{prism.sides} sides, " if isinstance(prism, Pyramid) else ""
     return [f"{sides}δ = {_number(prism.deflection)}"]
 
 
-def _array_words(array: Any, pen: Pen) -> list[str]:
+def _array_words(array: Any, pen: Span) -> list[str]:
     faces = array.faces()
     half = half_opening(faces, pen.axis)
     pitch = array.pitch if pen.axis == 0 else array.lattice.row_height
@@ -164,14 +164,14 @@ def _array_words(array: Any, pen: Pen) -> list[str]:
     ]
 
 
-def _plate_words(plate: Any, pen: Pen) -> list[str]:
+def _plate_words(plate: Any, pen: Span) -> list[str]:
     if not isinstance(plate.surface, Surface):
         return [f"slopes by {getattr(plate.surface, '__name__', type(plate.surface).__name__)}"]
     words = plate.surface.described().replace("-", "−").replace("um", "µm")
     return [words if len(words) <= LONGEST_WORDS else words.split(" (")[0]]
 
 
-def _scatter_words(diffuser: Any, pen: Pen) -> list[str]:
+def _scatter_words(diffuser: Any, pen: Span) -> list[str]:
     faces = diffuser.faces()
     low, high = drawn_range(pen, diffuser, half_opening(faces, pen.axis))
     spread = spread_along(faces.spread, pen.axis, *along(pen.axis, np.linspace(low, high, POINTS)))
@@ -179,7 +179,7 @@ def _scatter_words(diffuser: Any, pen: Pen) -> list[str]:
     return [f"σ = {least}" if least == most else f"σ = {least} to {most}"]
 
 
-def _system_words(system: Any, pen: Pen) -> list[str]:
+def _system_words(system: Any, pen: Span) -> list[str]:
     try:
         focal_length = system.focal_length
     except InputError:  # without an axis of symmetry it has none
@@ -190,7 +190,7 @@ def _system_words(system: Any, pen: Pen) -> list[str]:
     return [f"{words}, f/{_number(system.f_number)}"]
 
 
-_WORDS: dict[type[Any], Callable[[Any, Pen], list[str]]] = {
+_WORDS: dict[type[Any], Callable[[Any, Span], list[str]]] = {
     Lens: _lens_words,
     Prism: _prism_words,
     Biprism: _facet_words,
