@@ -46,6 +46,7 @@ ROOMS = [
     "showcase",
     "gallery",
     "demo",
+    "bench",
     "cli",
 ]
 """From the ground up: data and what is computed of it, the facades, and what is built on them."""
@@ -115,6 +116,9 @@ LATE = {
     "jinja2",
     "tomli_w",
     "cyclopts",
+    "starlette",
+    "uvicorn",
+    "websockets",
 }
 """Libraries that take long to load, or need not be there: these may be imported inside functions."""
 

@@ -44,6 +44,12 @@ COMMANDS = {
         "vcc plot camera.toml -o camera.svg",
         "vcc plot camera.toml --phase-space --light-field views/",
     ),
+    "bench": (
+        "Open the optical bench in the browser: move elements along the axis, and see the picture follow.\n\n"
+        "Without a camera and a light field it opens a lens before the demo's scene.",
+        "vcc bench",
+        "vcc bench camera.toml views/",
+    ),
     "demo": (
         "Run the paper's examples and its own check, and explain them on a page of pictures.\n\n"
         "It takes about 20 seconds on two cores, and about 10 with --small.",

@@ -1,0 +1,215 @@
+"""What can be put on a bench: kinds of elements with their parameters in words, and new ones that fit."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, is_dataclass
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vcc.base import units
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.bench.document import shown
+from vcc.files.camera_families import (
+    ELEMENT_KINDS,
+    Family,
+    alternatives,
+    family_of,
+    needed,
+    parameters_of,
+    unit_of,
+)
+from vcc.optics.sensor import Sensor
+from vcc.optics.train import Train
+
+Json = dict[str, Any]
+
+DEEPEST = 3
+"""How far parts inside parts are listed: a pattern's pattern's lattice."""
+_ARRAY_LIKE = set(get_args(ArrayLike))
+
+
+def kinds() -> list[Json]:
+    """All kinds of elements, with their parameters."""
+    return [_kind(name, kind) for name, kind in ELEMENT_KINDS.items()]
+
+
+def sensor_parameters() -> list[Json]:
+    """The parameters of a sensor, likewise."""
+    return _parameters(Sensor, DEEPEST)
+
+
+def families() -> Json:
+    """Patterns, kernels and surfaces by name, with their parameters."""
+    found: dict[str, Family] = {}
+    for kind in ELEMENT_KINDS.values():
+        for hint in get_type_hints(kind).values():
+            family = family_of(alternatives(hint))
+            if family is not None:
+                found[family.noun] = family
+    return {
+        noun: [
+            *(_kind(name, kind) for name, kind in family.names.items()),
+            *(_kind(name, kind, words=f"A {name.upper()}.") for name, kind in family.arrays.items()),
+        ]
+        for noun, family in sorted(found.items())
+    }
+
+
+def _kind(name: str, kind: type, words: str = "") -> Json:
+    return {"kind": name, "words": words or _first_line(kind), "parameters": _parameters(kind, DEEPEST)}
+
+
+def _first_line(kind: type) -> str:
+    return (inspect.getdoc(kind) or "").split("\n")[0]
+
+
+def _parameters(kind: type, depth: int) -> list[Json]:
+    hints, words = get_type_hints(kind), _words_of_parameters(kind)
+    return [
+        _parameter(name, field, hints[name], words.get(name, ""), depth)
+        for name, field in parameters_of(kind).items()
+    ]
+
+
+def _parameter(name: str, field: Field[Any], hint: Any, words: str, depth: int) -> Json:
+    choices = alternatives(hint)
+    family = family_of(choices)
+    told: Json = {
+        "name": name,
+        "words": words,
+        "unit": unit_of(field),
+        "needed": needed(field),
+        "default": _default(field),
+        "takes": sorted(set(_takes(choices, depth))),
+    }
+    if family is not None:
+        told["family"] = family.noun
+    literal = next((choice for choice in choices if get_origin(choice) is Literal), None)
+    quoted = re.findall(r'``"([\w -]+)"``', words) if str in choices else []
+    told["choices"] = list(get_args(literal)) if literal is not None else quoted
+    inner = next((one for one in choices if inspect.isclass(one) and is_dataclass(one)), None)
+    if inner is not None and family is None and inner is not Affine and depth > 0:
+        told["parameters"] = _parameters(inner, depth - 1)
+    return told
+
+
+def _takes(choices: tuple[Any, ...], depth: int) -> list[str]:
+    """What may be written: "number", "whole number", "text", "truth", "list", "array", "name", "table"."""
+    names = {float: "number", int: "whole number", str: "text", bool: "truth"}
+    found = [names[choice] for choice in choices if choice in names]
+    if any(get_origin(choice) is tuple for choice in choices):
+        found.append("list")
+    if set(choices) >= _ARRAY_LIKE or any(np.ndarray in (choice, get_origin(choice)) for choice in choices):
+        found = ["array"]
+    if family_of(choices) is not None:
+        found.append("name")
+    if any(inspect.isclass(one) and is_dataclass(one) for one in choices) and family_of(choices) is None:
+        found.append("array" if Affine in choices else "table")
+    return found
+
+
+def _default(field: Field[Any]) -> Any:
+    """A parameter's default as a camera file has it; None for none, and for what only Python can hold."""
+    if field.default is MISSING or field.default is None:
+        return None
+    unit = unit_of(field)
+    if isinstance(field.default, tuple):
+        return [units.text(each, unit) if unit else each for each in field.default]
+    if unit is not None and isinstance(field.default, int | float):
+        return units.text(field.default, unit)
+    return field.default if isinstance(field.default, bool | int | float | str) else None
+
+
+def _words_of_parameters(kind: type) -> dict[str, str]:
+    """What the docstrings of a class and of what it is made of say of each parameter."""
+    found: dict[str, str] = {}
+    for each in reversed(kind.__mro__):
+        said = re.search(r"\nArgs:\n(.*?)(?:\n\S|\Z)", inspect.cleandoc(each.__doc__ or "") + "\n", re.DOTALL)
+        if said is None:
+            continue
+        for entry in re.split(r"\n    (?=\w+: )", "\n" + said[1])[1:]:
+            name, words = entry.split(": ", 1)
+            found[name.strip()] = " ".join(words.split())
+    return found
+
+
+# --- new elements ---
+
+
+def new_element(kind: Any, z: Any, train: Train, names: set[str]) -> Json:
+    """The table of an element that does something sensible where it is put.
+
+    Args:
+        kind: as camera files call it.
+        z: where, as a length in words.
+        train: the camera that it is put into.
+        names: of elements that there are.
+
+    Raises:
+        InputError: there is no such kind, or what z says is no length.
+    """
+    if kind not in ELEMENT_KINDS:
+        raise InputError(f"there is no element of kind {shown(kind)}: there are {', '.join(ELEMENT_KINDS)}")
+    place = units.parse(z, "length", "z")
+    long, wide = max(train.sensor.z, 1e-3), _width_at(train, place)
+    table: Json = {"kind": kind, "name": free_name(str(kind).replace("_", " "), names), "z": z}
+    make = _NEW.get(str(kind))
+    return table | ({} if make is None else make(long, wide))
+
+
+def free_name(wanted: str, names: set[str]) -> str:
+    """A name that no other element has: the wanted one, or with a number behind it."""
+    base = re.sub(r" \d+$", "", wanted)
+    number, name = 1, wanted
+    while name in names:
+        number += 1
+        name = f"{base} {number}"
+    return name
+
+
+def _width_at(train: Train, z: float) -> float:
+    """About how wide light is at a place: between the first opening and the sensor, metres."""
+    widths = [2 * half for half in _first_opening(train)] or [min(train.sensor.size)]
+    share = min(max(z / train.sensor.z, 0.0), 1.0) if train.sensor.z > 0 else 1.0
+    return float((1 - share) * widths[0] + share * min(train.sensor.size))
+
+
+def _first_opening(train: Train) -> list[float]:
+    sizes = [stage.faces.pattern.size[0] / 2 for stage in train.stages if stage.faces.pattern is not None]
+    return [size for size in sizes if np.isfinite(size)][:1]
+
+
+def _length(value: float, digits: int = 3) -> str:
+    return units.text(float(f"{value:.{digits}g}"), "length")
+
+
+_NEW: Mapping[str, Callable[[float, float], Json]] = {
+    "biprism": lambda long, wide: {"deflection": 0.01, "diameter": _length(1.2 * wide)},
+    "coded_diffuser": lambda long, wide: {
+        "kernels": [{"name": "gaussian", "sigma": 0.002}, {"name": "gaussian", "sigma": 0.01}],
+        "width": _length(1.2 * wide),
+        "weights": [[[1, 0], [0, 1]], [[0, 1], [1, 0]]],
+    },
+    "diffuser": lambda long, wide: {"kernel": {"name": "gaussian", "sigma": 0.005}},
+    "first_order": lambda long, wide: {"matrix": [[1, 0], [float(f"{-1 / (2 * long):.3g}"), 1]]},
+    "lens": lambda long, wide: {"focal_length": _length(2 * long, 2), "diameter": _length(1.2 * wide, 2)},
+    "lens_array": lambda long, wide: {"pitch": _length(wide / 40, 2), "focal_length": _length(long / 50, 2)},
+    "mask": lambda long, wide: {"pattern": {"name": "circle", "diameter": _length(wide / 2, 2)}},
+    "phase_plate": lambda long, wide: {
+        "surface": {"name": "cubic", "strength": float(f"{0.002 / (wide / 2) ** 2:.2g}")},
+        "diameter": _length(1.2 * wide, 2),
+    },
+    "prism": lambda long, wide: {"deflection": [0.02, 0.0]},
+    "prism_array": lambda long, wide: {
+        "slopes": [[[-0.01, -0.01], [0.01, -0.01]], [[-0.01, 0.01], [0.01, 0.01]]],
+        "pitch": _length(wide / 2, 2),
+    },
+    "pyramid": lambda long, wide: {"sides": 4, "deflection": 0.01, "diameter": _length(1.2 * wide, 2)},
+}
+"""The parameters of a new element, of the camera's length and light's width where it stands, metres."""

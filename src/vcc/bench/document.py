@@ -1,0 +1,310 @@
+"""What an optical bench shows, as data: a camera as the tables of its file, a light field, how it is shown.
+
+A document is plain JSON. It changes by path, and keeps what the user typed: "41.5 mm" stays that. Who reads it are
+the readers of camera files, so that a bench takes what a file takes and refuses in the same words.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from vcc.base import checks, units
+from vcc.base.errors import InputError
+from vcc.files.camera_reading import Beside, TrainAsWritten, train_of_tables
+
+Step = str | int
+"""One step of a path: the key of a table, or the place in a list."""
+
+MOST_PIXELS = 2**22
+"""Of a sensor on a bench: more would keep its memory and its user waiting."""
+MOST_CELLS = 2**20
+"""Of a mask that is asked for by name and size."""
+MOST_ELEMENTS = 100
+MOST_STEPS = 100
+"""So many steps can be undone."""
+MOST_HISTORY = 2**22
+"""Characters of all documents that are kept to be undone."""
+
+_IN_CAMERA = ("elements", "sensor")
+_FIELDS = ("camera", "light_field", "views", "exposure", "noise")
+
+
+@dataclass(frozen=True)
+class Views:
+    """Which views are looked at: a rectangle of them.
+
+    Args:
+        rows: (first, last) row, the last one included.
+        columns: likewise.
+    """
+
+    rows: tuple[int, int]
+    columns: tuple[int, int]
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """What takes them from a light field."""
+        return slice(self.rows[0], self.rows[1] + 1), slice(self.columns[0], self.columns[1] + 1)
+
+    def check(self, shape: Sequence[int]) -> None:
+        """Refuse what a light field of this shape does not have."""
+        for name, (first, last), there in (("rows", self.rows, shape[0]), ("columns", self.columns, shape[1])):
+            if not 0 <= first <= last < there:
+                raise InputError(
+                    f"{name} of views are [{first}, {last}], and there are {there}: the first and the last of "
+                    f"those to be looked at, counted from 0 to {there - 1}"
+                )
+
+
+@dataclass(frozen=True)
+class Document:
+    """The state of a bench.
+
+    Args:
+        camera: ``elements`` and ``sensor``, the tables of a camera file.
+        light_field: the name of one of those that there are.
+        views: which of its views are looked at; None for all.
+        exposure: the irradiance that is shown white, above 0; None finds it for each picture.
+        noise: whether the sensor's electronics record the picture.
+    """
+
+    camera: Mapping[str, Any]
+    light_field: str
+    views: Views | None = None
+    exposure: float | None = None
+    noise: bool = False
+
+    def as_json(self) -> dict[str, Any]:
+        """The document as messages and addresses hold it."""
+        views = self.views and {"rows": list(self.views.rows), "columns": list(self.views.columns)}
+        return {
+            "camera": self.camera,
+            "light_field": self.light_field,
+            "views": views,
+            "exposure": self.exposure,
+            "noise": self.noise,
+        }
+
+    @classmethod
+    def of_json(cls, given: Any) -> Document:
+        """A document that came from elsewhere; what its camera is, `train` looks at.
+
+        Raises:
+            InputError: it is none.
+        """
+        if not isinstance(given, dict):
+            raise InputError("a bench's document is a table of camera, light_field, views, exposure and noise")
+        for key in given:
+            if key not in _FIELDS:
+                raise InputError(f"a bench's document has no {shown(key)}: it has {', '.join(_FIELDS)}")
+        camera, field = given.get("camera"), given.get("light_field")
+        if not isinstance(camera, dict) or not isinstance(field, str):
+            raise InputError("a bench's document needs a camera, which is a table, and a light_field, by name")
+        return cls(
+            camera,
+            field,
+            _views(given.get("views")),
+            _exposure(given.get("exposure")),
+            _truth("noise", given.get("noise", False)),
+        )
+
+    def changed(self, where: Any, value: Any) -> Document:
+        """The document with another value in one place.
+
+        Args:
+            where: the path: ``["elements", 0, "z"]``, ``["sensor", "pitch"]``, ``["exposure"]``.
+            value: as JSON; None takes away what is there, so that the default holds.
+
+        Raises:
+            InputError: there is no such place, or what `of_json` refuses.
+        """
+        path = _path(where)
+        whole = self.as_json()
+        if path[0] in _IN_CAMERA:
+            path = ("camera", *path)
+        elif path[0] not in _FIELDS or path[0] == "camera":
+            raise InputError(f"a bench has no {shown(path[0])}: it has elements, sensor, {', '.join(_FIELDS[1:])}")
+        elif value is None:
+            del whole[str(path[0])]
+            if path[0] == "light_field":
+                raise InputError("a bench needs a light field: choose another one instead")
+            return Document.of_json(whole)
+        return Document.of_json(_put(whole, path, value, "the bench"))
+
+    def train(self, beside: Beside) -> TrainAsWritten:
+        """The camera that the tables describe.
+
+        Args:
+            beside: the files that they may name.
+
+        Raises:
+            InputError: what the reader of camera files refuses; what is too large for a bench.
+        """
+        _check_sizes(self.camera, "the camera")
+        elements = self.camera.get("elements", [])
+        if isinstance(elements, list) and len(elements) > MOST_ELEMENTS:
+            raise InputError(f"a bench has room for {MOST_ELEMENTS} elements, not {len(elements)}")
+        return train_of_tables(self.camera, beside)
+
+    def settled(self, beside: Beside) -> Document:
+        """The same with the sensor's place as a length, where its focus was given instead."""
+        sensor = self.camera.get("sensor")
+        if not isinstance(sensor, dict) or "focus" not in sensor:
+            return self
+        asked = {key: each for key, each in sensor.items() if key != "z"}  # which follows
+        found = replace(self, camera={**self.camera, "sensor": asked}).train(beside)
+        z = units.text(found.train.sensor.z, "length", exact=True)
+        del asked["focus"]
+        return replace(self, camera={**self.camera, "sensor": {"z": z, **asked}})
+
+
+class History:
+    """A document, and those before it that can be had back.
+
+    What moves (a drag) is shown at once, and is one step when it has come to rest.
+
+    Args:
+        document: the first one.
+
+    Attributes:
+        present: what is shown.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.present = document
+        self._rest = document
+        self._past: list[Document] = []
+        self._future: list[Document] = []
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a step to undo."""
+        return bool(self._past) or self.present != self._rest
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is a step to do again."""
+        return bool(self._future)
+
+    def put(self, document: Document, moving: bool = False) -> None:
+        """Show another document; at rest, that is a step, and what was undone before is forgotten."""
+        self.present = document
+        if moving or document == self._rest:
+            return
+        self._past.append(self._rest)
+        self._rest = document
+        self._future.clear()
+        self._forget()
+
+    def undo(self) -> None:
+        """Go back one step, or to where a drag began; nothing where there is none."""
+        if self.present != self._rest:
+            self.present = self._rest
+        elif self._past:
+            self._future.append(self._rest)
+            self.present = self._rest = self._past.pop()
+
+    def redo(self) -> None:
+        """Go forward again; nothing where nothing was undone."""
+        if self._future:
+            self._past.append(self._rest)
+            self.present = self._rest = self._future.pop()
+
+    def _forget(self) -> None:
+        """Let go of the oldest steps where there are too many, or they are too large."""
+        kept, room = 0, MOST_HISTORY
+        for document in reversed(self._past[-MOST_STEPS:]):
+            room -= len(json.dumps(document.camera))
+            if room < 0:
+                break
+            kept += 1
+        del self._past[: len(self._past) - kept]
+
+
+def shown(given: Any, most: int = 60) -> str:
+    """What came from elsewhere, for a message: as JSON, not too long."""
+    try:
+        words = json.dumps(given, ensure_ascii=False)
+    except (TypeError, ValueError, RecursionError):
+        words = f"a {type(given).__name__}"
+    return words if len(words) <= most else f"{words[:most]}…"
+
+
+def _path(where: Any) -> tuple[Step, ...]:
+    good = isinstance(where, list) and where and all(type(step) in (str, int) for step in where)
+    if not good or not isinstance(where[0], str):
+        raise InputError(f'a place on a bench is a path such as ["elements", 0, "z"], not {shown(where)}')
+    return tuple(where)
+
+
+def _put(tree: Any, path: tuple[Step, ...], value: Any, place: str) -> Any:
+    """A tree with a value at a path; None takes away what is there. What is not changed is shared."""
+    step, rest = path[0], path[1:]
+    inside = f"{place}: {step}" if isinstance(step, str) else f"{place} {step + 1}"
+    if isinstance(tree, dict) and isinstance(step, str):
+        if not rest:
+            kept = {key: each for key, each in tree.items() if key != step}
+            return kept if value is None else {**tree, step: value}
+        return {**tree, step: _put(tree.get(step, {}), rest, value, inside)}
+    if isinstance(tree, list) and isinstance(step, int):
+        if not 0 <= step < len(tree):
+            raise InputError(f"{place} has {len(tree)} entries: there is no number {step}")
+        between = [] if not rest and value is None else [_put(tree[step], rest, value, inside) if rest else value]
+        return [*tree[:step], *between, *tree[step + 1 :]]
+    raise InputError(f"{place} is {shown(tree)}, which has no {shown(step)}")
+
+
+def _check_sizes(tree: Any, place: str) -> None:
+    """Refuse what has few letters and takes much memory, and what no camera file can hold."""
+    if isinstance(tree, dict):
+        for key, each in tree.items():
+            _check_sizes(each, f"{place}: {key}")
+        shape = tree.get("shape")
+        if isinstance(shape, list) and all(type(each) is int and each > 0 for each in shape):
+            pixels = math.prod(shape)
+            if pixels > MOST_PIXELS:
+                raise InputError(
+                    f"{place}: shape is {shown(shape)}, {pixels} pixels, and a bench shows up to {MOST_PIXELS}: "
+                    "take fewer and larger ones here; a picture of all is what vcc capture makes"
+                )
+        prime = tree.get("prime")
+        if type(prime) is int and prime * prime > MOST_CELLS:
+            raise InputError(f"{place}: prime is {prime}; on a bench it is up to {math.isqrt(MOST_CELLS)}")
+    elif isinstance(tree, list):
+        for number, each in enumerate(tree, start=1):
+            _check_sizes(each, f"{place} {number}")
+    elif not isinstance(tree, str | int | float) or (isinstance(tree, float) and not math.isfinite(tree)):
+        raise InputError(f"{place} is {shown(tree)}, which is no value")
+
+
+def _views(given: Any) -> Views | None:
+    if given is None:
+        return None
+    if not isinstance(given, dict) or set(given) != {"rows", "columns"}:
+        raise InputError(f"views are rows and columns, each [first, last], not {shown(given)}")
+    rows, columns = (_two(name, given[name]) for name in ("rows", "columns"))
+    return Views(rows, columns)
+
+
+def _two(name: str, given: Any) -> tuple[int, int]:
+    if not isinstance(given, list) or len(given) != 2 or not all(type(each) is int for each in given):
+        raise InputError(f"{name} of views are [first, last], two whole numbers, not {shown(given)}")
+    return given[0], given[1]
+
+
+def _exposure(given: Any) -> float | None:
+    if given is None:
+        return None
+    if type(given) not in (int, float):
+        raise InputError(f"exposure is a number, the irradiance that is shown white, not {shown(given)}")
+    return checks.above_zero("exposure", given)
+
+
+def _truth(name: str, given: Any) -> bool:
+    if not isinstance(given, bool):
+        raise InputError(f"{name} is true or false, not {shown(given)}")
+    return given

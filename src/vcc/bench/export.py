@@ -1,0 +1,229 @@
+"""What a bench gives away: a camera file, a program that makes the same picture, the picture."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.base.describe import is_default
+from vcc.base.errors import InputError
+from vcc.base.units import deg, mm, nm, um
+from vcc.bench.document import Document, shown
+from vcc.bench.picture import Taken
+from vcc.files.camera_families import FAMILIES, needed, parameters_of, unit_of
+from vcc.files.camera_reading import Beside
+from vcc.files.camera_writing import tables_of_train
+from vcc.optics import Element
+from vcc.optics.electronics import Electronics
+from vcc.optics.sensor import Sensor
+from vcc.optics.train import Train
+
+KINDS = ("toml", "python", "png", "exr")
+INLINE = 64
+"""Numbers of an array that a program states itself; larger ones are files beside it."""
+_DATE = (1980, 1, 1, 0, 0, 0)
+"""Of all files in an archive, the earliest there is: the same camera gives the same bytes."""
+
+
+@dataclass(frozen=True)
+class OnBench:
+    """What is exported.
+
+    Args:
+        document: what is shown.
+        train: its camera.
+        source: lines of Python that make ``light_field``; empty where a program cannot have it.
+        beside: the files that the camera may name.
+    """
+
+    document: Document
+    train: Train
+    source: str
+    beside: Beside
+
+
+def exported(what: Any, bench: OnBench, taken: Taken | None, white: float) -> tuple[str, str, bytes]:
+    """A file: its name, its type and its bytes.
+
+    Args:
+        what: one of `KINDS`.
+        bench: what is exported.
+        taken: the whole picture, for "png" and "exr".
+        white: the irradiance that a PNG shows white.
+
+    Raises:
+        InputError: anything else, or what cannot be written.
+    """
+    if what == "toml":
+        return _with_arrays("camera", "toml", "application/toml", *camera_file(bench.train))
+    if what == "python":
+        text, arrays = program(bench, white)
+        return _with_arrays("picture", "py", "text/x-python", text, arrays)
+    if what in ("png", "exr") and taken is not None:
+        kind = {"png": "image/png", "exr": "image/x-exr"}[what]
+        return f"picture.{what}", kind, _saved(taken, f".{what}", white)
+    raise InputError(f"a bench exports {', '.join(KINDS)}, not {shown(what)}")
+
+
+def _saved(taken: Taken, ending: str, white: float) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"picture{ending}"
+        taken.image.save(path, exposure=1 / white if ending == ".png" else "auto")
+        return path.read_bytes()
+
+
+def _with_arrays(
+    stem: str, ending: str, kind: str, text: str, arrays: dict[str, NDArray[np.float64]]
+) -> tuple[str, str, bytes]:
+    """A text as it is, or with the arrays that it names in a ZIP archive."""
+    if not arrays:
+        return f"{stem}.{ending}", kind, text.encode()
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(zipfile.ZipInfo(f"{stem}.{ending}", _DATE), text.encode())
+        for name, values in arrays.items():
+            stored = io.BytesIO()
+            np.save(stored, values)
+            archive.writestr(zipfile.ZipInfo(name, _DATE), stored.getvalue())
+    return f"{stem}.zip", "application/zip", packed.getvalue()
+
+
+def camera_file(train: Train) -> tuple[str, dict[str, NDArray[np.float64]]]:
+    """The text of a camera file, and the arrays that stand beside it, by their names."""
+    import tomli_w
+
+    nowhere = Path(tempfile.gettempdir()) / "no-such-folder" / "camera.toml"  # no file beside it is named instead
+    tables, arrays = tables_of_train(train, nowhere)
+    return tomli_w.dumps(tables), arrays
+
+
+# --- a program ---
+
+
+def program(bench: OnBench, white: float) -> tuple[str, dict[str, NDArray[np.float64]]]:
+    """A program that makes the picture that a bench shows, and the arrays that it loads.
+
+    Args:
+        bench: what is shown.
+        white: the irradiance that is shown white.
+    """
+    writer = _Writer({}, set())
+    elements = "".join(f"        {writer.made(element)},\n" for element in bench.train.elements)
+    camera = f"camera = vcc.Camera(\n    [\n{elements}    ],\n    {writer.made(bench.train.sensor)},\n)"
+    source = bench.source or (
+        'raise SystemExit("open here, as light_field, the one that was on the bench")  # and take this line away'
+    )
+    views = bench.document.views
+    if views is not None:
+        (a, b), (c, d) = views.rows, views.columns
+        source += f"\nlight_field = light_field[{a} : {b + 1}, {c} : {d + 1}]"
+    lines = [
+        '"""The picture that the optical bench showed."""\n',
+        *sorted({"import vcc", *(["import numpy as np"] if writer.uses_numpy else [])}),
+        *([f"from vcc.units import {', '.join(sorted(writer.names))}"] if writer.names else []),
+        f"\n{source}",
+        camera,
+        *_picture_lines(bench),
+        f'print(image.save("picture.png", exposure=1 / {white!r}).description)\n',
+    ]
+    return "\n".join(lines), writer.arrays
+
+
+def _picture_lines(bench: OnBench) -> list[str]:
+    if not bench.document.noise:
+        return ["image = camera.capture(light_field)"]
+    electronics = bench.train.sensor.electronics
+    filtered = electronics is not None and electronics.color_filter is not None
+    image = 'recording.demosaiced("bilinear")' if filtered else "recording.image()"
+    return ["recording = camera.expose(light_field)", f"image = {image}"]
+
+
+_UNITS = {"length": {"mm": mm, "um": um, "nm": nm}, "angle": {"deg": deg}}
+
+
+@dataclass
+class _Writer:
+    """Writes objects as the Python that makes equal ones.
+
+    Args:
+        arrays: put aside, by the name of the file that will hold each.
+        names: of units that were used.
+    """
+
+    arrays: dict[str, NDArray[np.float64]]
+    names: set[str]
+    uses_numpy: bool = False
+
+    def made(self, thing: Any) -> str:
+        """A call of the thing's class with the parameters that are not at their defaults."""
+        parts = []
+        for name, field in parameters_of(type(thing)).items():
+            value = getattr(thing, name)
+            if needed(field) or not is_default(value, field):
+                parts.append(f"{name}={self.value(value, unit_of(field))}")
+        return f"{_module_of(thing)}.{type(thing).__name__}({', '.join(parts)})"
+
+    def value(self, value: Any, unit: str | None) -> str:
+        """A parameter's value."""
+        if isinstance(value, tuple):
+            inside = ", ".join(self.value(part, unit) for part in value)
+            return f"({inside},)" if len(value) == 1 else f"({inside})"
+        if isinstance(value, list):
+            return f"[{', '.join(self.value(part, unit) for part in value)}]"
+        if isinstance(value, dict):
+            return "{" + ", ".join(f"{key!r}: {self.value(part, unit)}" for key, part in value.items()) + "}"
+        if isinstance(value, Affine):
+            return f"vcc.Affine({self.value(value.matrix, None)})"
+        if isinstance(value, np.ndarray) and value.ndim:
+            return self.array(np.asarray(value, dtype=np.float64))
+        if isinstance(value, np.ndarray | np.generic):
+            value = value.item()
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            return self.made(value)
+        if isinstance(value, float) and unit in _UNITS:
+            return self.quantity(value, unit)
+        if value is None or isinstance(value, bool | int | float | str):
+            return _number(value) if isinstance(value, float) else repr(value)
+        raise InputError(f"a {type(value).__name__} of Python's own cannot be written into a program")
+
+    def quantity(self, value: float, unit: str) -> str:
+        """A number with the unit in which it is short, if that gives the very same number."""
+        best = _number(value)
+        for name, factor in _UNITS[unit].items():
+            count = f"{value / factor:.12g}"
+            if float(count) * factor == value and len(count) + 3 < len(best) + 3 and "e" not in count:
+                best = f"{count} * {name}"
+                self.names.add(name)
+                break
+        return best
+
+    def array(self, values: NDArray[np.float64]) -> str:
+        """An array: stated, or loaded from a file beside the program."""
+        self.uses_numpy = True
+        if values.size <= INLINE:
+            return f"np.array({values.tolist()!r})"
+        name = f"array_{len(self.arrays) + 1}.npy"
+        self.arrays[name] = values
+        return f'np.load("{name}")'
+
+
+def _number(value: float) -> str:
+    text = repr(value)
+    return f'float("{text}")' if text in ("inf", "-inf", "nan") else text
+
+
+def _module_of(thing: Any) -> str:
+    """Where users find the class of a thing."""
+    if isinstance(thing, Element | Sensor | Electronics):
+        return "vcc"
+    family = next((each for each in FAMILIES if isinstance(thing, each.base)), None)
+    return family.module if family is not None else "vcc.patterns"

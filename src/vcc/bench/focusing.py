@@ -1,0 +1,76 @@
+"""How far away what a pixel of a picture shows is, by the light field's own depth."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+from vcc.light_field import LightField
+from vcc.optics.train import Train
+from vcc.recover.depth import depth_by_structure_tensor
+
+PATCH = 24
+"""Pixels of a view around the one that is looked at, each way, of which depth is found."""
+NEAR = 2
+"""Those whose depth counts."""
+
+
+def distance_at(train: Train, light_field: LightField, share: tuple[float, float]) -> float:
+    """The distance of what a place of the picture shows, metres before the entrance plane.
+
+    The ray through the middle view that lands there says which of its pixels to look at; how what it shows moves
+    from view to view says how far away it is.
+
+    Args:
+        train: the camera; where it bends light otherwise than by matrices, what does so is passed over.
+        light_field: before it.
+        share: the place on the sensor, (down, across), 0 to 1, as light lands on it.
+
+    Raises:
+        InputError: one view only, a place that the middle view does not see, or nothing there that shows depth.
+    """
+    nv, nu, nt, ns = light_field.shape[:4]
+    if nv * nu == 1:
+        raise InputError("one view alone shows no depth: there is nothing to focus by")
+    row, column = _pixel_of_middle_view(train, light_field, share)
+    if not (0 <= row < nt and 0 <= column < ns):
+        raise InputError("the light field's middle view does not show what is there")
+    rows, first_row = _around(row, nt)
+    columns, first_column = _around(column, ns)
+    depth = depth_by_structure_tensor(light_field[:, :, rows, columns])
+    down, across = row - first_row, column - first_column
+    part = np.s_[max(down - NEAR, 0) : down + NEAR + 1, max(across - NEAR, 0) : across + NEAR + 1]
+    weights = depth.confidence[part].astype(np.float64)
+    if not weights.sum() > 0:
+        raise InputError("nothing there shows depth: click where there is some detail")
+    disparity = float((depth.disparity[part] * weights).sum() / weights.sum())
+    distance = light_field.grid.distance_of(disparity)
+    return distance if distance > 0 else math.inf
+
+
+def _around(middle: int, size: int) -> tuple[slice, int]:
+    first, stop = max(middle - PATCH, 0), min(middle + PATCH + 1, size)
+    return slice(first, stop), first
+
+
+def _pixel_of_middle_view(train: Train, light_field: LightField, share: tuple[float, float]) -> tuple[int, int]:
+    """(row, column) of the middle view's pixel whose ray lands at a place of the sensor."""
+    rows, columns = train.sensor.shape
+    place = np.asarray(train.sensor.frame([share[1] * columns - 0.5, share[0] * rows - 0.5]))
+    ray = train.rays_at(train.sensor.z, before=True) @ light_field.frame
+    j, i = light_field.grid.middle_view
+    by_pixel, fixed = _of_pixels(ray.linear, ray.offset, i, j)
+    if abs(np.linalg.det(by_pixel)) < 1e-12 * np.abs(by_pixel).max() ** 2:
+        raise InputError("all pixels of a view land at one place here: the picture does not say what was clicked")
+    column, row = np.linalg.solve(by_pixel, place - fixed)
+    return round(float(row)), round(float(column))
+
+
+def _of_pixels(
+    linear: NDArray[np.float64], offset: NDArray[np.float64], i: int, j: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places on the sensor by (column, row) of a view's pixels: the matrix, and the place of pixel (0, 0)."""
+    return linear[:2, 2:], linear[:2, :2] @ np.array([i, j], dtype=np.float64) + offset[:2]

@@ -1,0 +1,493 @@
+"""One client of a bench: what it says, what is done, what it is told. Nothing here knows how messages travel.
+
+Messages come in from any thread and are worked on by one of the session's own, in order; of what moves only the
+newest counts. A picture that is no longer wanted is broken off.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from vcc.advice.darkness import why_dark
+from vcc.advice.limits import sampling_limits
+from vcc.base import units
+from vcc.base.errors import InputError
+from vcc.bench import additions, answers, export
+from vcc.bench.document import Document, History, Views, shown
+from vcc.bench.focusing import distance_at
+from vcc.bench.offered import Offered
+from vcc.bench.picture import WHOLE, Fineness, Pace, Picture, Taken, jpeg, pixel_at, psnr, take, white_of
+from vcc.bench.side import side
+from vcc.files.camera_reading import TrainAsWritten, tables_of_text
+from vcc.light_field import LightField
+from vcc.optics.focusing import focused_train
+from vcc.plan.parallax_rule import vergences
+
+Json = dict[str, Any]
+Send = Callable[[Json, Sequence[bytes]], None]
+"""Tells the client a message with its buffers; from any thread."""
+
+MOST_WAITING = 200
+"""Messages that may wait: who sends more is not listened to any longer."""
+SLOW = 0.4
+"""Seconds from which on a whole picture is shown coarsely first."""
+MISSING = 0.01
+"""Share of the rays from which on it is said that they are missing."""
+
+CHANGES = ("hello", "set", "add", "remove", "duplicate", "undo", "redo", "load", "focus")
+"""What a client may do that shows another picture."""
+QUESTIONS = ("pin", "value", "ask", "export")
+"""What it may do beside."""
+
+log = logging.getLogger("vcc.bench")
+
+
+class Broken(Exception):
+    """A message that no client of ours sends: who sent it is not listened to any longer."""
+
+
+class Superseded(Exception):
+    """What is being made is no longer wanted."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A picture that is to be made.
+
+    Args:
+        turn: the client's number of what asked for it.
+        moving: whether something moves.
+        coarse_shown: whether a coarse one was made of it already.
+    """
+
+    turn: int
+    moving: bool
+    coarse_shown: bool = False
+
+
+class Session:
+    """A client of a bench.
+
+    Args:
+        offered: what there is.
+        send: tells the client.
+    """
+
+    def __init__(self, offered: Offered, send: Send) -> None:
+        self._offered, self._send = offered, send
+        self._history = History(offered.start)
+        self._described = offered.start.train(offered.beside)
+        self._inbox: deque[tuple[Json, list[bytes]]] = deque()
+        self._changed = threading.Condition()
+        self._closed = False
+        self._wanted: Wanted | None = None
+        self._pace = Pace()
+        self._taken: Taken | None = None
+        self._shown_white = 1.0
+        self._pinned: tuple[Picture, float] | None = None
+        self._thread = threading.Thread(target=self._work, name="vcc bench", daemon=True)
+        self._thread.start()
+
+    @property
+    def document(self) -> Document:
+        """What is shown."""
+        return self._history.present
+
+    def receive(self, message: object, buffers: Sequence[bytes] = ()) -> None:
+        """Take note of a message; what follows comes by ``send``.
+
+        Args:
+            message: as JSON has it.
+            buffers: that came with it.
+
+        Raises:
+            Broken: it is none, or too many wait.
+        """
+        checked = _checked(message)
+        with self._changed:
+            if self._closed:
+                return
+            if self._inbox and _replaces(checked, self._inbox[-1][0]):
+                self._inbox.pop()
+            if len(self._inbox) >= MOST_WAITING:
+                raise Broken(f"more than {MOST_WAITING} messages wait")
+            self._inbox.append((checked, list(buffers)))
+            self._changed.notify()
+
+    def close(self) -> None:
+        """End: what is being made is broken off, and nothing is sent any longer."""
+        with self._changed:
+            self._closed = True
+            self._inbox.clear()
+            self._changed.notify()
+
+    def join(self, timeout: float | None = None) -> bool:
+        """Wait until the session's thread has ended; whether it has."""
+        self._thread.join(timeout)
+        return not self._thread.is_alive()
+
+    # --- the thread ---
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or self._inbox or self._wanted)
+                if self._closed:
+                    return
+                message, buffers = self._inbox.popleft() if self._inbox else (None, [])
+            try:
+                if message is None:
+                    self._make_picture()
+                else:
+                    self._answer(message, buffers)
+            except Superseded:
+                continue
+            except Exception as error:  # a fault of ours; the client is told, and the bench goes on
+                log.exception("a fault on the bench")
+                self._wanted = None
+                self._tell({"is": "failed", "words": f"a fault in the program: {type(error).__name__}: {error}"})
+
+    def _tell(self, message: Json, buffers: Sequence[bytes] = ()) -> None:
+        if not self._closed:
+            self._send(message, buffers)
+
+    def _answer(self, message: Json, buffers: list[bytes]) -> None:
+        doing = message["do"]
+        try:
+            getattr(self, f"_do_{doing}")(message)
+        except InputError as error:
+            self._refuse(message, error)
+
+    def _refuse(self, message: Json, error: InputError) -> None:
+        where, turn = message.get("where"), _turn(message)
+        self._tell({"is": "refused", "do": message["do"], "words": str(error), "where": where, "turn": turn})
+
+    def _check_wanted(self, done: int = 0, total: int = 0) -> None:
+        """Break off what is being made where another picture is asked for."""
+        if self._closed or any(message["do"] in CHANGES for message, _ in list(self._inbox)):
+            raise Superseded
+
+    # --- what changes the picture ---
+
+    def _do_hello(self, message: Json) -> None:
+        self._tell(
+            {
+                "is": "parts",
+                "light_fields": list(self._offered.fields),
+                "kinds": additions.kinds(),
+                "sensor": additions.sensor_parameters(),
+                "families": additions.families(),
+                "gallery": list(self._offered.gallery),
+            }
+        )
+        given = message.get("document")
+        if given is None:
+            self._tell_state()
+            self._wanted = Wanted(_turn(message), moving=False)
+            return
+        try:
+            document, described = self._checked(Document.of_json(given))
+        except InputError as error:
+            self._refuse(message, error)
+            document, described = self._history.present, self._described
+        self._history, self._described = History(document), described
+        self._tell_state()
+        self._wanted = Wanted(_turn(message), moving=False)
+
+    def _do_set(self, message: Json) -> None:
+        changed = self._history.present.changed(message.get("where"), message.get("value"))
+        self._show(changed, message, bool(message.get("moving", False)))
+
+    def _do_add(self, message: Json) -> None:
+        present = self._history.present
+        entry = additions.new_element(message.get("kind"), message.get("z"), self._described.train, self._names())
+        elements = [*present.camera.get("elements", []), entry]
+        self._show(replace(present, camera={**present.camera, "elements": elements}), message)
+
+    def _do_remove(self, message: Json) -> None:
+        number = self._element(message)
+        self._show(self._history.present.changed(["elements", number], None), message)
+
+    def _do_duplicate(self, message: Json) -> None:
+        present, number = self._history.present, self._element(message)
+        elements = list(present.camera["elements"])
+        copy, original = dict(elements[number]), self._described.elements[number]
+        wanted = str(copy.get("name") or original.kind)
+        copy["name"] = additions.free_name(wanted, self._names())
+        step = max(original.length, self._described.train.sensor.z / 50)
+        z = min(original.z + step, self._described.train.sensor.z)
+        copy["z"] = units.text(float(f"{z:.4g}"), "length")
+        elements.insert(number + 1, copy)
+        self._show(replace(present, camera={**present.camera, "elements": elements}), message)
+
+    def _do_undo(self, message: Json) -> None:
+        self._history.undo()
+        self._show_again(message)
+
+    def _do_redo(self, message: Json) -> None:
+        self._history.redo()
+        self._show_again(message)
+
+    def _do_load(self, message: Json) -> None:
+        if "toml" in message:
+            if not isinstance(message["toml"], str):
+                raise InputError("a camera file is text")
+            document = replace(self._history.present, camera=tables_of_text(message["toml"]))
+        elif "gallery" in message:
+            title = message["gallery"]
+            if not isinstance(title, str) or title not in self._offered.gallery:
+                raise InputError(
+                    f"there is no camera {shown(title)}: there are {', '.join(self._offered.gallery)}"
+                )
+            document = self._offered.gallery[title]
+        else:
+            document = Document.of_json(message.get("document"))
+        self._show(document, message)
+
+    def _do_focus(self, message: Json) -> None:
+        taken = self._picture_there()
+        pixel = pixel_at(taken.values.shape, message.get("x"), message.get("y"))
+        train = self._described.train
+        share = (pixel[0] + 0.5) / taken.values.shape[0], (pixel[1] + 0.5) / taken.values.shape[1]
+        distance = distance_at(train, self._light_field(), share)
+        z = focused_train(train.elements, train.sensor, distance).sensor.z
+        value = units.text(float(f"{z:.8g}"), "length")
+        self._show(self._history.present.changed(["sensor", "z"], value), message)
+
+    def _show(self, document: Document, message: Json, moving: bool = False) -> None:
+        """Show another document, if it is one."""
+        document, self._described = self._checked(document)
+        self._history.put(document, moving)
+        self._tell_state()
+        self._wanted = Wanted(_turn(message), moving)
+
+    def _show_again(self, message: Json) -> None:
+        """Show what history gives, which was shown before."""
+        self._described = self._history.present.train(self._offered.beside)
+        self._tell_state()
+        self._wanted = Wanted(_turn(message), moving=False)
+
+    def _checked(self, document: Document) -> tuple[Document, TrainAsWritten]:
+        document = document.settled(self._offered.beside)
+        described = document.train(self._offered.beside)
+        field = self._offered.field(document.light_field)
+        if document.views is not None and field.is_open:
+            document.views.check(field.whole().shape)
+        if document.noise and described.train.sensor.electronics is None:
+            raise InputError("noise is that of a sensor's electronics, and this sensor has none: add them first")
+        return document, described
+
+    def _element(self, message: Json) -> int:
+        number = message.get("element")
+        count = len(self._described.elements)
+        if type(number) is not int or not 0 <= number < count:
+            raise InputError(f"there is no element {shown(number)}: there are {count}, counted from 0")
+        return number
+
+    def _names(self) -> set[str]:
+        return {element.name for element in self._described.elements}
+
+    def _light_field(self) -> LightField:
+        document = self._history.present
+        whole = self._offered.field(document.light_field).whole(self._progress)
+        return whole if document.views is None else whole[document.views.slices]
+
+    # --- what is told ---
+
+    def _tell_state(self) -> None:
+        document = self._history.present
+        field = self._offered.field(document.light_field)
+        grid, seen = None, None
+        if field.is_open:
+            grid = field.whole().grid
+            seen = field.whole() if document.views is None else _seen(field.whole(), document.views)
+        self._tell(
+            {
+                "is": "state",
+                "document": document.as_json(),
+                "undo": self._history.can_undo,
+                "redo": self._history.can_redo,
+                "grid": None if grid is None else list(grid.shape),
+                "side": side(self._described.elements, self._described.train, seen, grid),
+            }
+        )
+
+    def _progress(self, done: int, total: int) -> None:
+        self._tell({"is": "progress", "done": done, "total": total, "words": "Opening the light field"})
+        if self._closed:
+            raise Superseded
+
+    def _make_picture(self) -> None:
+        wanted, document = self._wanted, self._history.present
+        assert wanted is not None
+        field = self._offered.field(document.light_field)
+        if not field.is_open:
+            self._tell({"is": "progress", "done": 0, "total": 1, "words": "Opening the light field"})
+            try:
+                field.whole(self._progress)
+            except InputError as error:
+                self._no_picture(wanted, error)
+                return
+            self._tell_state()
+        fineness = WHOLE
+        kinds = (document.light_field, *(element.kind for element in self._described.elements))
+        if wanted.moving or (not wanted.coarse_shown and (self._pace.seconds(kinds) or math.inf) > SLOW):
+            fineness = self._pace.fineness(kinds)
+        try:
+            taken = self._take(fineness)
+        except InputError as error:
+            self._no_picture(wanted, error)
+            return
+        self._pace.noted(kinds, fineness, taken)
+        self._taken = taken
+        self._tell_picture(taken, wanted)
+        whole = fineness == WHOLE
+        self._wanted = None if whole or wanted.moving else replace(wanted, coarse_shown=True)
+        if whole and not wanted.moving:
+            self._tell({"is": "notes", "turn": wanted.turn, "notes": self._notes(taken)})
+
+    def _take(self, fineness: Fineness) -> Taken:
+        document = self._history.present
+        field = self._offered.field(document.light_field)
+        while not self._offered.turn.acquire(timeout=0.05):
+            self._check_wanted()
+        try:
+            return take(self._described.train, field, document, fineness, self._check_wanted)
+        finally:
+            self._offered.turn.release()
+
+    def _no_picture(self, wanted: Wanted, error: InputError) -> None:
+        self._wanted, self._taken = None, None
+        self._tell({"is": "no picture", "turn": wanted.turn, "words": str(error)})
+
+    def _tell_picture(self, taken: Taken, wanted: Wanted) -> None:
+        exposure = self._history.present.exposure
+        white = white_of(taken.values) if exposure is None else exposure
+        self._shown_white = white
+        compared = None
+        if self._pinned is not None and not taken.coarse:
+            compared = psnr(taken.values, *self._pinned)
+        message = {
+            "is": "picture",
+            "turn": wanted.turn,
+            "coarse": taken.coarse,
+            "moving": wanted.moving,
+            "shape": list(taken.values.shape[:2]),
+            "white": white,
+            "missing": taken.found.missing_rays,
+            "by_rays": taken.plan.by_rays,
+            "took": round(1000 * taken.seconds, 1),
+            "psnr": None if compared is None or math.isinf(compared) else compared,
+            "same": compared is not None and bool(math.isinf(compared)),
+        }
+        self._tell(message, [jpeg(taken.values, white, taken.coarse)])
+
+    def _notes(self, taken: Taken) -> list[Json]:
+        """What to beware of, each at the element that its words name."""
+        train, field = self._described.train, self._light_field()
+        said = list(taken.plan.cautions)
+        if dark := why_dark(taken.plan, field, taken.found):
+            said.append(dark)
+        elif taken.found.missing_rays > MISSING:
+            said.append(
+                f"{taken.found.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
+                f"({taken.found.missing_reason}); the picture is darker there"
+            )
+        far_near = vergences(field.grid, None)
+        scene = None if far_near is None else (float(far_near.min()), float(far_near.max()))
+        told = {item.advice: item for item in sampling_limits(train, field.grid, scene).to_watch}
+        said += [f"{item.stated}. {item.advice}" for item in told.values()]
+        return [{"element": self._element_named_in(words), "words": words} for words in said]
+
+    def _element_named_in(self, words: str) -> int | None:
+        labels = [element.label for element in self._described.elements]
+        return next((number for number, label in enumerate(labels) if label in words), None)
+
+    # --- questions ---
+
+    def _picture_there(self) -> Taken:
+        if self._taken is None:
+            raise InputError("there is no picture yet")
+        return self._taken
+
+    def _whole_picture(self) -> Taken:
+        """The whole picture of the document, made if only a coarse one is there."""
+        taken = self._picture_there()
+        if taken.coarse:
+            taken = self._take(WHOLE)
+            self._taken = taken
+        return taken
+
+    def _do_pin(self, message: Json) -> None:
+        if not message.get("on", True):
+            self._pinned = None
+            self._tell({"is": "pinned", "on": False})
+            return
+        taken = self._whole_picture()
+        self._pinned = (taken.values, self._shown_white)
+        self._tell(
+            {"is": "pinned", "on": True, "white": self._shown_white, "shape": list(taken.values.shape[:2])},
+            [jpeg(taken.values, self._shown_white)],
+        )
+
+    def _do_value(self, message: Json) -> None:
+        taken = self._picture_there()
+        pixel = pixel_at(taken.values.shape, message.get("x"), message.get("y"))
+        numbers = None if taken.recording is None else taken.recording.values
+        recorded = None if numbers is None else np.atleast_1d(numbers[pixel]).tolist()
+        self._tell(
+            {
+                "is": "value",
+                "x": message["x"],
+                "y": message["y"],
+                "irradiance": np.atleast_1d(taken.values[pixel]).tolist(),
+                "recorded": recorded,
+            }
+        )
+
+    def _do_ask(self, message: Json) -> None:
+        what = message.get("what")
+        answer, buffers = answers.answer(what, message, self._described.train, self._light_field())
+        self._tell({"is": "answer", "what": what, **answer}, buffers)
+
+    def _do_export(self, message: Json) -> None:
+        document = self._history.present
+        field = self._offered.field(document.light_field)
+        bench = export.OnBench(document, self._described.train, field.source, self._offered.beside)
+        taken = self._whole_picture() if message.get("what") in ("png", "exr") else None
+        name, kind, data = export.exported(message.get("what"), bench, taken, self._shown_white)
+        self._tell({"is": "file", "name": name, "type": kind}, [data])
+
+
+def _seen(light_field: LightField, views: Views) -> LightField:
+    return light_field[views.slices]
+
+
+def _checked(message: object) -> Json:
+    """A message that is one."""
+    if not isinstance(message, dict) or message.get("do") not in (*CHANGES, *QUESTIONS):
+        raise Broken(f"no message of a bench: {shown(message)}")
+    if type(message.get("turn", 0)) is not int or not -(2**53) < message.get("turn", 0) < 2**53:
+        raise Broken("turn is a whole number")
+    return message
+
+
+def _turn(message: Json) -> int:
+    return int(message.get("turn", 0))
+
+
+def _replaces(newer: Json, older: Json) -> bool:
+    """Whether a message makes the one before it needless: the same thing has moved on."""
+    same = newer["do"] == older["do"]
+    if same and newer["do"] == "set":
+        return bool(older.get("moving")) and json.dumps(newer.get("where")) == json.dumps(older.get("where"))
+    return bool(same and newer["do"] == "value")

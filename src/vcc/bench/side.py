@@ -1,0 +1,249 @@
+"""What the side view of a bench shows, as data: elements in their places, rays through them, distances in words.
+
+It is what `vcc.plot.plot_camera` draws, traced and measured by the same functions. Lengths are metres, heights go
+upwards in the drawing as they go right in the scene. What is infinite is None: JSON has no infinity.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.advice.words import distance_in_words
+from vcc.base.errors import InputError
+from vcc.base.units import short
+from vcc.fields.grid import Grid
+from vcc.fields.samples import InMemory
+from vcc.optics import CellDeflection, Element, Faces, FirstOrder, Lens, Prism
+from vcc.optics.focusing import focused_train
+from vcc.optics.train import Train
+from vcc.plot.elements import (
+    Span,
+    along,
+    drawn_range,
+    glass_profile,
+    half_opening,
+    half_size,
+    magnification,
+    mask_bar,
+)
+from vcc.plot.fans import (
+    OFF_AXIS_RAYS,
+    RAYS,
+    RAYS_THAT_SPLIT,
+    Point,
+    beam_at,
+    focused_distance,
+    half_height,
+    points_to_show,
+    scene_length,
+    trace_point,
+)
+from vcc.plot.labels import label_of
+from vcc.plot.tracing import Paths, crossings, openings, spread_along
+
+Array = NDArray[np.float64]
+Json = dict[str, Any]
+
+AXIS = 0
+"""x is drawn upwards."""
+DIGITS = 5
+"""Of lengths that are drawn: a thousandth of a pixel."""
+PROFILE_POINTS = 160
+MOST_PIECES = 400
+"""Of a mask's pattern: of a finer one, pieces are the mean of several."""
+CLOSE = 1e-9
+"""Metres: a place on the axis that is the same but for rounding."""
+
+
+def side(elements: Sequence[Element], train: Train, light_field: InMemory | None, grid: Grid | None) -> Json:
+    """The side view of a camera.
+
+    Args:
+        elements: of the camera, in the order by which they are called.
+        train: of them.
+        light_field: whose width the rays fill; None fills the first lens.
+        grid: whose scene tells what distances matter; None for none.
+    """
+    points = points_to_show(train, None, AXIS)
+    start = -scene_length(train, points)
+    scattering = any(stage.faces.spread is not None for stage in train.stages)
+    rays = RAYS_THAT_SPLIT if scattering else RAYS
+    paths = [
+        trace_point(train, point, light_field, AXIS, OFF_AXIS_RAYS if point.offset else rays, start)
+        for point in points
+    ]
+    half = half_height(train, paths, AXIS)
+    span = Span(AXIS, -half, half)
+    focus = focused_distance(train)
+    return {
+        "from": _short(start),
+        "to": _short(train.sensor.z),
+        "half": _short(half),
+        "elements": [_element(number, one, span, paths) for number, one in enumerate(elements)],
+        "sensor": {
+            "z": train.sensor.z,
+            "half": train.sensor.size[1 - AXIS] / 2,
+            "decentre": train.sensor.decentre[AXIS],
+            "label": _sensor_label(train),
+        },
+        "rays": [_rays(point, path) for point, path in zip(points, paths, strict=True)],
+        "focus": _distance(focus),
+        "snaps": _snaps(train, grid),
+        "words": _words(train, focus, grid),
+    }
+
+
+# --- elements ---
+
+
+def _element(number: int, element: Element, span: Span, paths: Sequence[Paths]) -> Json:
+    """What an element is drawn as, how large, and what it lets through."""
+    planes = crossings(element)
+    size = half_size(element, AXIS)
+    centre = element.decentre[AXIS]
+    drawn: Json = {
+        "element": number,
+        "kind": element.kind,
+        "name": element.name,
+        "label": label_of(element, span).split("\n"),
+        "z": element.z,
+        "length": element.length,
+        "decentre": centre,
+        "half": None if math.isinf(size) else size,
+    }
+    if len(planes) > 1 or element.length > 0:
+        rims = [(plane.z, half_opening(plane.faces, AXIS)) for plane in planes]
+        return drawn | {
+            "drawn": "block",
+            "beam": _short(max(beam_at(element, paths, AXIS), 0.0)),
+            "openings": [[z, centre - half, centre + half] for z, half in rims if math.isfinite(half)],
+        }
+    if isinstance(element, Lens):
+        return drawn | {"drawn": "lens", "converging": element.focal_length > 0} | _opening(element, size)
+    if isinstance(element, Prism):
+        return drawn | {"drawn": "prism", "towards": float(np.sign(element.deflection[AXIS]))}
+    return drawn | _by_faces(element, planes[0].faces, span)
+
+
+def _opening(element: Element, half: float) -> Json:
+    """What is open of an element with a rim: from where to where, on the drawing."""
+    centre = element.decentre[AXIS]
+    return {"openings": [[element.z, centre - half, centre + half]] if math.isfinite(half) else []}
+
+
+def _by_faces(element: Element, faces: Faces, span: Span) -> Json:
+    """Any thin element by what it does: glass where it bends, frosted where it scatters, a bar of shades."""
+    found: Json = {"drawn": "sheet"} | _opening(element, half_opening(faces, AXIS))
+    if faces.pattern is not None:
+        scale = magnification(element, faces, AXIS, span.low, span.high)
+        bar = mask_bar(span, element, faces.pattern, scale)
+        found |= {"drawn": "mask", "shades": [] if bar is None else _pieces(*bar)}
+    if faces.spread is not None:
+        low, high = drawn_range(span, element, half_opening(faces, AXIS))
+        places = np.linspace(low, high, 33)
+        spread = spread_along(faces.spread, AXIS, *along(AXIS, places))
+        strongest = float(spread.max())
+        strength = spread / strongest if strongest > 0 else spread
+        found |= {"drawn": "frosted", "roughness": _pairs(places + element.decentre[AXIS], strength)}
+    if faces.deflection is not None:
+        profile = glass_profile(span, element, faces)
+        if profile is not None:
+            height, depth = profile
+            cells = isinstance(faces.bending, CellDeflection)  # whose borders are to stay sharp
+            every = 1 if cells else max(len(height) // PROFILE_POINTS, 1)
+            points = _pairs(height[::every] + element.decentre[AXIS], depth[::every])
+            found |= {"drawn": "glass", "profile": points}
+    return found
+
+
+def _pieces(edges: Array, values: Array) -> list[list[float]]:
+    """[from, to, share of light] of each piece of a mask, no more than `MOST_PIECES`."""
+    if len(values) > MOST_PIECES:
+        wanted = np.linspace(edges[0], edges[-1], MOST_PIECES + 1)
+        through = np.concatenate([[0.0], np.cumsum(values * np.diff(edges))])
+        passed = np.interp(wanted, edges, through)
+        edges, values = wanted, np.diff(passed) / np.diff(wanted)
+    return [
+        [_short(low), _short(high), round(float(value), 3)]
+        for low, high, value in zip(edges[:-1], edges[1:], values, strict=True)
+    ]
+
+
+def _pairs(heights: Array, values: Array) -> list[list[float]]:
+    return [[_short(height), round(float(value), 3)] for height, value in zip(heights, values, strict=True)]
+
+
+def _sensor_label(train: Train) -> list[str]:
+    rows, columns = train.sensor.shape
+    return ["sensor", f"{rows} × {columns}, {short(train.sensor.pitches[1 - AXIS], digits=4)}"]
+
+
+# --- rays ---
+
+
+def _rays(point: Point, paths: Paths) -> Json:
+    """The fan from a point: each ray as places [z, height, share of light left on the way there]."""
+    listed = []
+    for height, share, first in zip(paths.positions[..., AXIS], paths.shares, paths.starts, strict=True):
+        ray = []
+        for plane in range(first, len(paths.z)):
+            if plane > first and share[plane] <= 0:
+                break
+            ray.append([_short(paths.z[plane]), _short(height[plane]), round(float(share[plane]), 3)])
+        listed.append(ray)
+    return {"colour": point.role, "distance": _distance(point.distance), "words": point.label, "paths": listed}
+
+
+def _distance(distance: float | None) -> float | None:
+    return None if distance is None or math.isinf(distance) else distance
+
+
+def _short(length: float) -> float:
+    """A length for a drawing: what JSON holds of it is no longer than what is seen."""
+    return float(f"{length:.{DIGITS}g}")
+
+
+# --- words ---
+
+
+def scene_distances(grid: Grid) -> dict[str, float]:
+    """Distances of a light field's scene that matter, metres, by name: its ends, as far as they are known."""
+    found = grid.measured_disparity_range()
+    if found is None:
+        return {}
+    far, near = (grid.distance_of(disparity) for disparity in found)
+    return {"nearest": near, "farthest": far if far > 0 else math.inf}
+
+
+def _snaps(train: Train, grid: Grid | None) -> list[Json]:
+    """Where the sensor would have to stand for what matters to be sharp."""
+    snaps = []
+    for name, distance in ({} if grid is None else scene_distances(grid)).items():
+        try:
+            z = focused_train(train.elements, train.sensor, distance).sensor.z
+        except InputError:  # of that distance there is no image
+            continue
+        snaps.append({"z": z, "words": f"{name} of the scene, {distance_in_words(distance)}, is sharp"})
+    return sorted(snaps, key=lambda snap: float(snap["z"]))
+
+
+def _words(train: Train, focus: float | None, grid: Grid | None) -> list[str]:
+    """What is sharp, how long the camera is, and its first lenses' openings."""
+    sharp = "Nothing real is sharp on the sensor" if focus is None else f"Sharp: {distance_in_words(focus)}"
+    said = [f"{sharp}."]
+    if grid is not None and (scene := scene_distances(grid)):
+        said.append(f"The scene: {' to '.join(map(distance_in_words, scene.values()))}.")
+    lens = next((one for one in train.elements if isinstance(one, Lens | FirstOrder)), None)
+    if lens is None:
+        return said
+    behind = train.sensor.z - lens.z - lens.length
+    said.append(f"The sensor stands {short(behind, digits=4)} behind {lens.label}.")
+    rims = [half for element, _, half in openings(train, AXIS) if element is lens]
+    if isinstance(lens, Lens) and rims:
+        said.append(f"{lens.label.capitalize()}: f/{abs(lens.focal_length) / (2 * rims[0]):.3g}.")
+    return said

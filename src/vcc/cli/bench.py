@@ -1,0 +1,90 @@
+"""``vcc bench``: the optical bench in a browser."""
+
+import dataclasses
+import threading
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from vcc.base.errors import InputError
+from vcc.base.progress import Progress
+from vcc.bench.cameras import SCENE, cameras, scene
+from vcc.bench.document import Document
+from vcc.bench.offered import Field, Offered
+from vcc.bench.server import LOOPBACK, run
+from vcc.camera_file import load_camera
+from vcc.cli.console import show
+from vcc.cli.options import Reading, Whole
+from vcc.files.camera_reading import Beside, read_tables, train_of_tables
+from vcc.light_field import LightField
+from vcc.store import is_store
+
+
+def bench(
+    camera: Annotated[Path | None, Parameter(help="The camera file, .toml. Default: a lens of 50 mm.")] = None,
+    light_field: Annotated[
+        Path | None, Parameter(help="A folder of views, a file or a store. Default: the demo's scene.")
+    ] = None,
+    /,
+    *,
+    host: Annotated[str, Parameter(metavar="ADDRESS")] = LOOPBACK,
+    port: Whole = 0,
+    no_browser: bool = False,
+    reading: Reading = Reading(),
+) -> None:
+    """Open the optical bench in the browser: move elements along the axis, and see the picture follow.
+
+    Args:
+        host: The address to listen at. Anything but this machine's own lets others in, who then need the token in
+            the address that is printed.
+        port: The port to listen at; 0 takes a free one.
+        no_browser: Print the address, and open no browser.
+    """
+    fields = {SCENE: scene()}
+    name = SCENE
+    if light_field is not None:
+        if not light_field.expanduser().exists():
+            raise InputError(f"there is no light field {light_field}")
+        name = light_field.expanduser().resolve().name or str(light_field)
+        fields = {name: _field(light_field, reading), **fields}
+    gallery = cameras(SCENE)
+    if camera is None:
+        start, beside = (
+            dataclasses.replace(next(iter(gallery.values())), light_field=name),
+            Beside(Path(), frozenset()),
+        )
+    else:
+        start, beside = _document(camera, name)
+    offered = Offered(fields, start, beside, gallery)
+    # While the browser starts; whoever looks first waits for the same.
+    threading.Thread(target=_opened, args=(fields[name],), daemon=True).start()
+    run(offered, host=host, port=port, browser=not no_browser, say=show)
+
+
+def _document(camera: Path, light_field: str) -> tuple[Document, Beside]:
+    """A camera file as what a bench shows, and the files beside it that it names: those alone may be read."""
+    load_camera(camera)  # which refuses it with its name
+    file = camera.expanduser()
+    tables, seen = read_tables(file), Beside(file.parent)
+    train_of_tables(tables, seen)
+    beside = Beside(file.parent, frozenset(seen.opened))
+    return Document(tables, light_field).settled(beside), beside
+
+
+def _field(path: Path, reading: Reading) -> Field:
+    def opened(progress: Progress | None) -> LightField:
+        return reading.in_memory(path)
+
+    named = "".join(f", {key}={value!r}" for key, value in reading.given().items())
+    place = repr(str(path.expanduser().resolve()))
+    if is_store(path):
+        return Field(opened, f"light_field = vcc.store.open_store({place}).read()")
+    return Field(opened, f"light_field = vcc.open_light_field({place}{named})")
+
+
+def _opened(field: Field) -> None:
+    try:
+        field.whole()
+    except InputError:
+        return  # who looks at it is told

@@ -1,0 +1,235 @@
+"""The bench in a browser: who may come in, what is served, what ends whom. Real sockets on this machine."""
+
+import json
+import re
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from contextlib import ExitStack, contextmanager
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from tests.bench.on_bench import offered
+from vcc import InputError
+from vcc.bench import server
+from vcc.bench.carried import Damaged, packed, unpacked
+from vcc.bench.server import LARGEST_MESSAGE, MOST_CLIENTS, Door, Outbox, application, listening
+
+PAGES = {"index.html": b"<p>A bench.</p>", "bench.js": b"export {};", "notes.txt": b"not a page"}
+uvicorn = pytest.importorskip("uvicorn")
+
+
+@contextmanager
+def served(door):
+    """A bench behind a door: its host and port, and the running server."""
+    with listening("127.0.0.1", 0) as made:
+        config = uvicorn.Config(
+            application(offered(), door, PAGES),
+            log_level="critical",
+            ws_max_size=LARGEST_MESSAGE,
+            timeout_graceful_shutdown=0,
+        )
+        running = uvicorn.Server(config)
+        thread = threading.Thread(target=running.run, kwargs={"sockets": [made]}, daemon=True)
+        thread.start()
+        yield f"127.0.0.1:{made.getsockname()[1]}"
+        running.should_exit = running.force_exit = True
+        thread.join(20)
+        assert not thread.is_alive()
+
+
+@pytest.fixture(scope="module")
+def bench():
+    with served(Door()) as address:
+        yield address
+
+
+def told(socket, *kinds):
+    """The next message of these kinds."""
+    while True:
+        message, buffers = unpacked(socket.recv(timeout=60))
+        if message["is"] in kinds:
+            return message, buffers
+
+
+def closed(socket):
+    """Why the server lets a client go."""
+    try:
+        while True:
+            socket.recv(timeout=20)
+    except ConnectionClosed as error:
+        return error.rcvd.code
+
+
+def code(opening):
+    """How the server answers who asks for a page."""
+    try:
+        with urllib.request.urlopen(opening, timeout=20) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def test_the_front_end_and_nothing_else_is_served(bench):
+    with urllib.request.urlopen(f"http://{bench}/", timeout=20) as page:
+        assert page.read() == PAGES["index.html"]
+        assert "default-src 'none'" in page.headers["Content-Security-Policy"]
+        assert page.headers["Content-Type"].startswith("text/html")
+    for path in (
+        "server.py",
+        "../server.py",
+        "%2e%2e/server.py",
+        "etc/passwd",
+        "static/index.html",
+        "bench",
+        "notes.txt",
+    ):
+        assert code(f"http://{bench}/{path}") == 404, path
+
+
+def test_pages_of_others_are_kept_out(bench):
+    """A page from elsewhere may open sockets here; a name of somebody else's may stand for this machine."""
+    with connect(f"ws://{bench}/bench", origin=f"http://{bench}"):
+        pass
+    with pytest.raises(InvalidStatus), connect(f"ws://{bench}/bench", origin="http://example.org"):
+        pass
+    with pytest.raises(InvalidStatus), connect(f"ws://{bench}/bench", additional_headers={"Host": "example.org"}):
+        pass
+    request = urllib.request.Request(f"http://{bench}/", headers={"Host": "example.org"})
+    assert code(request) == 403
+
+
+def test_elsewhere_a_token_is_needed():
+    door = Door("0.0.0.0", "a-token")
+    with served(door) as address:
+        for query in ("", "?token=", "?token=another", "?token=a-toke"):
+            with pytest.raises(InvalidStatus), connect(f"ws://{address}/bench{query}"):
+                pass
+        with connect(f"ws://{address}/bench?token=a-token") as socket:
+            socket.send(packed({"do": "hello"}))
+            told(socket, "state")
+    assert not Door.of("localhost").token
+    assert len(Door.of("0.0.0.0").token) >= 32
+    assert Door.of("0.0.0.0").token != Door.of("0.0.0.0").token
+
+
+BROKEN = {
+    "no bytes": b"",
+    "too short": b"\1\0",
+    "longer than it is": struct.pack("<I", 999) + b"{}",
+    "no JSON": struct.pack("<I", 3) + b"{]}",
+    "no table": packed([1]),  # type: ignore[arg-type]
+    "no number": struct.pack("<I", 11) + b'{"turn":NaN',
+    "deep": struct.pack("<I", 100000) + b"[" * 100000,
+    "buffers that are not there": packed({"do": "hello", "buffers": [5]}),
+    "nothing to do": packed({"is": "state"}),
+    "another thing to do": packed({"do": "format"}),
+    "text": "hello",
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_message_ends_that_client_only(bench, name):
+    with connect(f"ws://{bench}/bench", max_size=None) as good, connect(f"ws://{bench}/bench") as bad:
+        bad.send(BROKEN[name])
+        assert closed(bad) == 1008
+        good.send(packed({"do": "hello"}))
+        told(good, "picture")
+
+
+def test_a_message_that_is_too_large_ends_that_client(bench):
+    with connect(f"ws://{bench}/bench") as socket:
+        socket.send(packed({"do": "hello", "document": "x" * LARGEST_MESSAGE}))
+        assert closed(socket) == 1009
+
+
+def test_ten_clients_each_with_a_bench_of_its_own(bench):
+    with ExitStack() as all_of_them:
+        sockets = [
+            all_of_them.enter_context(connect(f"ws://{bench}/bench", max_size=None)) for _ in range(MOST_CLIENTS)
+        ]
+        for turn, socket in enumerate(sockets):
+            place = f"{52 + turn / 10} mm"
+            socket.send(packed({"do": "set", "where": ["sensor", "z"], "value": place, "turn": turn}))
+        with connect(f"ws://{bench}/bench") as one_more:
+            assert closed(one_more) == 1013
+        for turn, socket in enumerate(sockets):
+            state, _ = told(socket, "state")
+            assert state["document"]["camera"]["sensor"]["z"] == f"{52 + turn / 10} mm"
+            assert told(socket, "picture")[0]["turn"] == turn
+    for _ in range(100):  # those who went make room
+        with connect(f"ws://{bench}/bench") as again:
+            again.send(packed({"do": "hello"}))
+            try:
+                told(again, "state")
+                return
+            except ConnectionClosed:
+                time.sleep(0.05)
+    raise AssertionError("nobody is let in again")
+
+
+def test_of_pictures_that_were_not_taken_the_newest_is_sent():
+    woken = []
+    outbox = Outbox(lambda: woken.append(1))
+    for turn in range(5):
+        outbox.put({"is": "picture", "turn": turn}, [b"jpeg"])
+    outbox.put({"is": "file", "name": "a"}, [b"1"])
+    outbox.put({"is": "file", "name": "b"}, [b"2"])
+    messages = [unpacked(data) for data in outbox.take()]
+    assert [message.get("turn", message.get("name")) for message, _ in messages] == [4, "a", "b"]
+    assert not outbox.take()
+    assert not outbox.overfull
+    outbox.put({"is": "file"}, [bytes(server.MOST_UNSENT + 1)])
+    assert outbox.overfull
+
+
+@given(
+    some.dictionaries(some.text(max_size=5), some.integers() | some.text(max_size=9), max_size=4),
+    some.lists(some.binary(min_size=1, max_size=20), max_size=3),
+)
+def test_messages_come_as_they_went(message, buffers):
+    message.pop("buffers", None)
+    assert unpacked(packed(message, buffers)) == (message, buffers)
+
+
+@given(some.binary(max_size=60))
+def test_bytes_are_a_message_or_damaged(data):
+    try:
+        message, _ = unpacked(data)
+    except Damaged:
+        return
+    assert isinstance(message, dict)
+
+
+def test_a_port_that_is_taken_is_refused():
+    with listening("127.0.0.1", 0) as made, pytest.raises(InputError, match="is taken"):
+        listening("127.0.0.1", made.getsockname()[1])
+    with pytest.raises(InputError, match="cannot be listened at"):
+        listening("203.0.113.7", 0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent otherwise")
+def test_the_command_tells_its_address_and_ends_without_a_traceback():
+    command = [sys.executable, "-m", "vcc", "bench", "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        assert running.stdout is not None
+        line = running.stdout.readline()
+        address = re.fullmatch(r"The bench is at http://(127\.0\.0\.1:\d+)/ \(Ctrl-C ends it\)\n", line)
+        assert address, line
+        with connect(f"ws://{address[1]}/bench", max_size=None) as socket:
+            socket.send(packed({"do": "hello"}))
+            state, _ = told(socket, "state")
+            assert json.dumps(state)
+            running.send_signal(signal.SIGINT)
+            _, said = running.communicate(timeout=30)
+    assert running.returncode == 130
+    assert "Traceback" not in said

@@ -1,0 +1,406 @@
+"""Sessions of the bench: what a client says and is told; without sockets."""
+
+import io
+import json
+import runpy
+import time
+import warnings
+import zipfile
+
+import imagecodecs
+import numpy as np
+import pytest
+import scipy.special
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as some
+
+import vcc
+from tests.bench.on_bench import CAMERA, NOWHERE, PIXELS, START, Client, noise, offered
+from vcc.bench.document import Document
+from vcc.bench.offered import Field
+from vcc.bench.picture import COARSER, WHOLE, Pace, Taken, take
+from vcc.bench.session import MOST_WAITING, Broken
+from vcc.camera_file import ELEMENT_KINDS
+from vcc.files.pictures import auto_exposure
+
+
+@pytest.fixture
+def client():
+    made = Client()
+    yield made
+    made.close()
+
+
+def test_hello_brings_parts_state_and_picture(client):
+    client.do("hello", turn=7)
+    parts, _ = client.until("parts")
+    assert {kind["kind"] for kind in parts["kinds"]} == set(ELEMENT_KINDS)
+    lens = next(kind for kind in parts["kinds"] if kind["kind"] == "lens")
+    focal_length = next(each for each in lens["parameters"] if each["name"] == "focal_length")
+    assert (focal_length["unit"], focal_length["needed"]) == ("length", True)
+    assert "f" in focal_length["words"]
+    state, _ = client.until("state")
+    assert state["document"] == json.loads(json.dumps(START.as_json()))
+    message = client.at_rest()
+    assert (message["turn"], message["shape"]) == (7, [PIXELS, PIXELS])
+    client.until("notes")
+
+
+def test_the_picture_is_that_of_capture_upright(client):
+    client.do("hello")
+    while True:
+        message, (data,) = client.until("picture")
+        if not message["coarse"]:
+            break
+    image = camera_of(START).capture(noise())
+    shown = imagecodecs.jpeg_decode(data).astype(float)
+    white = message["white"]
+    exact = np.clip(image.upright().to_numpy() / white, 0, 1)
+    coded = np.where(exact <= 0.0031308, 12.92 * exact, 1.055 * exact ** (1 / 2.4) - 0.055) * 255
+    # JPEG errs by some codes, and a picture upside down is another one.
+    upright, turned = (np.abs(each.mean(axis=2) - coded.mean(axis=2)).mean() for each in (shown, shown[::-1]))
+    assert upright < 8
+    assert turned > 2 * upright
+
+
+def camera_of(document):
+    train = document.train(NOWHERE).train
+    return vcc.Camera(train.elements, train.sensor)
+
+
+def test_a_value_is_that_of_the_pixel(client):
+    client.do("hello")
+    client.until("notes")
+    client.do("value", x=2, y=5)
+    message, _ = client.until("value")
+    values = camera_of(START).capture(noise()).upright().to_numpy()
+    assert message["irradiance"] == pytest.approx(values[5, 2].tolist(), rel=1e-6)
+    client.do("value", x=2, y=PIXELS)
+    assert "has no pixel" in client.until("refused")[0]["words"]
+
+
+def test_what_is_refused_leaves_the_state(client):
+    client.do("hello")
+    client.at_rest()
+    client.do("set", where=["sensor", "z"], value="0.5")
+    refused, _ = client.until("refused")
+    assert refused["where"] == ["sensor", "z"]
+    assert "a length needs a unit" in refused["words"]
+    assert client.session.document == START
+
+
+def test_a_picture_that_cannot_be_made_is_said(client):
+    client.do("hello")
+    client.at_rest()
+    client.do("set", where=["sensor", "electronics"], value={"quantum_efficiency": [0.5, 0.5]})
+    client.until("state")
+    client.do("set", where=["noise"], value=True, turn=3)
+    message = client.at_rest()
+    assert message["is"] == "no picture"
+    assert message["turn"] == 3
+    client.do("undo")
+    assert client.at_rest()["is"] == "picture"
+
+
+def test_noise_is_recorded_and_told(client):
+    client.do("hello")
+    client.do("set", where=["noise"], value=True)
+    assert "has none" in client.until("refused")[0]["words"]
+    client.do("set", where=["sensor", "electronics"], value={})
+    client.do("set", where=["noise"], value=True, turn=5)
+    while client.at_rest()["turn"] != 5:
+        pass
+    client.do("value", x=0, y=0)
+    recorded = client.until("value")[0]["recorded"]
+    assert len(recorded) == 3
+    assert all(isinstance(number, int) and number >= 0 for number in recorded)
+
+
+def test_elements_are_added_copied_and_removed(client):
+    client.do("hello")
+    client.at_rest()
+    client.do("duplicate", element=1)
+    client.until("state")
+    client.do("remove", element=0)
+    client.until("state")
+    client.at_rest()
+    names = [element.get("name") for element in client.session.document.camera["elements"]]
+    assert len(names) == 2
+    assert names[1] == "mask"
+    client.do("remove", element=5)
+    assert "there is no element 5" in client.until("refused")[0]["words"]
+
+
+@pytest.mark.parametrize("kind", list(ELEMENT_KINDS))
+def test_each_kind_can_be_added_and_drawn(client, kind):
+    client.do("add", kind=kind, z="13 mm")
+    state, _ = client.until("state", "refused")
+    assert state["is"] == "state", state
+    drawn = state["side"]["elements"][2]
+    assert (drawn["element"], drawn["kind"]) == (2, kind.replace("_", " "))
+    assert state["document"]["camera"]["elements"][2]["name"]
+
+
+def test_pictures_are_compared_with_the_pinned_one(client):
+    client.do("hello")
+    client.until("notes")
+    client.do("pin", on=True)
+    _, (pinned,) = client.until("pinned")
+    assert imagecodecs.jpeg_decode(pinned).shape == (PIXELS, PIXELS, 3)
+    client.do("set", where=["sensor", "z"], value="54 mm")
+    changed = client.at_rest()
+    values = [camera_of(each).capture(noise()).to_numpy() for each in (START, client.session.document)]
+    difference = float(np.mean(np.square(values[0] - values[1], dtype=np.float64)))
+    white = 1 / auto_exposure(values[0])
+    assert changed["psnr"] == pytest.approx(10 * np.log10(white**2 / difference), abs=1e-3)
+    client.do("undo")
+    same = client.at_rest()
+    assert (same["psnr"], same["same"]) == (None, True)
+
+
+def test_a_click_focuses_on_what_is_there():
+    field = noise(5, 48)
+    client = Client(offered(fields={"noise": Field(field)}))
+    client.do("hello")
+    client.at_rest()
+    client.do("focus", x=12, y=12)
+    client.at_rest()
+    z = client.session.document.train(NOWHERE).train.sensor.z
+    distance = field.distance_of(1.0)
+    assert z == pytest.approx(1 / (1 / 0.05 - 1 / distance), rel=2e-3)
+    client.close()
+
+
+def test_of_what_moves_only_the_newest_counts(client):
+    client.do("hello")
+    client.at_rest()
+    for number in range(500):
+        client.do("set", where=["sensor", "z"], value=f"{52 + number / 250:.3f} mm", moving=True, turn=number + 1)
+    client.do("set", where=["sensor", "z"], value="53.998 mm", turn=1000)
+    assert client.at_rest()["turn"] == 1000
+    client.do("undo")
+    client.at_rest()
+    assert client.session.document == START
+
+
+def test_while_something_moves_few_pictures_are_made_and_the_last_comes_soon(client):
+    """Each picture is held up: those that were asked for meanwhile are never made."""
+    client.do("hello")
+    client.at_rest()
+    turn = client.session._offered.turn
+    with turn:
+        for number in range(100):
+            client.do(
+                "set", where=["sensor", "z"], value=f"{52 + number / 50:.2f} mm", moving=True, turn=number + 1
+            )
+            time.sleep(0.001)
+        client.do("value", x=0, y=0)
+    turns = []
+    while not turns or turns[-1] != 100:
+        turns.append(client.until("picture")[0]["turn"])
+    assert len(turns) <= 3
+
+
+def test_who_sends_too_much_is_not_listened_to(client):
+    client.do("hello")
+    client.at_rest()
+
+    def flood():
+        for number in range(MOST_WAITING + 50):
+            client.do("set", where=["sensor", "z"], value=f"{52 + number % 2} mm")
+
+    with client.session._offered.turn, pytest.raises(Broken, match="messages wait"):
+        flood()
+
+
+@pytest.mark.parametrize("message", [None, [], {}, {"do": "jump"}, {"do": "set", "turn": "1"}, {"do": ["set"]}, 5])
+def test_what_is_no_message_is_broken(client, message):
+    with pytest.raises(Broken):
+        client.session.receive(message)
+
+
+def test_cameras_come_from_text_and_from_the_gallery():
+    client = Client(offered(gallery={"other": START.changed(["sensor", "z"], "55 mm")}))
+    client.do("load", toml='[sensor]\nz = "30 mm"\nshape = [4, 4]\npitch = "1 mm"\n')
+    client.until("state")
+    assert client.session.document.camera["sensor"]["z"] == "30 mm"
+    client.do("load", toml="[sensor")
+    assert "not valid TOML" in client.until("refused")[0]["words"]
+    client.do("load", toml='[sensor]\nz = 1979-05-27\nshape = [4, 4]\npitch = "1 mm"\n')
+    assert client.until("refused", "state")[0]["is"] == "refused"
+    client.do("load", gallery="other")
+    client.until("state")
+    assert client.session.document.camera["sensor"]["z"] == "55 mm"
+    client.do("load", gallery="none")
+    assert "there is no camera" in client.until("refused")[0]["words"]
+    client.do("load", document={"camera": CAMERA, "light_field": "sunset"})
+    assert "there is no light field" in client.until("refused")[0]["words"]
+    client.close()
+
+
+def test_a_document_of_a_link_is_taken_or_refused(client):
+    moved = START.changed(["sensor", "z"], "54 mm")
+    client.do("hello", document=moved.as_json())
+    client.until("state")
+    assert client.session.document == moved
+    client.do("hello", document={"camera": 5})
+    assert "document" in client.until("refused")[0]["words"]
+    client.until("state")
+
+
+def test_answers(client):
+    client.do("hello")
+    client.at_rest()
+    client.do("ask", what="explain")
+    assert "folded into one matrix" in client.until("answer")[0]["words"]
+    client.do("ask", what="point spread", distance="1 m")
+    told, (picture,) = client.until("answer")
+    assert list(imagecodecs.jpeg_decode(picture).shape[:2]) == told["shape"]
+    client.do("ask", what="mtf", distance="0.6 m")
+    curve = np.array(client.until("answer")[0]["across"])
+    # a disc of light w wide, by similar triangles of the cone behind the lens: |2·J₁(π·w·f)/(π·w·f)|
+    width = 18 * 52 * abs(1 / 600 + 1 / 52 - 1 / 50)
+    argument = np.pi * width * np.maximum(curve[:, 0], 1e-9)
+    # pixels an eighth as wide take up to 1 − sinc(1/8) = 2.6 % of what is left
+    assert np.abs(curve[:, 1] - np.abs(2 * scipy.special.j1(argument) / argument)).max() < 0.026
+    client.do("ask", what="phase space")
+    planes, pictures = client.until("answer")
+    assert len(planes["planes"]) == len(pictures) == 4
+    client.do("ask", what="why")
+    assert "a bench is asked for" in client.until("refused")[0]["words"]
+
+
+# --- exports ---
+
+
+def exported(client, what):
+    client.do("export", what=what)
+    message, (data,) = client.until("file")
+    return message["name"], data
+
+
+DOCUMENTS = {
+    "lens and mask": START,
+    "views and exposure": Document.of_json(
+        START.as_json() | {"views": {"rows": [0, 1], "columns": [1, 2]}, "exposure": 0.2}
+    ),
+    "an array": START.changed(["elements", 1, "pattern"], {"name": "mura", "prime": 13}).changed(
+        ["elements", 1, "width"], "14.7 mm"
+    ),
+    "noise behind a filter": START.changed(["sensor", "electronics"], {"color_filter": "RGGB"}).changed(
+        ["noise"], True
+    ),
+}
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_the_program_makes_the_identical_picture(name, tmp_path, monkeypatch):
+    client = Client()
+    client.do("hello", document=DOCUMENTS[name].as_json())
+    assert client.at_rest()["is"] == "picture"
+    stated, program = exported(client, "python")
+    _, picture = exported(client, "png")
+    client.close()
+    if stated.endswith(".zip"):
+        zipfile.ZipFile(io.BytesIO(program)).extractall(tmp_path)
+    else:
+        (tmp_path / "picture.py").write_bytes(program)
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.ResultWarning)  # of rays that are missing
+        runpy.run_path("picture.py")
+    assert (tmp_path / "picture.png").read_bytes() == picture
+
+
+def test_the_camera_file_gives_the_same_camera(client, tmp_path):
+    client.do("hello")
+    client.at_rest()
+    name, data = exported(client, "toml")
+    (tmp_path / name).write_bytes(data)
+    assert vcc.load_camera(tmp_path / name) == camera_of(START)
+    name, data = exported(client, "exr")
+    (tmp_path / name).write_bytes(data)
+    exact = camera_of(START).capture(noise()).to_numpy()
+    assert np.array_equal(vcc.load_image(tmp_path / name).upright().to_numpy(), exact[::-1, ::-1])
+    client.do("export", what="docx")
+    assert "a bench exports" in client.until("refused")[0]["words"]
+
+
+# --- pictures ---
+
+
+def test_the_pace_is_kept_for_each_kind_of_camera():
+    pace, taken = Pace(), take(START.train(NOWHERE).train, Field(noise()), START)
+    assert pace.fineness("new") == COARSER[0]
+    pace.noted("quick", WHOLE, timed(taken, 0.01))
+    assert pace.fineness("quick") == WHOLE
+    pace.noted("slow", WHOLE, timed(taken, 0.19))
+    assert pace.fineness("slow") == COARSER[0]
+    pace.noted("slower", WHOLE, timed(taken, 100.0))
+    assert pace.fineness("slower") == COARSER[-1]
+    for _ in range(60):
+        pace.noted("slower", COARSER[-1], timed(taken, 1e-4))
+    assert pace.fineness("slower") == WHOLE
+
+
+def timed(taken, seconds):
+    return Taken(taken.image, None, taken.plan, taken.found, False, seconds)
+
+
+@pytest.mark.parametrize("fineness", COARSER)
+def test_a_coarse_picture_is_the_picture_with_fewer_pixels(fineness):
+    # light as even as it gets: each pixel's irradiance is that of the whole picture there, whatever the pixels
+    values = np.full((8, 8, 48, 48), 0.5, np.float32)
+    field = Field(noise(8, 48).replaced(values))
+    document = START.changed(["elements"], [{"kind": "lens", "z": "0 mm", "focal_length": "50 mm"}])
+    train = document.train(NOWHERE).train
+    whole, coarse = (take(train, field, document, each).values for each in (WHOLE, fineness))
+    assert coarse.shape[0] == PIXELS // fineness.pixels
+    middle = coarse.shape[0] // 2
+    assert coarse[middle, middle] == pytest.approx(whole[PIXELS // 2, PIXELS // 2], rel=0.02)
+
+
+# --- sequences ---
+
+ACTIONS = some.one_of(
+    some.tuples(some.just("set"), some.integers(40, 60), some.booleans()),
+    some.tuples(some.sampled_from(["undo", "redo", "add", "remove", "duplicate", "bad", "views"])),
+)
+
+
+@given(some.lists(ACTIONS, min_size=1, max_size=12))
+@settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
+def test_document_and_picture_stay_consistent(actions):
+    """After any sequence of messages the last picture is that of the document that was told last."""
+    client = Client(offered())
+    for turn, (what, *more) in enumerate(actions, start=1):
+        if what == "set":
+            client.do("set", where=["sensor", "z"], value=f"{more[0]} mm", moving=more[1], turn=turn)
+        elif what == "add":
+            client.do("add", kind="mask", z="10 mm", turn=turn)
+        elif what in ("remove", "duplicate"):
+            client.do(what, element=0, turn=turn)
+        elif what == "bad":
+            client.do("set", where=["sensor", "z"], value="far", turn=turn)
+        elif what == "views":
+            client.do("set", where=["views"], value={"rows": [0, 0], "columns": [0, 2]}, turn=turn)
+        else:
+            client.do(what, turn=turn)
+    client.do("set", where=["exposure"], value=0.25, turn=99)
+    while client.at_rest()["turn"] != 99:
+        pass
+    client.until("notes")
+    document = client.session.document
+    client.do("value", x=3, y=4)
+    told = client.until("value")[0]["irradiance"]
+    field = noise() if document.views is None else noise()[document.views.slices]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.ResultWarning)  # of rays that are missing
+        expected = camera_of(document).capture(field).upright().to_numpy()[4, 3]
+    assert told == pytest.approx(expected.tolist(), rel=1e-6)
+    client.do("undo")
+    client.do("redo")
+    client.do("value", x=3, y=4)
+    client.until("value")
+    assert client.session.document == document
+    client.close()
