@@ -36,8 +36,6 @@ def ran(name: str) -> dict[str, Any]:
     names: dict[str, Any] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # learned and plenoptic cameras ask for a little more than 9×9 views hold, and say so
-        warnings.simplefilter("ignore", vcc.ResultWarning)
         names["ran"] = list(pages()["run"](name, names, shown))
     return names
 

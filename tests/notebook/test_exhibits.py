@@ -15,10 +15,12 @@ import pytest
 import torch
 
 import vcc
-from vcc import analysis, kernels, patterns, recover, surfaces
+from vcc import analysis, gallery, kernels, patterns, recover, surfaces
 from vcc.files.transfer import encode, from_linear
 from vcc.notebook.pictures import GAP, LARGEST_SIDE, MOST_BYTES
 from vcc.plot import plot_element
+from vcc.sources import PlanesScene, TexturedPlane
+from vcc.sources.textures import Waves
 from vcc.store import open_store, save_store
 from vcc.store.reading import StoredLightField
 from vcc.units import mm, um
@@ -122,6 +124,34 @@ def test_each_thing_shows_itself_in_little_room(name):
     assert sum(len(base64.b64decode(each)) for each in pictures) < MOST_BYTES
     # no wall of numbers: rows of a matrix would stand here
     assert not re.search(r"(-?\d+\.\d+[,\s]+){8}", "".join(shown.itertext()))
+
+
+OTHERS = {
+    "stages": CAMERA.stages,
+    "faces": LENS.faces(),
+    "grid": FIELD.grid,
+    "ray map": CAMERA.rays_at(52 * mm),
+    "operator": CAMERA.operator(FIELD),
+    "adjoint": CAMERA.operator(FIELD).T,
+    "disparities": FIELD.disparity,
+    "scene": PlanesScene([TexturedPlane(Waves(0.1), 1.0), TexturedPlane(Waves(0.1), 2.0)]),
+    "refocuser": analysis.Refocuser(FIELD),
+    "entry": gallery.entry("plenoptic"),
+    "elements": CAMERA.elements,
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_shows_its_words_alone_needs_few(name):
+    text = repr(OTHERS[name])
+    assert len(text) < 600, text
+    assert text.count("\n") < 6
+    assert " object at 0x" not in text
+
+
+def test_what_was_saved_is_said_in_a_line(tmp_path):
+    saved = THINGS["image"].save(tmp_path / "picture.png")
+    assert saved.description.replace(" um", " µm") in words(saved)
 
 
 def test_only_what_is_asked_for_is_given():

@@ -128,6 +128,9 @@ class Refocuser:
         self._spectrum = np.zeros(shape, dtype=np.complex64)
         self._fill()
 
+    def __repr__(self) -> str:
+        return f"Refocuser({self.light_field!r})"
+
     def _fill(self) -> None:
         values = to_numpy(self.light_field.values)
         scale = np.float32(1 / self.light_field.full_scale)

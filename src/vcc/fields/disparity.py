@@ -136,6 +136,12 @@ class Disparities:
             return self
         return Disparities(self._maps, self._find or find, self._measure or measure, self._whole)
 
+    def __repr__(self) -> str:
+        if self._maps is not None:
+            return f"Disparities({self._maps!r})"
+        state = "known with the whole" if self.known else "not looked for yet"
+        return f"Disparities({state}: .range() and .maps() tell)"
+
     @property
     def known(self) -> bool:
         """Whether the maps are there without further work."""

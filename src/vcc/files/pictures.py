@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.reading import check_file
+from vcc.base.showing import Shown
 from vcc.files import transfer
 from vcc.files.destination import Destination, Target
 from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_png
@@ -146,7 +147,7 @@ def refuse_coded(path: Path, wanted: str) -> None:
 
 
 @dataclass(frozen=True)
-class SavedPicture:
+class SavedPicture(Shown):
     """What was written: where, with which exposure, and a line that says so to a person.
 
     Args:

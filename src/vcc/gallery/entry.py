@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -123,9 +123,9 @@ class Entry:
 
     name: str
     title: str
-    citation: str
-    claim: str
-    runner: Callable[[Bench, Progress], Result]
+    citation: str = field(repr=False)
+    claim: str = field(repr=False)
+    runner: Callable[[Bench, Progress], Result] = field(repr=False)
 
     def run(self, light_field: Path | LightField | None = None, progress: Progress | None = None) -> Result:
         """Take a light field through the camera and its decoder, and measure.

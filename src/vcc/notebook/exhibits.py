@@ -26,6 +26,7 @@ from vcc.base.describe import kind_in_words, parameters_listed
 from vcc.base.errors import InputError
 from vcc.base.units import mm, short, um
 from vcc.fields.sampled import has_values
+from vcc.files.pictures import SavedPicture
 from vcc.files.transfer import encode
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -266,6 +267,11 @@ def _(explanation: Explanation) -> Exhibit:
 def _(advice: SamplingAdvice) -> Exhibit:
     panels, failed = _drawing(advice.plot)
     return Exhibit("SamplingAdvice", "", panels, text=str(advice) + failed)
+
+
+@exhibit.register
+def _(saved: SavedPicture) -> Exhibit:
+    return Exhibit("SavedPicture", saved.description)
 
 
 # --- what is found ---

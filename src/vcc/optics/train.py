@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.base.units import short
@@ -25,8 +26,8 @@ from vcc.optics.sensor import Sensor
 from vcc.shapes.patterns import owned
 
 
-@dataclass(frozen=True, eq=False)
-class Stage:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stage(Brief):
     """One thing that light meets on its way through a camera.
 
     Args:

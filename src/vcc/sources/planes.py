@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from vcc.base import checks, late
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
+from vcc.base.units import short
+from vcc.base.words import first_few
 from vcc.base.workers import Workers
 from vcc.light_field import LightField
 from vcc.plan.how import cores
@@ -220,6 +222,9 @@ class PlanesScene:
         self._kept: tuple[_GridAround, NDArray[np.float32]] | None = None
         if not self.planes:
             raise InputError("a scene needs at least one plane")
+
+    def __repr__(self) -> str:
+        return f"PlanesScene(planes at {first_few(map(short, self.distances), len(self.planes))})"
 
     @property
     def distances(self) -> tuple[float, ...]:

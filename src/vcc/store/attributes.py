@@ -12,6 +12,7 @@ import numpy as np
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Sample
 
@@ -30,8 +31,8 @@ DTYPES = ("uint8", "uint16", "float16", "float32")
 Transfer = Literal["linear", "srgb"]
 
 
-@dataclass(frozen=True, eq=False)
-class Attributes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Attributes(Brief):
     """The attributes of a store.
 
     Args:
