@@ -27,7 +27,7 @@ def test_what_is_expected_of_one_sharp_picture_is_wieners_error(example):
     squared = frequencies[:, None] ** 2 + frequencies**2
     power = example["CONTRAST"] ** 2 / squared[squared > 0]
     left = (power * NOISE**2 / (power + NOISE**2)).sum() / 256
-    found = example["expected_decibels"](sharp[None], sharp)
+    (found,) = example["expected_decibels"](sharp[None], sharp)
     assert float(found) == pytest.approx(-10 * math.log10(left), abs=1e-5)
 
 
@@ -41,11 +41,19 @@ def test_pictures_that_differ_cost_what_one_filter_cannot_undo(example):
     squared[0, 0] = np.inf
     power, alike = example["CONTRAST"] ** 2 / squared, np.cos(2 * np.pi * frequencies) ** 2
     left = (power * (1 - power * alike / (power + NOISE**2))).sum() / 256
-    assert float(example["expected_decibels"](moved, sharp)) == pytest.approx(-10 * math.log10(left), abs=1e-9)
+    both = example["expected_decibels"](moved, sharp)
+    assert both.tolist() == pytest.approx([-10 * math.log10(left)] * 2, abs=1e-9)
+
+
+def test_the_worst_depth_counts_most(example):
+    decibels = torch.tensor([20.0, 24.0, 30.0], dtype=torch.float64, requires_grad=True)
+    example["worst"](decibels).backward()
+    shares = np.exp(-example["WORST"] * np.array([20.0, 24.0, 30.0]))
+    assert decibels.grad.tolist() == pytest.approx((shares / shares.sum()).tolist())
 
 
 def test_a_plate_is_learned_from_next_to_none(example):
-    """Light moves by a fifth of a pixel at most, first; in six steps four starts gained 2.5 to 3.7 dB."""
+    """Light moves by a fifth of a pixel at most, first; in six steps four starts gained 2.0 to 2.8 dB at worst."""
     effort = replace(example["QUICK"], measured=Sizes(depths=3, target=64), frame=20, rays=128, steps=6)
     pair = example["gallery_pair"](effort.measured)
     start = example["next_to_none"](effort.points, 1)
@@ -53,4 +61,4 @@ def test_a_plate_is_learned_from_next_to_none(example):
     moved = np.abs(start.slopes(places[None], places[:, None])) / pair.comparison.slope
     assert moved.max() < 0.2
     learned = example["learned"](pair.comparison, pair.plain, start, "paths", effort)
-    assert learned.curve[-1] > learned.curve[0] + 1.5
+    assert min(learned.curve[-1]) > min(learned.curve[0]) + 1.5
