@@ -10,7 +10,7 @@ from typing import Any, Literal, Self, TypeVar, Unpack
 from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
 from vcc.advice.darkness import why_dark
 from vcc.advice.explain import Explanation, explained
-from vcc.base import checks
+from vcc.base import checks, late
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
@@ -348,6 +348,23 @@ class Camera(Train):
     def plot(self, **options: Any) -> Any:
         """Draw the axis, the elements, the sensor and fans of rays. See `vcc.plot.plot_camera`."""
         return plot_camera(self, **options)
+
+    def bench(self, light_field: InMemory) -> Any:
+        """This camera on the optical bench, in a notebook: move its elements, and see the picture follow.
+
+        The widget's ``camera`` is the camera as it stands on the bench at that moment; this one stays as it is.
+
+        Args:
+            light_field: given at the entrance plane, in memory.
+
+        Returns:
+            A widget, which the last line of a cell shows (Jupyter, VS Code, marimo).
+
+        Raises:
+            InputError: the package anywidget is not installed (extra ``notebook``), a light field that is not in
+                memory, or a camera that no file can hold: functions of Python, elements of your own.
+        """
+        return late.module("vcc.bench.widget").bench_of(self, light_field)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.camera_file`."""

@@ -84,6 +84,10 @@ BY_NAME = {
 }
 """Modules that load others by names in strings, and why."""
 
+UPWARDS = {"camera": "bench.widget"}
+"""What names something that stands above it: `vcc.Camera.bench` is a verb of cameras, and the bench is built on
+all that there is. It is loaded when it is called, and left out of the graph."""
+
 NEVER = {"torch", "deepinv", "jax", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""
 
@@ -116,6 +120,7 @@ LATE = {
     "jinja2",
     "tomli_w",
     "cyclopts",
+    "anywidget",
     "starlette",
     "uvicorn",
     "websockets",
@@ -189,6 +194,7 @@ def graph() -> dict[str, set[str]]:
     for module in INSIDE:
         listed = {target for name, _ in imports(MODULES[module]) if (target := own(name))}
         by_name = named(MODULES[module]) if module in BY_NAME else set()
+        assert UPWARDS.get(module) not in listed
         found[module] = {target for target in listed | by_name if target in MODULES and target != module}
     return found
 

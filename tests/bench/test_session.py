@@ -187,7 +187,7 @@ def test_while_something_moves_few_pictures_are_made_and_the_last_comes_soon(cli
     """Each picture is held up: those that were asked for meanwhile are never made."""
     client.do("hello")
     client.at_rest()
-    turn = client.session._offered.turn
+    turn = client.session.offered.turn
     with turn:
         for number in range(100):
             client.do(
@@ -209,7 +209,7 @@ def test_who_sends_too_much_is_not_listened_to(client):
         for number in range(MOST_WAITING + 50):
             client.do("set", where=["sensor", "z"], value=f"{52 + number % 2} mm")
 
-    with client.session._offered.turn, pytest.raises(Broken, match="messages wait"):
+    with client.session.offered.turn, pytest.raises(Broken, match="messages wait"):
         flood()
 
 

@@ -80,10 +80,13 @@ class Session:
     Args:
         offered: what there is.
         send: tells the client.
+
+    Attributes:
+        offered: as given.
     """
 
     def __init__(self, offered: Offered, send: Send) -> None:
-        self._offered, self._send = offered, send
+        self.offered, self._send = offered, send
         self._history = History(offered.start)
         self._described = offered.start.train(offered.beside)
         self._inbox: deque[tuple[Json, list[bytes]]] = deque()
@@ -182,11 +185,11 @@ class Session:
         self._tell(
             {
                 "is": "parts",
-                "light_fields": list(self._offered.fields),
+                "light_fields": list(self.offered.fields),
                 "kinds": additions.kinds(),
                 "sensor": additions.sensor_parameters(),
                 "families": additions.families(),
-                "gallery": list(self._offered.gallery),
+                "gallery": list(self.offered.gallery),
             }
         )
         given = message.get("document")
@@ -244,11 +247,9 @@ class Session:
             document = replace(self._history.present, camera=tables_of_text(message["toml"]))
         elif "gallery" in message:
             title = message["gallery"]
-            if not isinstance(title, str) or title not in self._offered.gallery:
-                raise InputError(
-                    f"there is no camera {shown(title)}: there are {', '.join(self._offered.gallery)}"
-                )
-            document = self._offered.gallery[title]
+            if not isinstance(title, str) or title not in self.offered.gallery:
+                raise InputError(f"there is no camera {shown(title)}: there are {', '.join(self.offered.gallery)}")
+            document = self.offered.gallery[title]
         else:
             document = Document.of_json(message.get("document"))
         self._show(document, message)
@@ -272,14 +273,14 @@ class Session:
 
     def _show_again(self, message: Json) -> None:
         """Show what history gives, which was shown before."""
-        self._described = self._history.present.train(self._offered.beside)
+        self._described = self._history.present.train(self.offered.beside)
         self._tell_state()
         self._wanted = Wanted(_turn(message), moving=False)
 
     def _checked(self, document: Document) -> tuple[Document, TrainAsWritten]:
-        document = document.settled(self._offered.beside)
-        described = document.train(self._offered.beside)
-        field = self._offered.field(document.light_field)
+        document = document.settled(self.offered.beside)
+        described = document.train(self.offered.beside)
+        field = self.offered.field(document.light_field)
         if document.views is not None and field.is_open:
             document.views.check(field.whole().shape)
         if document.noise and described.train.sensor.electronics is None:
@@ -298,14 +299,14 @@ class Session:
 
     def _light_field(self) -> LightField:
         document = self._history.present
-        whole = self._offered.field(document.light_field).whole(self._progress)
+        whole = self.offered.field(document.light_field).whole(self._progress)
         return whole if document.views is None else whole[document.views.slices]
 
     # --- what is told ---
 
     def _tell_state(self) -> None:
         document = self._history.present
-        field = self._offered.field(document.light_field)
+        field = self.offered.field(document.light_field)
         grid, seen = None, None
         if field.is_open:
             grid = field.whole().grid
@@ -329,7 +330,7 @@ class Session:
     def _make_picture(self) -> None:
         wanted, document = self._wanted, self._history.present
         assert wanted is not None
-        field = self._offered.field(document.light_field)
+        field = self.offered.field(document.light_field)
         if not field.is_open:
             self._tell({"is": "progress", "done": 0, "total": 1, "words": "Opening the light field"})
             try:
@@ -357,13 +358,13 @@ class Session:
 
     def _take(self, fineness: Fineness) -> Taken:
         document = self._history.present
-        field = self._offered.field(document.light_field)
-        while not self._offered.turn.acquire(timeout=0.05):
+        field = self.offered.field(document.light_field)
+        while not self.offered.turn.acquire(timeout=0.05):
             self._check_wanted()
         try:
             return take(self._described.train, field, document, fineness, self._check_wanted)
         finally:
-            self._offered.turn.release()
+            self.offered.turn.release()
 
     def _no_picture(self, wanted: Wanted, error: InputError) -> None:
         self._wanted, self._taken = None, None
@@ -461,8 +462,8 @@ class Session:
 
     def _do_export(self, message: Json) -> None:
         document = self._history.present
-        field = self._offered.field(document.light_field)
-        bench = export.OnBench(document, self._described.train, field.source, self._offered.beside)
+        field = self.offered.field(document.light_field)
+        bench = export.OnBench(document, self._described.train, field.source, self.offered.beside)
         taken = self._whole_picture() if message.get("what") in ("png", "exr") else None
         name, kind, data = export.exported(message.get("what"), bench, taken, self._shown_white)
         self._tell({"is": "file", "name": name, "type": kind}, [data])

@@ -1,0 +1,84 @@
+"""The bench in a notebook: the same front end, carried by anywidget (Jupyter, VS Code, marimo)."""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from vcc.base import checks
+from vcc.base.errors import InputError
+from vcc.bench.document import Document
+from vcc.bench.offered import Field, Offered
+from vcc.bench.session import Broken, Session
+from vcc.camera import Camera
+from vcc.fields.samples import check_is_light_field
+from vcc.files.camera_reading import Beside
+from vcc.files.camera_writing import tables_of_train
+from vcc.light_field import LightField
+from vcc.optics.train import Train
+
+NAME = "light field"
+"""What the light field of a notebook is called on a bench."""
+
+
+def bench_of(camera: Train, light_field: LightField) -> Any:
+    """A camera on the bench, as a widget; see `vcc.Camera.bench`."""
+    check_is_light_field(light_field)
+    if not isinstance(light_field, LightField):
+        raise InputError("the bench takes light fields in memory: pass stored.read(), or a part, stored[a:b, c:d]")
+    return _kind()(_offered(camera, light_field))
+
+
+def _offered(camera: Train, light_field: LightField) -> Offered:
+    # No file beside it is read: what a camera of Python's holds is in memory.
+    nowhere = Path(tempfile.gettempdir()) / "no-such-folder"
+    tables, arrays = tables_of_train(camera, nowhere / "camera.toml")
+    document = Document({"elements": [], **tables}, NAME)
+    return Offered({NAME: Field(light_field)}, document, Beside(nowhere, frozenset(), arrays))
+
+
+@functools.cache
+def _kind() -> Any:
+    """The class of the widget, made when there is anywidget to make it of."""
+    with checks.package("the bench in a notebook", "anywidget", "notebook"):
+        import anywidget
+
+    class Bench(anywidget.AnyWidget):  # type: ignore[misc]
+        """A camera on the optical bench, in a cell.
+
+        Args:
+            offered: what there is.
+        """
+
+        _esm = (resources.files("vcc.bench") / "static" / "bench.js").read_text(encoding="utf-8")
+
+        def __init__(self, offered: Offered) -> None:
+            super().__init__()
+            self._session = Session(offered, self._tell)
+            self.on_msg(self._hear)
+
+        @property
+        def camera(self) -> Camera:
+            """The camera as it now stands on the bench."""
+            train = self._session.document.train(self._session.offered.beside).train
+            return Camera(train.elements, train.sensor)
+
+        def close(self) -> None:
+            """End, and take the bench out of the notebook."""
+            self._session.close()
+            super().close()
+
+        def _tell(self, message: dict[str, Any], buffers: Sequence[bytes]) -> None:
+            self.send(message, list(buffers) or None)
+
+        def _hear(self, _: Any, message: Any, buffers: Sequence[Any] | None) -> None:
+            try:
+                self._session.receive(message, [bytes(each) for each in buffers or ()])
+            except Broken:
+                self.close()
+
+    return Bench
