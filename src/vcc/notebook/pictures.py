@@ -17,7 +17,7 @@ from vcc.plot import style
 
 LARGEST_SIDE = 720
 """Pixels of a picture; a larger one is averaged down by a whole factor."""
-MOST_BYTES = 450_000
+MOST_BYTES = 520_000
 """Of the PNG files of one exhibit, all together."""
 MAGNIFIED_TO = 320
 """Pictures narrower than half of this are magnified by a whole factor, up to this."""
@@ -140,12 +140,16 @@ def drawn(draw: Callable[[], Any], caption: str = "") -> Panel:
     figure = getattr(made, "figure", None) or made
     from PIL import Image
 
-    stream, small = BytesIO(), BytesIO()
-    figure.savefig(stream, format="png", dpi=DOTS, facecolor="white")
-    # A drawing has few colours, and takes half the bytes by numbers of them.
-    Image.open(stream).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(small, "png")
-    inches = figure.get_size_inches()[0]
-    return Panel(small.getvalue(), round(inches * SHOWN_DOTS), caption, paper=True)
+    png = b""
+    for dots in (DOTS, SHOWN_DOTS):
+        stream, small = BytesIO(), BytesIO()
+        figure.savefig(stream, format="png", dpi=dots, facecolor="white")
+        # A drawing has few colours, and takes half the bytes by numbers of them.
+        Image.open(stream).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(small, "png")
+        png = small.getvalue()
+        if len(png) <= MOST_BYTES // 2:
+            break
+    return Panel(png, round(figure.get_size_inches()[0] * SHOWN_DOTS), caption, paper=True)
 
 
 def map_panel(values: Array, label: str, caption: str = "", *, outliers: bool = True) -> Panel:
