@@ -3,6 +3,7 @@
     pip install ".[torch]"
     python benchmarks/gradcheck.py                  # some minutes; exit code 1 where one fails
     python benchmarks/gradcheck.py --kind axicon    # one element
+    python benchmarks/gradcheck.py --between auto   # an hour: with views in between, a thousand taps instead of 16
 
 Cameras are those of the page's table (docs/learning_table.py), before a light field of random samples; pictures
 by the reference, in double precision, by footprints and by rays. Each parameter is checked by itself: all its
@@ -35,7 +36,7 @@ TABLE = runpy.run_path(str(Path(__file__).resolve().parents[1] / "docs" / "learn
 ELEMENTS = TABLE["ELEMENTS"]
 STEP = {"footprints": 1e-5, "rays": 1e-8}
 VALUES = np.random.default_rng(0).random((4, 4, 10, 10))
-FIELD = vcc.LightField.from_views(VALUES, 1.5 * mm, 2.5e-3, 1.0, (-0.3, 0.3), sample="point")
+FIELD = vcc.LightField.from_views(VALUES, 2.25 * mm, 2.5e-3, 1.0, (-0.3, 0.3), sample="point")
 
 
 def passes(camera: vcc.Camera, name: str, how: vcc.How) -> bool:
@@ -59,6 +60,7 @@ def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kind", choices=list(ELEMENTS))
+    parser.add_argument("--between", choices=["none", "auto"], default="none", help="see between_views of capture")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     print("| element | by | exact | pass | which do not |\n|---|---|---|---|---|")
@@ -68,7 +70,8 @@ def main() -> int:
         # Not at the end of what a fill factor may be, beside which there are no differences.
         camera = vcc.Camera(camera.elements, replace(camera.sensor, fill_factor=0.8))
         for method in ("footprints", "rays"):
-            how = vcc.How(method=method, samples=16 if method == "rays" else None, engine="reference")
+            by = {"samples": 16} if method == "rays" else {"between_views": given.between}
+            how = vcc.How(method=method, engine="reference", **by)
             exact = [name for name in names(camera) if verdict(camera, FIELD.grid, name, how).kind == "exact"]
             if method == "footprints" and not exact:
                 continue

@@ -81,7 +81,7 @@ def backlight(direction: tuple[int, int], cells: tuple[int, int]) -> vcc.LightFi
     t, s = (step * STEP for step in direction)
     ray_from_index = np.array([[0, 0, CELL, 0], [0, 0, 0, CELL], [THIN, 0, 0, 0], [0, THIN, 0, 0]])
     first = np.array([-(columns - 1) / 2 * CELL, -(rows - 1) / 2 * CELL, s, t])
-    radiance = np.full((1, 1, rows, columns), 1 / THIN**2)
+    radiance = np.full((1, 1, rows, columns), 1 / THIN**2, np.float32)
     return vcc.LightField(radiance, vcc.Affine.from_parts(ray_from_index, first), disparity_range=(0, 0))
 
 
