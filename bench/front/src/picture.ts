@@ -319,7 +319,7 @@ export class PictureView extends Part {
           <button class="icon" title="Larger (+)" aria-label="Zoom in" @click=${() => this.zoomTo(this.zoom * 1.5)}>${sign("plus")}</button>
           <button class="icon" title="All of it (0)" aria-label="The whole picture" @click=${() => this.zoomTo(1)}>${sign("whole")}</button>
         </div>
-        <button aria-pressed=${this.aiming} title="Click into the picture to focus there: the sensor moves" @click=${() => (this.aiming = !this.aiming)}>${sign("aim")}Click to focus</button>
+        <button aria-pressed=${this.aiming} aria-label="Click to focus" title="Click into the picture to focus there: the sensor moves" @click=${() => (this.aiming = !this.aiming)}>${sign("aim")}<span class="short">Focus</span><span class="long">Click to focus</span></button>
         ${this.exposure()}
         <label class="check" title="Noise of the sensor's electronics"><input type="checkbox" .checked=${bench.document?.noise ?? false}
           @change=${(event: Event) => bench.set(["noise"], (event.target as HTMLInputElement).checked)}>Noise</label>
@@ -353,8 +353,8 @@ export class PictureView extends Part {
     const fixed = bench.document?.exposure ?? null;
     const white = bench.picture?.about.white ?? 0;
     return html`<div class="group">
-      <label class="check" title="Brightness is kept as it is now, so that it does not jump"><input type="checkbox" .checked=${fixed !== null}
-        @change=${(event: Event) => bench.set(["exposure"], (event.target as HTMLInputElement).checked ? white : null)}>Fix exposure</label>
+      <label class="check" title="Brightness is kept as it is now, so that it does not jump"><input type="checkbox" aria-label="Fix exposure" .checked=${fixed !== null}
+        @change=${(event: Event) => bench.set(["exposure"], (event.target as HTMLInputElement).checked ? white : null)}><span class="long">Fix exposure</span><span class="short">Exposure</span></label>
       ${fixed === null ? nothing : html`
         <button class="icon" aria-label="Darker" title="Darker" @click=${() => bench.set(["exposure"], fixed * Math.SQRT2)}>${sign("minus")}</button>
         <button class="icon" aria-label="Brighter" title="Brighter" @click=${() => bench.set(["exposure"], fixed / Math.SQRT2)}>${sign("plus")}</button>`}
@@ -389,7 +389,9 @@ export class PictureView extends Part {
   static override styles = [
     controls,
     css`
-      :host { display: flex; flex-direction: column; min-height: 0; min-width: 0; }
+      :host { display: flex; flex-direction: column; min-height: 0; min-width: 0; container-type: inline-size; }
+      .short { display: none; }
+      @container (max-width: 540px) { .short { display: inline; } .long { display: none; } .bar { gap: 2px 2px; } }
       .bar { display: flex; flex-wrap: wrap; align-items: center; gap: 2px 8px; padding: 6px 8px; }
       .group { display: flex; align-items: center; gap: 2px; }
       .spring { flex: 1; }

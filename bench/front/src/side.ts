@@ -43,6 +43,11 @@ function wide(words: string, bold = false): number {
   return pencil.measureText(words).width;
 }
 
+/** What a fan of rays is called where there is little room: "in focus: 1.3 m", "off the axis". */
+function brief({ colour, words }: Rays): string {
+  return colour === "off axis" ? "off the axis" : words.replace(/ away$/, "");
+}
+
 export class SideView extends Part {
   static override properties = { ...Part.properties, width: { state: true }, height: { state: true }, drag: { state: true }, hover: { state: true } };
   declare width: number;
@@ -235,7 +240,7 @@ export class SideView extends Part {
         ${this.drawDistances(side, scale)}
       </svg>
       <ul class="legend">
-        ${side.rays.map((each) => html`<li><i class="ray ${each.colour.replace(" ", "-")}"></i>${each.words}</li>`)}
+        ${side.rays.map((each) => html`<li><i class="ray ${each.colour.replace(" ", "-")}"></i>${brief(each)}</li>`)}
       </ul>`;
   }
 
