@@ -404,3 +404,72 @@ def test_document_and_picture_stay_consistent(actions):
     client.until("value")
     assert client.session.document == document
     client.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "noun"),
+    [("mask", "pattern", "pattern"), ("diffuser", "kernel", "kernel"), ("phase_plate", "surface", "surface")],
+)
+def test_what_is_chosen_by_name_alone_gets_what_it_needs(client, kind, field, noun):
+    client.do("hello")
+    parts, _ = client.until("parts")
+    client.until("state")
+    client.do("add", kind=kind, z="30 mm")
+    client.until("state")
+    for one in parts["families"][noun]:
+        client.do("set", where=["elements", 2, field], value={"name": one["kind"]})
+        message, _ = client.until("state")  # none is refused
+        given = message["document"]["camera"]["elements"][2][field]
+        assert set(given) >= {each["name"] for each in one["parameters"] if each["needed"]}
+
+
+def test_a_mask_that_becomes_cells_gets_a_width(client):
+    client.do("hello")
+    client.until("state")
+    client.do("set", where=["elements", 1, "pattern"], value=[[0, 1], [1, 1]])
+    table = client.until("state")[0]["document"]["camera"]["elements"][1]
+    assert table["pattern"] == [[0, 1], [1, 1]]
+    assert 18 < float(table["width"].removesuffix(" mm")) < 24  # between the lens and the sensor
+    client.do("undo")
+    assert client.until("state")[0]["document"] == json.loads(json.dumps(START.as_json()))  # one step
+
+
+def test_a_picture_is_brought_as_a_pattern(client):
+    client.do("hello")
+    client.until("state")
+    grey = np.array([[0, 51, 255], [255, 102, 0]], np.uint8)
+    where = ["elements", 1, "pattern"]
+    client.session.receive({"do": "upload", "where": where, "name": "a.png"}, [imagecodecs.png_encode(grey)])
+    table = client.until("state")[0]["document"]["camera"]["elements"][1]
+    assert table["pattern"] == [[0.0, 0.2, 1.0], [1.0, 0.4, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "words"),
+    [
+        ("a.png", b"no picture", "a.png"),
+        ("a.png", imagecodecs.png_encode(np.zeros((129, 128), np.uint8)), "129×128"),
+        ("../a.toml", b"", "a.toml"),
+        (None, b"", "with its name"),
+    ],
+)
+def test_what_is_no_pattern_is_refused(client, name, data, words):
+    client.do("hello")
+    client.session.receive({"do": "upload", "where": ["elements", 1, "pattern"], "name": name, "turn": 4}, [data])
+    refused, _ = client.until("refused")
+    assert words in refused["words"]
+    assert refused["turn"] == 4
+
+
+def test_neighbours_trade_places(client):
+    client.do("hello")
+    client.until("state")
+    client.do("reorder", element=0, by=1, turn=3)
+    message, _ = client.until("state")
+    assert message["turn"] == 3
+    assert [element["z"] for element in message["document"]["camera"]["elements"]] == ["26 mm", "0 mm"]
+    client.do("reorder", element=0, by=1)
+    assert "no element behind" in client.until("refused")[0]["words"]
+    client.do("set", where=["elements", 1, "z"], value="26 mm")
+    client.do("reorder", element=0, by=1)
+    assert "one plane" in client.until("refused")[0]["words"]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
-from collections.abc import Callable, Mapping
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, is_dataclass
+from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vcc.base import units
+from vcc.base import checks, units
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.bench.document import shown
@@ -24,6 +27,7 @@ from vcc.files.camera_families import (
     parameters_of,
     unit_of,
 )
+from vcc.files.camera_reading import Beside, TrainAsWritten, read_array
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 
@@ -213,3 +217,125 @@ _NEW: Mapping[str, Callable[[float, float], Json]] = {
     "pyramid": lambda long, wide: {"sides": 4, "deflection": 0.01, "diameter": _length(1.2 * wide, 2)},
 }
 """The parameters of a new element, of the camera's length and light's width where it stands, metres."""
+
+
+# --- what is chosen by name, or brought ---
+
+
+def made_whole(
+    where: Any, value: Any, camera: Mapping[str, Any], described: TrainAsWritten
+) -> list[tuple[Any, Any]]:
+    """What is changed so that a chosen pattern, kernel or surface fits its element.
+
+    One that is chosen by its name alone gets the parameters that it needs, and a mask that becomes an array of
+    cells a width, if it has none. All else is changed as it is said.
+
+    Args:
+        where: the path of what is set, in the document.
+        value: what it is set to.
+        camera: the tables.
+        described: what they describe.
+
+    Returns:
+        (path, value), in order.
+    """
+    inside = isinstance(where, list) and len(where) == 3 and where[0] == "elements" and type(where[1]) is int
+    if not inside or not 0 <= where[1] < len(described.elements):
+        return [(where, value)]
+    train, z = described.train, described.elements[where[1]].z
+    long, wide = max(train.sensor.z, 1e-3), _width_at(train, z)
+    name = value.get("name") if isinstance(value, dict) else None
+    if isinstance(name, str) and len(value) == 1 and name in _CHOSEN:
+        value = value | _CHOSEN[name](long, wide)
+    table = camera["elements"][where[1]]
+    cells = isinstance(value, list) or name == "mura"
+    if where[2] == "pattern" and cells and "width" not in table and table.get("kind") == "mask":
+        return [([*where[:2], "width"], _length(wide, 2)), (where, value)]
+    return [(where, value)]
+
+
+def cells_of(name: Any, buffers: Sequence[bytes]) -> list[list[float]]:
+    """The cells of a picture, or of an array, that a client brings: shares of light that pass.
+
+    Args:
+        name: of its file, whose ending says what it is.
+        buffers: its bytes, in one.
+
+    Raises:
+        InputError: what readers of camera files refuse, and more than `MOST_BROUGHT` cells.
+    """
+    if not isinstance(name, str) or len(buffers) != 1:
+        raise InputError("a file is brought with its name and its bytes")
+    with tempfile.TemporaryDirectory() as folder:
+        ending = Path(name).suffix.lower()
+        file = Path(folder) / f"brought{ending if ending.isascii() and len(ending) < 8 else ''}"
+        file.write_bytes(buffers[0])
+        beside = Beside(file.parent, frozenset({file.name}))
+        with checks.within(shown(name)):
+            values = read_array(file.name, None, True, "the picture", beside)
+    if values.ndim != 2 or values.size > MOST_BROUGHT:
+        size, most = "×".join(map(str, values.shape)), math.isqrt(MOST_BROUGHT)
+        raise InputError(
+            f"{shown(name)} has {size} cells, and a bench takes rows and columns of up to {most}×{most}: make it "
+            "smaller, or name the file in the camera file that the bench is started with"
+        )
+    return [[round(float(cell), 4) for cell in row] for row in values]
+
+
+MOST_BROUGHT = 2**14
+"""Cells of a picture: each state of the bench tells them all."""
+
+_CHOSEN: Mapping[str, Callable[[float, float], Json]] = {
+    "bounded": lambda long, wide: {
+        "pattern": {"name": "cosine_sum", "period": _length(wide / 10, 2)},
+        "width": _length(wide, 2),
+        "height": _length(wide, 2),
+    },
+    "cell_apertures": lambda long, wide: {"lattice": {"layout": "square", "pitch": _length(wide / 10, 2)}},
+    "cell_block": lambda long, wide: {
+        "lattice": {"layout": "square", "pitch": _length(wide / 10, 2)},
+        "rows": 8,
+        "columns": 8,
+    },
+    "cells": lambda long, wide: {"values": [[1, 0, 1], [0, 1, 0], [1, 0, 1]], "width": _length(wide, 2)},
+    "circle": lambda long, wide: {"diameter": _length(wide / 2, 2)},
+    "cosine_sum": lambda long, wide: {"period": _length(wide / 10, 2)},
+    "mura": lambda long, wide: {"prime": 13},
+    "polygon": lambda long, wide: {"sides": 6, "diameter": _length(wide / 2, 2)},
+    "product": lambda long, wide: {
+        "patterns": [
+            {"name": "circle", "diameter": _length(wide, 2)},
+            {"name": "cosine_sum", "period": _length(wide / 10, 2)},
+        ]
+    },
+    "gaussian": lambda long, wide: {"sigma": 0.005},
+    "radial": lambda long, wide: {"radii": [0, 0.005, 0.01], "profile": [1, 0.5, 0], "normalise": True},
+    "samples": lambda long, wide: {
+        "values": [[1, 2, 1], [2, 4, 2], [1, 2, 1]],
+        "slope_pitch": 0.005,
+        "normalise": True,
+    },
+    "top_hat": lambda long, wide: {"width": 0.01},
+    "axicon": lambda long, wide: {"slope": 0.01},
+    "cubic": lambda long, wide: {"strength": float(f"{0.002 / (wide / 2) ** 2:.2g}")},
+    "height_map": lambda long, wide: {
+        "heights": [[0, 0, 0, 0], [0, 2e-5, 2e-5, 0], [0, 2e-5, 2e-5, 0], [0, 0, 0, 0]],
+        "width": _length(1.4 * wide, 2),
+    },
+    "path_map": lambda long, wide: {
+        "paths": [[0, 0, 0, 0], [0, 1e-5, 1e-5, 0], [0, 1e-5, 1e-5, 0], [0, 0, 0, 0]],
+        "width": _length(1.4 * wide, 2),
+    },
+    "quadratic": lambda long, wide: {"focal_length": _length(2 * long, 2)},
+    "rough": lambda long, wide: {
+        "height_rms": "1 um",
+        "correlation_length": _length(wide / 50, 2),
+        "width": _length(1.4 * wide, 2),
+    },
+    "tilt": lambda long, wide: {"deflection": [0.02, 0.0]},
+    "zernike": lambda long, wide: {
+        "coefficients": ["0 um", "0 um", "0 um", "5 um"],
+        "diameter": _length(1.4 * wide, 2),
+    },
+}
+"""What patterns, kernels and surfaces need, of the camera's length and light's width where they stand, metres."""

@@ -30,6 +30,7 @@ from vcc.bench.side import side
 from vcc.files.camera_reading import TrainAsWritten, tables_of_text
 from vcc.light_field import LightField
 from vcc.optics.focusing import focused_train
+from vcc.optics.train import touch
 from vcc.plan.parallax_rule import vergences
 
 Json = dict[str, Any]
@@ -43,7 +44,7 @@ SLOW = 0.4
 MISSING = 0.01
 """Share of the rays from which on it is said that they are missing."""
 
-CHANGES = ("hello", "set", "add", "remove", "duplicate", "undo", "redo", "load", "focus")
+CHANGES = ("hello", "set", "upload", "add", "remove", "duplicate", "reorder", "undo", "redo", "load", "focus")
 """What a client may do that shows another picture."""
 QUESTIONS = ("pin", "value", "ask", "export")
 """What it may do beside."""
@@ -166,7 +167,10 @@ class Session:
     def _answer(self, message: Json, buffers: list[bytes]) -> None:
         doing = message["do"]
         try:
-            getattr(self, f"_do_{doing}")(message)
+            if doing == "upload":
+                self._do_upload(message, buffers)
+            else:
+                getattr(self, f"_do_{doing}")(message)
         except InputError as error:
             self._refuse(message, error)
 
@@ -194,7 +198,7 @@ class Session:
         )
         given = message.get("document")
         if given is None:
-            self._tell_state()
+            self._tell_state(_turn(message))
             self._wanted = Wanted(_turn(message), moving=False)
             return
         try:
@@ -203,12 +207,20 @@ class Session:
             self._refuse(message, error)
             document, described = self._history.present, self._described
         self._history, self._described = History(document), described
-        self._tell_state()
+        self._tell_state(_turn(message))
         self._wanted = Wanted(_turn(message), moving=False)
 
     def _do_set(self, message: Json) -> None:
-        changed = self._history.present.changed(message.get("where"), message.get("value"))
-        self._show(changed, message, bool(message.get("moving", False)))
+        self._put(message, message.get("value"), bool(message.get("moving", False)))
+
+    def _do_upload(self, message: Json, buffers: Sequence[bytes]) -> None:
+        self._put(message, additions.cells_of(message.get("name"), buffers))
+
+    def _put(self, message: Json, value: Any, moving: bool = False) -> None:
+        changed = self._history.present
+        for where, each in additions.made_whole(message.get("where"), value, changed.camera, self._described):
+            changed = changed.changed(where, each)
+        self._show(changed, message, moving)
 
     def _do_add(self, message: Json) -> None:
         present = self._history.present
@@ -231,6 +243,27 @@ class Session:
         copy["z"] = units.text(float(f"{z:.4g}"), "length")
         elements.insert(number + 1, copy)
         self._show(replace(present, camera={**present.camera, "elements": elements}), message)
+
+    def _do_reorder(self, message: Json) -> None:
+        """Trade places along the axis with what light meets before (−1) or behind (1)."""
+        number, by = self._element(message), message.get("by")
+        elements = self._described.elements
+        if by not in (-1, 1):
+            raise InputError(f"by is -1 or 1, towards the scene or the sensor, not {shown(by)}")
+        order = sorted(range(len(elements)), key=lambda each: elements[each].z)
+        place = order.index(number) + by
+        if not 0 <= place < len(order):
+            raise InputError(f"there is no element {'before' if by < 0 else 'behind'} {elements[number].label}")
+        other = order[place]
+        if touch(elements[number].z, elements[other].z):
+            raise InputError(
+                f"{elements[number].label} and {elements[other].label} stand in one plane, where their order "
+                "makes no difference: move one of them along the axis"
+            )
+        changed, tables = self._history.present, self._history.present.camera["elements"]
+        for one, another in ((number, other), (other, number)):
+            changed = changed.changed(["elements", one, "z"], tables[another].get("z", "0 mm"))
+        self._show(changed, message)
 
     def _do_undo(self, message: Json) -> None:
         self._history.undo()
@@ -268,13 +301,13 @@ class Session:
         """Show another document, if it is one."""
         document, self._described = self._checked(document)
         self._history.put(document, moving)
-        self._tell_state()
+        self._tell_state(_turn(message))
         self._wanted = Wanted(_turn(message), moving)
 
     def _show_again(self, message: Json) -> None:
         """Show what history gives, which was shown before."""
         self._described = self._history.present.train(self.offered.beside)
-        self._tell_state()
+        self._tell_state(_turn(message))
         self._wanted = Wanted(_turn(message), moving=False)
 
     def _checked(self, document: Document) -> tuple[Document, TrainAsWritten]:
@@ -304,7 +337,7 @@ class Session:
 
     # --- what is told ---
 
-    def _tell_state(self) -> None:
+    def _tell_state(self, turn: int) -> None:
         document = self._history.present
         field = self.offered.field(document.light_field)
         grid, seen = None, None
@@ -314,6 +347,7 @@ class Session:
         self._tell(
             {
                 "is": "state",
+                "turn": turn,
                 "document": document.as_json(),
                 "undo": self._history.can_undo,
                 "redo": self._history.can_redo,
@@ -338,7 +372,7 @@ class Session:
             except InputError as error:
                 self._no_picture(wanted, error)
                 return
-            self._tell_state()
+            self._tell_state(wanted.turn)
         fineness = WHOLE
         kinds = (document.light_field, *(element.kind for element in self._described.elements))
         if wanted.moving or (not wanted.coarse_shown and (self._pace.seconds(kinds) or math.inf) > SLOW):

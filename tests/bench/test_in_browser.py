@@ -1,0 +1,207 @@
+"""The bench in headless Chromium: by mouse, keys and typing, in two windows, without a server."""
+
+import json
+
+import pytest
+
+from tests.bench.browser import AXE, Page, Served, chromium
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def served(browser):  # no server where there is no browser
+    bench = Served()
+    bench.start()
+    yield bench
+    bench.stop()
+
+
+@pytest.fixture
+def page(browser, served):
+    opened = Page(browser, served.address)
+    yield opened
+    opened.close()
+
+
+def test_sensor_is_dragged_and_picture_follows_and_undo_takes_it_back(page):
+    before = page.picture()
+    x, y = page.middle("sensor")
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x - 40, y, steps=4)
+    dragged = page.place("sensor")
+    assert 44 < float(dragged.removesuffix(" mm")) < 50
+    page.page.mouse.up()
+    page.settle()
+    assert page.place("sensor") == dragged
+    assert page.picture() != before
+    page.page.keyboard.press("Control+z")
+    page.wait_for_place("sensor", "52 mm")
+    page.settle()
+    assert page.button("Undo").is_disabled()  # all of the drag was one step
+    page.page.keyboard.press("Control+Shift+z")
+    page.wait_for_place("sensor", dragged)
+
+
+def test_drag_is_pulled_to_where_the_scene_is_sharp(page):
+    x, y = page.middle("sensor")
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    places = set()
+    for step in range(2, 40, 2):
+        page.page.mouse.move(x + step, y)
+        held = page.page.locator(".snap.held text")
+        if held.count():
+            places.add((page.place("sensor"), held.text_content()))
+    page.page.mouse.up()
+    # f = 50 mm: the scene's nearest leaves, 0.8 m away, are sharp 53.33 mm behind the lens
+    assert ("53.3333 mm", "nearest of the scene, 800 mm, is sharp") in places
+
+
+def test_arrow_keys_step_and_those_that_follow_one_another_are_one_movement(page):
+    page.part("sensor").focus()
+    for key, place in (
+        ("ArrowRight", "52.1 mm"),
+        ("Shift+ArrowRight", "53.1 mm"),
+        ("Alt+ArrowLeft", "53.09 mm"),
+        ("ArrowLeft", "52.99 mm"),
+    ):
+        page.page.keyboard.press(key)
+        assert page.place("sensor") == place
+    page.page.wait_for_selector('button[aria-label="Undo"]:not([disabled])')
+    page.settle()
+    page.button("Undo").click()
+    page.wait_for_place("sensor", "52 mm")
+
+
+def focused(page):
+    """How what has the focus is called."""
+    return page.page.evaluate(
+        "(() => { let at = document.activeElement;"
+        " while (at?.shadowRoot?.activeElement) at = at.shadowRoot.activeElement;"
+        " return at?.getAttribute('aria-label') ?? at?.textContent ?? ''; })()"
+    )
+
+
+def tabbed(page, until, key="Tab"):
+    """What is reached by Tab until something that begins so has the focus."""
+    reached = []
+    while not (reached and reached[-1].startswith(until)):
+        assert len(reached) < 40, f"{until} is not reached by {key}: {reached}"
+        page.page.keyboard.press(key)
+        reached.append(focused(page))
+    return reached
+
+
+def test_bench_is_worked_by_keyboard_alone(page):
+    reached = tabbed(page, "The picture.")
+    words = " ".join(reached)
+    for each in ("Open", "Export", "lens main", "mask code", "sensor", "Zoom in", "Click to focus", "Pin"):
+        assert each in words
+    page.page.keyboard.press("ArrowRight")
+    page.page.get_by_text("column 41, row 30").wait_for()
+    tabbed(page, "mask code:", "Shift+Tab")
+    page.page.keyboard.press("Enter")  # types a place
+    page.page.keyboard.type("31.5")
+    page.page.keyboard.press("Enter")
+    page.wait_for_place(1, "31.5 mm")
+    tabbed(page, "mask code:", "Shift+Tab")
+    page.page.keyboard.press("Delete")
+    page.part(1).wait_for(state="detached")
+
+
+def test_places_are_typed_with_their_units_and_what_is_no_length_is_refused_at_its_field(page):
+    for typed, place in (("41.5 mm", "41.5 mm"), ("47", "47 mm"), ("4.85 cm", "48.5 mm")):
+        page.page.locator("#sensor-z").fill(typed)
+        page.page.keyboard.press("Enter")
+        page.wait_for_place("sensor", place)
+    page.page.locator("#sensor-z").fill("far")
+    page.page.keyboard.press("Enter")
+    assert "not a length" in page.page.get_by_role("alert").text_content()
+    assert page.place("sensor") == "48.5 mm"
+    assert page.page.locator("#sensor-z").input_value() == "4.85 cm"  # as it was typed
+
+
+def test_elements_are_added_edited_and_removed(page):
+    page.page.get_by_label("Add an element").select_option("diffuser")
+    page.wait_for_place(2, "13 mm")  # in the middle of the first of the widest gaps
+    page.page.locator("#elements-2-kernel-sigma").fill("0.02")
+    page.page.keyboard.press("Enter")
+    page.settle()
+    page.button("Duplicate").click()
+    page.part(3).wait_for()
+    page.button("Remove").click()
+    page.part(3).wait_for(state="detached")
+    page.page.get_by_role("tab", name="mask code").click()
+    page.page.locator(".grid i").first.click()  # a cell of the drawn pattern
+    page.settle()
+    assert page.page.locator("#elements-1-pattern-cells").input_value().split() == ["0", "0", "0", "1"]
+
+
+def test_address_holds_the_camera_for_another_window_and_for_a_reload(page, browser, served):
+    page.page.locator("#sensor-z").fill("50.5 mm")
+    page.page.keyboard.press("Enter")
+    page.page.wait_for_url("**#d=*")
+    page.settle()
+    page.page.wait_for_timeout(400)  # the address is written when the bench rests
+    other = Page(browser, page.page.url)
+    assert other.place("sensor") == "50.5 mm"
+    other.page.locator("#sensor-z").fill("51 mm")
+    other.page.keyboard.press("Enter")
+    other.wait_for_place("sensor", "51 mm")
+    other.close()
+    assert page.place("sensor") == "50.5 mm"  # a window has a camera of its own
+    page.page.reload()
+    page.wait_for_place("sensor", "50.5 mm")
+
+
+def test_server_goes_and_comes_back_and_the_camera_is_still_there(page, served):
+    page.page.locator("#sensor-z").fill("51.25 mm")
+    page.page.keyboard.press("Enter")
+    page.settle()
+    served.stop()
+    page.page.get_by_text("The server is gone").wait_for()
+    served.start()
+    page.page.get_by_text("The server is gone").wait_for(state="detached")
+    page.settle()
+    assert page.place("sensor") == "51.25 mm"
+
+
+def test_pinned_picture_is_compared_with(page):
+    page.button("Pin").click()
+    page.page.get_by_text("now · the same").wait_for()
+    page.page.locator("#sensor-z").fill("54 mm")
+    page.page.keyboard.press("Enter")
+    page.page.get_by_text("dB").wait_for()
+    pictures = set()
+    for mode in ("alone", "beside", "wipe", "difference"):
+        page.page.get_by_label("Compare with the pinned picture").select_option(mode)
+        pictures.add(page.picture())
+    assert len(pictures) == 4
+
+
+def test_click_focuses_where_it_was_clicked(page):
+    page.button("Click to focus").click()
+    box = page.page.locator("canvas").bounding_box()
+    page.page.mouse.click(box["x"] + box["width"] * 0.05, box["y"] + box["height"] / 2)  # near leaves
+    page.page.wait_for_selector('button[aria-label="Undo"]:not([disabled])')
+    assert 52.5 < float(page.place("sensor").removesuffix(" mm")) < 54
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
+def test_accessibility_has_no_serious_fault(browser, served, scheme, width):
+    if not AXE.exists():
+        pytest.skip("axe is not installed: run npm ci in bench/front, as .ci/run does")
+    page = Page(browser, served.address, width, 800, color_scheme=scheme, bypass_csp=True)
+    page.page.evaluate(AXE.read_text(encoding="utf-8"))
+    found = page.page.evaluate("axe.run({ resultTypes: ['violations'] })")["violations"]
+    serious = [each["id"] for each in found if each["impact"] in ("serious", "critical")]
+    assert serious == [], json.dumps(found, indent=1)[:3000]
+    wider = page.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+    assert wider <= 0  # nothing has to be scrolled sideways
+    page.close()
