@@ -9,6 +9,7 @@ import zipfile
 
 import imagecodecs
 import numpy as np
+import PIL.Image
 import pytest
 import scipy.special
 from hypothesis import HealthCheck, given, settings
@@ -18,7 +19,7 @@ import vcc
 from tests.bench.on_bench import CAMERA, NOWHERE, PIXELS, START, Client, noise, offered
 from vcc.bench.document import Document
 from vcc.bench.offered import Field
-from vcc.bench.picture import COARSER, WHOLE, Pace, Taken, take
+from vcc.bench.picture import COARSER, WHOLE, Pace, Taken, codes, take
 from vcc.bench.session import MOST_WAITING, Broken
 from vcc.camera_file import ELEMENT_KINDS
 from vcc.files.pictures import auto_exposure
@@ -473,3 +474,55 @@ def test_neighbours_trade_places(client):
     client.do("set", where=["elements", 1, "z"], value="26 mm")
     client.do("reorder", element=0, by=1)
     assert "one plane" in client.until("refused")[0]["words"]
+
+
+# --- films ---
+
+
+def test_a_film_of_a_sweep(client):
+    client.do("hello")
+    client.at_rest()
+    client.do("export", what="film", where=["sensor", "z"], **{"from": "50 mm", "to": "54 mm"}, frames=5)
+    message, (data,) = client.until("file", "refused")
+    assert (message["name"], message["type"]) == ("film.gif", "image/gif")
+    with PIL.Image.open(io.BytesIO(data)) as film:
+        assert (film.n_frames, film.size) == (8, (PIXELS, PIXELS))  # five there, three back
+        film.seek(4)
+        last = np.asarray(film.convert("RGB")).astype(float)
+    ended = START.changed(["sensor", "z"], "54 mm")
+    white = 1 / auto_exposure(camera_of(START).capture(noise()).to_numpy())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.ResultWarning)  # of rays that are missing
+        values = camera_of(ended).capture(noise()).to_numpy()
+    # 256 colours are dithered: the mean is that of the picture
+    assert last.mean() == pytest.approx(codes(values, white).mean(), abs=2)
+    assert client.session.document == START
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"to": "1 deg"}, "two quantities of one kind"),
+        ({"frames": 1}, "frames is a whole number from 2 to 200"),
+        ({"format": "avi"}, "a film is a gif or an mp4"),
+        ({"frames_per_second": 100}, "up to 50"),
+        ({"where": ["elements", 9, "z"]}, "there is no number 9"),
+        ({"to": "5 mm"}, "stands behind the sensor"),
+    ],
+)
+def test_films_that_cannot_be_made_are_refused(client, changes, words):
+    client.do("hello")
+    client.at_rest()
+    asked = {"what": "film", "where": ["sensor", "z"], "from": "50 mm", "to": "54 mm", "frames": 3} | changes
+    client.do("export", **asked)
+    assert words in client.until("refused", "file")[0]["words"]
+
+
+def test_a_film_is_broken_off_by_a_change(client):
+    client.do("hello")
+    client.at_rest()
+    with client.session.offered.turn:
+        client.do("export", what="film", where=["sensor", "z"], **{"from": "50 mm", "to": "54 mm"}, frames=100)
+        client.do("set", where=["sensor", "z"], value="53 mm", turn=9)
+    assert "broken off" in client.until("refused", "file")[0]["words"]
+    assert client.at_rest()["turn"] == 9

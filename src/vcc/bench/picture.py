@@ -206,8 +206,22 @@ def white_of(values: Picture) -> float:
     return 1 / auto_exposure(_shown(values))
 
 
+def codes(values: Picture, white: float) -> NDArray[np.uint8]:
+    """A picture as people see it: upright, the sRGB codes of 8 bits.
+
+    Args:
+        values: irradiance as light lands on the sensor.
+        white: the irradiance that is shown white.
+    """
+    scaled = _shown(values)[::-1, ::-1] * np.float32((SHADES - 1) / white)
+    np.nan_to_num(scaled, copy=False)
+    np.clip(scaled, 0, SHADES - 1, out=scaled)
+    found: NDArray[np.uint8] = np.take(_codes(), scaled.astype(np.uint16))
+    return found
+
+
 def jpeg(values: Picture, white: float, coarse: bool = False) -> bytes:
-    """A picture as people see it: upright, sRGB.
+    """`codes` as a JPEG.
 
     Args:
         values: irradiance as light lands on the sensor.
@@ -216,11 +230,7 @@ def jpeg(values: Picture, white: float, coarse: bool = False) -> bytes:
     """
     import imagecodecs
 
-    scaled = _shown(values)[::-1, ::-1] * np.float32((SHADES - 1) / white)
-    np.nan_to_num(scaled, copy=False)
-    np.clip(scaled, 0, SHADES - 1, out=scaled)
-    codes = np.take(_codes(), scaled.astype(np.uint16))
-    return bytes(imagecodecs.jpeg_encode(codes, level=QUALITY[coarse]))
+    return bytes(imagecodecs.jpeg_encode(codes(values, white), level=QUALITY[coarse]))
 
 
 @functools.cache

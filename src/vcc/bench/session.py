@@ -25,8 +25,9 @@ from vcc.bench import additions, answers, export
 from vcc.bench.document import Document, History, Views, shown
 from vcc.bench.focusing import distance_at
 from vcc.bench.offered import Offered
-from vcc.bench.picture import WHOLE, Fineness, Pace, Picture, Taken, jpeg, pixel_at, psnr, take, white_of
+from vcc.bench.picture import WHOLE, Fineness, Pace, Picture, Taken, codes, jpeg, pixel_at, psnr, take, white_of
 from vcc.bench.side import side
+from vcc.bench.sweep import Sweep, sweep_of
 from vcc.files.camera_reading import TrainAsWritten, tables_of_text
 from vcc.light_field import LightField
 from vcc.optics.focusing import focused_train
@@ -390,13 +391,16 @@ class Session:
         if whole and not wanted.moving:
             self._tell({"is": "notes", "turn": wanted.turn, "notes": self._notes(taken)})
 
-    def _take(self, fineness: Fineness) -> Taken:
-        document = self._history.present
+    def _take(
+        self, fineness: Fineness, document: Document | None = None, described: TrainAsWritten | None = None
+    ) -> Taken:
+        """The picture of a document; None takes the present one."""
+        document, described = document or self._history.present, described or self._described
         field = self.offered.field(document.light_field)
         while not self.offered.turn.acquire(timeout=0.05):
             self._check_wanted()
         try:
-            return take(self._described.train, field, document, fineness, self._check_wanted)
+            return take(described.train, field, document, fineness, self._check_wanted)
         finally:
             self.offered.turn.release()
 
@@ -496,10 +500,30 @@ class Session:
 
     def _do_export(self, message: Json) -> None:
         document = self._history.present
+        if message.get("what") == "film":
+            self._export_film(sweep_of(message, document), message)
+            return
         field = self.offered.field(document.light_field)
         bench = export.OnBench(document, self._described.train, field.source, self.offered.beside)
         taken = self._whole_picture() if message.get("what") in ("png", "exr") else None
         name, kind, data = export.exported(message.get("what"), bench, taken, self._shown_white)
+        self._tell({"is": "file", "name": name, "type": kind}, [data])
+
+    def _export_film(self, sweep: Sweep, message: Json) -> None:
+        """A film of a sweep: each picture whole, all with the white of the present one."""
+        self._whole_picture()
+        frames, words = [], "Making the film"
+        try:
+            for number, document in enumerate(sweep.documents):
+                self._tell({"is": "progress", "done": number, "total": sweep.frames, "words": words})
+                checked, described = self._checked(document)
+                taken = self._take(WHOLE, checked, described)
+                frames.append(codes(taken.values, self._shown_white))
+        except Superseded:
+            self._refuse(message, InputError("the film was broken off: something else was asked for meanwhile"))
+            raise
+        self._tell({"is": "progress", "done": sweep.frames, "total": sweep.frames, "words": words})
+        name, kind, data = sweep.film(frames)
         self._tell({"is": "file", "name": name, "type": kind}, [data])
 
 

@@ -17,9 +17,10 @@ from vcc.cli.options import (
     length,
 )
 from vcc.files.pictures import WRITE_ENDINGS
+from vcc.formats.films import ENDINGS
 from vcc.light_field import LightField
 from vcc.plan.how import BetweenViews, Interpolation
-from vcc.recover.focal_stack import ENDINGS, focal_stack, focus_distances
+from vcc.recover.focal_stack import focal_stack, focus_distances
 from vcc.recover.refocus import refocused
 from vcc.store import StoredLightField
 

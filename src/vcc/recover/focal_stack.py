@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -21,13 +20,12 @@ from vcc.base.showing import Shown
 from vcc.files import transfer
 from vcc.files.destination import Destination, Target
 from vcc.files.pictures import auto_exposure, checked_exposure
-from vcc.formats import video
+from vcc.formats.films import ENDINGS, Film
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.recover.refocus import check_distance, refocused
 from vcc.store import StoredLightField
 
-ENDINGS = (".mp4", ".gif")
 _NOTHING_SHARP = 1e-12
 """Sharpness relative to the picture's power below which there is no detail to choose by: all pictures count."""
 
@@ -168,7 +166,7 @@ class FocalStack(Brief, Shown):
                 neither 1 nor 3 channels, no PyAV for an MP4, or a place that cannot be written to.
         """
         place = Destination.of("a focal stack", path, format, ENDINGS)
-        _check_rate(place.ending, frames_per_second)
+        film = Film(place.ending, frames_per_second)
         count, rows, columns = self.pictures.shape[:3]
         channels = self.pictures.reshape(count, rows, columns, -1)
         if channels.shape[3] not in (1, 3):
@@ -187,10 +185,7 @@ class FocalStack(Brief, Shown):
             return np.ascontiguousarray(np.broadcast_to(encoded, (rows, columns, 3)))
 
         with place.opened() as temporary:
-            if place.ending == ".gif":
-                _write_gif(temporary, [codes(number) for number in way], frames_per_second)
-            else:
-                _write_mp4(temporary, (codes(number) for number in way), frames_per_second, place.words)
+            film.write((codes(number) for number in way), temporary, place.words)
         return (
             f"{place.words}: {count} pictures of {columns}×{rows} pixels in {len(way)} frames, "
             f"{frames_per_second:g} a second, exposure {factor:.6g}, {clipped:.2%} of the pixels clipped"
@@ -258,32 +253,3 @@ def focal_stack(
         pictures[number], frame = image.values, image.frame
         tell(progress, number + 1, len(distances))
     return FocalStack(pictures, distances, frame)
-
-
-def _check_rate(ending: str, frames_per_second: float) -> None:
-    if not 0 < frames_per_second <= (50 if ending == ".gif" else math.inf) or math.isinf(frames_per_second):
-        raise InputError(
-            f"frames_per_second is a number above 0{' and up to 50' if ending == '.gif' else ''}, not "
-            f"{frames_per_second}"
-        )
-
-
-def _write_mp4(path: Path, frames: Iterable[NDArray[np.uint8]], frames_per_second: float, told: str) -> None:
-    """An H.264 film; ``told`` is what to call the file in an error."""
-    av = video.library()
-    # The common chroma of H.264 goes by pairs of pixels.
-    even = (np.pad(each, ((0, each.shape[0] % 2), (0, each.shape[1] % 2), (0, 0)), mode="edge") for each in frames)
-    try:
-        video.encode(av, path, even, frames_per_second, quality=18, lossless=False)
-    except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
-        raise InputError(f"{told} could not be written as a video: {error}") from error
-
-
-def _write_gif(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: float) -> None:
-    """An animated GIF by Pillow, which Matplotlib brings; it takes 256 colours for each frame, without FFmpeg."""
-    from PIL import Image as Picture
-
-    pictures = [Picture.fromarray(frame).quantize(256, dither=Picture.Dither.FLOYDSTEINBERG) for frame in frames]
-    pictures[0].save(
-        path, save_all=True, append_images=pictures[1:], duration=1000 / frames_per_second, loop=0, optimize=False
-    )

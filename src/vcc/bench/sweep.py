@@ -1,0 +1,102 @@
+"""A parameter that goes from one value to another, and the film of it."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import units
+from vcc.base.errors import InputError
+from vcc.bench.document import Document, shown
+from vcc.formats.films import Film
+
+FRAMES, FRAMES_PER_SECOND = 30, 12
+MOST_FRAMES = 200
+MOST_PIXELS = 2**26
+"""Of all frames together: what is kept until the film is written takes three bytes for each."""
+TYPES = {".gif": "image/gif", ".mp4": "video/mp4"}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A parameter on its way.
+
+    Args:
+        documents: with each of its values.
+        writer: of the film.
+        there_and_back: whether the frames follow in reverse order, too.
+    """
+
+    documents: tuple[Document, ...]
+    writer: Film
+    there_and_back: bool
+
+    @property
+    def frames(self) -> int:
+        """How many pictures are made."""
+        return len(self.documents)
+
+    def film(self, frames: Sequence[NDArray[np.uint8]]) -> tuple[str, str, bytes]:
+        """The film of pictures, grey or in colour: its name, its type and its bytes.
+
+        Raises:
+            InputError: no PyAV for an MP4.
+        """
+        back = list(frames[-2:0:-1]) if self.there_and_back else []
+        ending = self.writer.ending
+        coloured = [each if each.ndim == 3 else np.repeat(each[..., None], 3, axis=2) for each in [*frames, *back]]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"film{ending}"
+            self.writer.write(coloured, path, f"the film{ending}")
+            return f"film{ending}", TYPES[ending], path.read_bytes()
+
+
+def sweep_of(message: dict[str, Any], document: Document) -> Sweep:
+    """What a client asks to be filmed.
+
+    Args:
+        message: with ``where``, the path of a parameter, ``from`` and ``to``, numbers or quantities in words;
+            ``frames``, ``format``, ``frames_per_second`` and ``there_and_back``.
+        document: in which the parameter goes.
+
+    Raises:
+        InputError: what is none of these, or too long.
+    """
+    ending = f".{message.get('format', 'gif')}"
+    if ending not in TYPES:
+        raise InputError(f"a film is a gif or an mp4, not {shown(message.get('format'))}")
+    count, rate = message.get("frames", FRAMES), message.get("frames_per_second", FRAMES_PER_SECOND)
+    if type(count) is not int or not 2 <= count <= MOST_FRAMES:
+        raise InputError(f"frames is a whole number from 2 to {MOST_FRAMES}, not {shown(count)}")
+    if type(rate) not in (int, float):
+        raise InputError(f"frames_per_second is a number, not {shown(rate)}")
+    sensor = document.camera.get("sensor", {}).get("shape", [1, 1])
+    if count * int(np.prod(sensor)) > MOST_PIXELS:
+        raise InputError(
+            f"{count} frames of {sensor} pixels are more than {MOST_PIXELS} pixels: take fewer of either"
+        )
+    values = _between(message.get("from"), message.get("to"), count)
+    documents = tuple(document.changed(message.get("where"), value) for value in values)
+    return Sweep(documents, Film(ending, rate), message.get("there_and_back") is not False)
+
+
+def _between(first: Any, last: Any, count: int) -> list[Any]:
+    """Values in equal steps from the first to the last, in the form of these."""
+    if type(first) in (int, float) and type(last) in (int, float):
+        return [float(each) for each in np.linspace(first, last, count)]
+    for dimension in units.SI_NAMES:
+        try:
+            ends = units.parse(first, dimension, "from"), units.parse(last, dimension, "to")
+        except InputError:
+            continue
+        return [units.text(float(each), dimension, exact=True) for each in np.linspace(*ends, count)]
+    raise InputError(
+        f'from and to are two numbers, or two quantities of one kind such as "50 mm", not {shown(first)} and '
+        f"{shown(last)}"
+    )
