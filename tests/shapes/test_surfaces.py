@@ -310,7 +310,7 @@ def test_a_rough_surface_is_its_seeds():
 
 def test_a_rough_surface_may_be_longer_than_its_sheet_or_not_rough_at_all():
     gentle = Rough(1 * um, 1.0, 1 * mm)
-    assert gentle.grid == (8, 8)
+    assert gentle.grid == (35, 35)
     assert max(gentle.largest(0.5 * mm, 0.5 * mm)) < 1e-5
     assert not np.any(Rough(0.0, 1 * mm, 5 * mm).slopes(PLACES, 0.0))
 
@@ -399,7 +399,7 @@ def _with(value: float) -> np.ndarray:
         ),
         (
             lambda: Rough(1 * um, 5 * um, 50 * mm),
-            "40007×40007 points, more than 4096 a side: make the sheet at most",
+            "40001×40001 points, more than 4097 a side: make the sheet at most",
         ),
     ],
 )
@@ -409,9 +409,9 @@ def test_bad_input_is_refused(make, message):
 
 
 def test_the_largest_grid_of_a_rough_surface_is_what_its_error_says():
-    Rough(1 * um, 10 * um, 10.22 * mm)
-    with pytest.raises(vcc.InputError, match=r"at most 10\.22 mm wide"):
-        Rough(1 * um, 10 * um, 10.23 * mm)
+    Rough(1 * um, 10 * um, 10.24 * mm)
+    with pytest.raises(vcc.InputError, match=r"at most 10\.24 mm wide"):
+        Rough(1 * um, 10 * um, 10.25 * mm)
 
 
 # -- a user's own
@@ -440,3 +440,17 @@ def test_a_users_own_surface_needs_path_and_slopes_only():
     x, y = RNG.uniform(-2 * mm, 2 * mm, (2, 5000))
     steepest = np.abs(ripple.slopes(x, y)[0]).max()
     assert steepest <= ripple.largest(2 * mm, 2 * mm)[0] <= 1.1 * steepest
+
+
+def test_a_wider_or_a_little_finer_rough_surface_goes_on_from_the_same_middle():
+    """Numbers of points jump with its sizes; the surface must not, or no derivative to them would be one."""
+    x, y = np.linspace(-2, 2, 41)[None, :] * mm, np.linspace(-1.5, 1.5, 31)[:, None] * mm
+    one = Rough(2 * um, 100 * um, 4 * mm, height=3 * mm, seed=3)
+    for other in (replace(one, width=5.7 * mm), replace(one, height=9 * mm)):
+        assert other.grid != one.grid
+        np.testing.assert_allclose(other.path(x, y), one.path(x, y), rtol=0, atol=1e-8 * 2 * um)
+    points = {side: replace(one, correlation_length=(1 + side * 1e-5) * 100 * um) for side in (-1, 1)}
+    assert points[-1].grid != points[1].grid
+    difference = points[1].path(x, y) - points[-1].path(x, y)
+    # A pattern stretched by 2e-5 has moved by 40 nm at its corners, up slopes of some 1 %.
+    assert 0 < np.abs(difference).max() < 40 * um * 2e-5 * 5

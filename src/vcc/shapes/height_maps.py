@@ -22,8 +22,8 @@ from vcc.shapes.surface import Array, Surface
 
 POINTS_PER_CORRELATION_LENGTH = 4
 """Of a rough surface. Its spectrum exp(−π²f²l²) has fallen to 1e-17 at the highest frequency that they hold."""
-LARGEST_GRID = 4096
-"""Points a side of a rough surface: 128 MiB of float64, and seconds to make."""
+LARGEST_GRID = 4097
+"""Points a side of a rough surface, on its sheet: 128 MiB of float64, and seconds to make."""
 
 
 class Sheet(Surface):
@@ -300,9 +300,9 @@ class Rough(Sheet):
         checks.sizes("a rough surface", width=self.width, height=self.height)
         _check_glass("a rough surface", self.refractive_index)
         object.__setattr__(self, "seed", checks.seed(self.seed, "seed of a rough surface"))
-        rows, columns = self.grid
+        rows, columns = (points - 2 * _MARGIN for points in self.grid)
         if max(rows, columns) > LARGEST_GRID:
-            room = (LARGEST_GRID - 1 - 2 * _MARGIN) * self._step
+            room = (LARGEST_GRID - 1) * self._step
             raise InputError(
                 f"a rough surface of correlation length {short(self.correlation_length)} on a sheet of "
                 f"{short(self.size[0])} × {short(self.size[1])} takes a grid of {columns}×{rows} points, more "
@@ -317,9 +317,11 @@ class Rough(Sheet):
 
     @property
     def grid(self) -> tuple[int, int]:
-        """(rows, columns) of points at which the surface is made, the outermost a few beyond each edge."""
+        """(rows, columns) of points at which the surface is made, the outermost 16 beyond each edge."""
         # A millionth of a step less: a sheet of a whole number of steps is not one step longer by rounding
-        rows, columns = (math.ceil(length / self._step - 1e-6) + 1 + 2 * _MARGIN for length in self.size[::-1])
+        rows, columns = (
+            2 * (math.ceil(length / (2 * self._step) - 1e-6) + _MARGIN) + 1 for length in self.size[::-1]
+        )
         return rows, columns
 
     @property
@@ -344,7 +346,7 @@ class Rough(Sheet):
         kernel = np.exp(-2 * (np.arange(-reach, reach + 1) / POINTS_PER_CORRELATION_LENGTH) ** 2)
         kernel /= np.sqrt(np.sum(kernel**2))  # so that noise of variance 1 stays so
         rows, columns = self.grid
-        heights = np.random.default_rng(self.seed).standard_normal((rows + 2 * reach, columns + 2 * reach))
+        heights = _noise(self.seed, rows // 2 + reach, columns // 2 + reach)
         # Only points with the whole kernel inside the noise are kept: no edge, no wrapping around.
         heights = convolve1d(heights, kernel, axis=0)[reach:-reach]
         heights = convolve1d(heights, kernel, axis=1)[:, reach:-reach]
@@ -355,8 +357,22 @@ class Rough(Sheet):
         return y, x, np.asarray((self.refractive_index - 1) * self.height_rms * heights)
 
 
-_MARGIN = 3
-"""Points of a rough surface beyond each edge of its sheet, where the spline's ends do no harm."""
+_MARGIN = 16
+"""Points of a rough surface beyond each edge of its sheet. What a spline does at its ends falls by 0.27 from point
+to point: on the sheet, 1e-9 of it is left, and a point more or less does not show."""
+
+
+def _noise(seed: int, rows: int, columns: int) -> Array:
+    """Normal numbers of variance 1 at places −rows … rows, −columns … columns; larger tables go on from smaller.
+
+    So a surface stays the same where its sheet becomes larger or its grid finer, and its sizes can be learned.
+    """
+    table = np.empty((2 * rows + 1, 2 * columns + 1))
+    for row in range(-rows, rows + 1):
+        place = 2 * abs(row) + (row < 0)
+        left, right = np.random.default_rng((seed, place)).standard_normal((columns + 1, 2)).T
+        table[row + rows] = np.concatenate([left[:0:-1], right])
+    return table
 
 
 def _table(what: str, given: Any) -> Array:
