@@ -13,12 +13,14 @@ from vcc.base.units import short
 from vcc.files.pictures import auto_exposure
 from vcc.light_field import LightField
 from vcc.notebook.html import Panel
-from vcc.notebook.pictures import GAP, LARGEST_SIDE, MOST_BYTES, averaged, encoded, in_colour, sheet, sized
+from vcc.notebook.pictures import GAP, MOST_BYTES, averaged, encoded, in_colour, sheet, sized
 from vcc.recover import FocalStack
 from vcc.store import StoredLightField
 
 MOST_ACROSS, MOST_IN_A_ROW = 5, 8
 """Views shown along each axis; where there is one row or column of them, along it."""
+SHEET_SIDE = 520
+"""Pixels of a sheet: many small pictures of detail do not pack well."""
 MOST_READ = 2**26
 """Bytes of samples that are looked at for a sheet: of larger views fewer are shown."""
 
@@ -107,5 +109,5 @@ def _panel(places: Sequence[Sequence[Any]], picture: Callable[[Any], Array | Non
 def _factor(shape: tuple[int, ...], down: int, across: int) -> int:
     """By which pictures of a sheet are averaged so that it fits."""
     rows, columns = shape
-    room = [(LARGEST_SIDE + GAP) / count - GAP for count in (down, across)]
+    room = [(SHEET_SIDE + GAP) / count - GAP for count in (down, across)]
     return max(math.ceil(rows / room[0]), math.ceil(columns / room[1]), 1)
