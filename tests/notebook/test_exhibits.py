@@ -13,6 +13,7 @@ import imagecodecs
 import numpy as np
 import pytest
 import torch
+from matplotlib.figure import Figure
 
 import vcc
 from vcc import analysis, gallery, kernels, patterns, recover, surfaces
@@ -39,6 +40,12 @@ LENS = vcc.Lens(focal_length=50 * mm, diameter=6 * mm, name="main")
 MASK = vcc.Mask(patterns.CosineSum(period=1.5 * mm), width=30 * mm, z=40 * mm)
 CAMERA = vcc.Camera([LENS, MASK], SENSOR)
 FRAME = SENSOR.frame
+
+
+def drawing() -> Figure:
+    figure = Figure(figsize=(2, 1))
+    figure.subplots().plot([0, 1])
+    return figure
 
 
 def things() -> dict[str, Any]:
@@ -83,6 +90,16 @@ def things() -> dict[str, Any]:
         "spectrum": analysis.fft4(FIELD),
         "advice": analysis.sampling_advice(CAMERA, FIELD),
         "depth": recover.DepthMap(np.ones((4, 5)), np.full((4, 5), np.inf), np.zeros((4, 5)), (1, 1)),
+        "result": gallery.Result(
+            "<p>how it was made</p>",
+            (
+                (
+                    gallery.Picture("a", "left", "", RANDOM.random((8, 9, 3))),
+                    gallery.Picture("b", "right", "", drawing()),
+                ),
+            ),
+            (gallery.Finding("contrast", "above 1 dB", 2.5, "dB", True),),
+        ),
         "best aperture": analysis.OptimisedAperture(np.eye(5), 0.1, (0.2, 0.1), (0.3, 0.2), True, "done"),
     }
 
@@ -147,6 +164,12 @@ def test_what_shows_its_words_alone_needs_few(name):
     assert len(text) < 600, text
     assert text.count("\n") < 6
     assert " object at 0x" not in text
+
+
+def test_a_result_of_the_gallery_lists_what_it_found():
+    rows = [[cell.text or "" for cell in row] for row in parsed(THINGS["result"]).iter("tr")]
+    assert rows[1] == ["contrast", "above 1 dB", "2.5 dB", "reached", ""]
+    assert "left" in words(THINGS["result"])
 
 
 def test_what_was_saved_is_said_in_a_line(tmp_path):

@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vcc.base import showing
 from vcc.base.describe import Brief
 from vcc.base.progress import Progress as Progress
 from vcc.light_field import LightField
@@ -87,7 +88,7 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Brief):
+class Result(showing.Shown, Brief):
     """What came of a run.
 
     Args:

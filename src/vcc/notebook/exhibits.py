@@ -28,6 +28,7 @@ from vcc.base.units import mm, short, um
 from vcc.fields.sampled import has_values
 from vcc.files.pictures import SavedPicture
 from vcc.files.transfer import encode
+from vcc.gallery.entry import Picture, Result
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.notebook.contacts import contact_panel, strip_panel
@@ -49,6 +50,10 @@ from vcc.store import StoredLightField
 
 FRONT = 256
 """Points a side at which patterns, kernels and surfaces are looked at from the front."""
+MOST_PICTURES = 6
+"""Of a result of the gallery."""
+SIDE_BY_SIDE = 270
+"""Width at which they are shown, pixels."""
 PERIODS = 6
 """Of a pattern without a bound, so many are shown where it has a period."""
 
@@ -322,6 +327,27 @@ def _(found: Deblurred) -> Exhibit:
     steps = f" after {found.iterations} steps" if found.iterations else ""
     panel = light_panel(np.maximum(found.picture, 0), "as the recording lies")
     return Exhibit("Deblurred", f"{found.message}{steps}", (panel,))
+
+
+@exhibit.register
+def _(result: Result) -> Exhibit:
+    pictures = [picture for row in result.pictures for picture in row][:MOST_PICTURES]
+    left_out = sum(map(len, result.pictures)) - len(pictures)
+    panels = tuple(_of_gallery(picture, share=len(pictures)) for picture in pictures)
+    rows = [(found.what, found.claim or "–", found.measured, found.verdict, found.why) for found in result.numbers]
+    table = Table(("what", "claimed", "measured here", "claim", "why"), rows) if rows else None
+    more = f"{left_out} more pictures: vcc.gallery.write_entry writes all" if left_out else ""
+    return Exhibit("Result", more, panels, table, text=result.assumed)
+
+
+def _of_gallery(picture: Picture, share: int) -> Panel:
+    """A picture of the gallery's, as screens want it, or a figure."""
+    if not isinstance(picture.content, np.ndarray):
+        return drawn(lambda: picture.content, picture.title, share)
+    panel = codes_panel(
+        picture.content, lambda part: np.rint(np.clip(part, 0, 1) * 255).astype(np.uint8), picture.title, share
+    )
+    return replace(panel, width=min(panel.width, SIDE_BY_SIDE))
 
 
 @exhibit.register

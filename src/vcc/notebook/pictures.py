@@ -128,12 +128,13 @@ def sheet(pictures: Sequence[Sequence[Array | None]], exposure: float) -> Array:
     return made
 
 
-def drawn(draw: Callable[[], Any], caption: str = "") -> Panel:
+def drawn(draw: Callable[[], Any], caption: str = "", share: int = 2) -> Panel:
     """A drawing by Matplotlib, which shows itself nowhere else.
 
     Args:
         draw: makes axes or a figure, by the functions of `vcc.plot`.
         caption: below it.
+        share: how many pictures share the room of an exhibit.
     """
     with style.by_itself():
         made = draw()
@@ -147,7 +148,7 @@ def drawn(draw: Callable[[], Any], caption: str = "") -> Panel:
         # A drawing has few colours, and takes half the bytes by numbers of them.
         Image.open(stream).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(small, "png")
         png = small.getvalue()
-        if len(png) <= MOST_BYTES // 2:
+        if len(png) <= MOST_BYTES // share:
             break
     return Panel(png, round(figure.get_size_inches()[0] * SHOWN_DOTS), caption, paper=True)
 
