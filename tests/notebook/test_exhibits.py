@@ -211,6 +211,14 @@ def test_pure_noise_stays_small_and_says_that_it_was_averaged():
     assert "width:600px" in noise._repr_html_()
 
 
+@pytest.mark.parametrize("shape", [(1, 5000), (5000, 3), (1, 1), (700, 5, 3)])
+def test_pictures_of_any_shape_fit(shape):
+    thing = vcc.Image(RANDOM.random(shape, dtype=np.float32), FRAME)
+    assert 1 <= max(picture(thing).shape[:2]) <= LARGEST_SIDE
+    width = int(re.search(r"img[^>]*width:(\d+)px", thing._repr_html_())[1])
+    assert width * picture(thing).shape[0] / picture(thing).shape[1] <= 2 * LARGEST_SIDE
+
+
 def test_what_is_not_finite_is_said():
     assert "50.00% of the values are not finite, and shown black" in words(THINGS["not finite"])
     assert "the mean of 31 channels" in words(THINGS["many channels"])

@@ -102,7 +102,7 @@ def _panel(places: Sequence[Sequence[Any]], picture: Callable[[Any], Array | Non
             break
         made = [[None if each is None else averaged(each, 2) for each in row] for row in made]
         there = [each for row in made for each in row if each is not None]
-    panel = sized(png, codes.shape[1], f"{caption}; exposure {exposure:.4g}")
+    panel = sized(png, codes.shape, f"{caption}; exposure {exposure:.4g}")
     return panel if codes.shape[1] == width else Panel(png, width, panel.caption)
 
 

@@ -20,7 +20,7 @@ LARGEST_SIDE = 720
 MOST_BYTES = 520_000
 """Of the PNG files of one exhibit, all together."""
 MAGNIFIED_TO = 320
-"""Pictures narrower than half of this are magnified by a whole factor, up to this."""
+"""Pictures smaller than half of this, pixels, are magnified by a whole factor, up to this."""
 GAP = 4
 """Pixels between the pictures of a sheet."""
 COLOURS = 192
@@ -33,11 +33,16 @@ Array = NDArray[Any]
 
 
 def averaged(values: Array, factor: int) -> NDArray[np.float32]:
-    """A picture of 1 pixel for each factor×factor; what is left over at the right and below is left out."""
-    rows, columns = (size // factor * factor for size in values.shape[:2])
-    cut = np.asarray(values[:rows, :columns], dtype=np.float32)
-    parts = cut.reshape(rows // factor, factor, columns // factor, factor, *cut.shape[2:])
-    return np.asarray(parts.mean(axis=(1, 3)), dtype=np.float32) if factor > 1 else cut
+    """A picture of 1 pixel for each factor×factor; what is left over at the right and below is left out.
+
+    Along an axis that has no more pixels than the factor all become one.
+    """
+    if factor == 1:
+        return np.asarray(values, dtype=np.float32)
+    (down, rows), (across, columns) = ((min(factor, size), max(size // factor, 1)) for size in values.shape[:2])
+    cut = np.asarray(values[: rows * down, : columns * across], dtype=np.float32)
+    parts = cut.reshape(rows, down, columns, across, *cut.shape[2:])
+    return np.asarray(parts.mean(axis=(1, 3)), dtype=np.float32)
 
 
 def in_colour(values: Array) -> tuple[NDArray[np.float32], str]:
@@ -79,24 +84,24 @@ def codes_panel(values: Array, code: Callable[[Array], Array], caption: str, sha
         caption: below it.
         share: how many pictures share the room of an exhibit.
     """
-    factor = max(-(-max(values.shape[:2]) // LARGEST_SIDE), 1)
+    first = factor = max(-(-max(values.shape[:2]) // LARGEST_SIDE), 1)
     while True:
         codes = code(averaged(values, factor))
         png = encoded(codes)
-        if len(png) <= MOST_BYTES // share or min(codes.shape[:2]) < 2:
+        if len(png) <= MOST_BYTES // share:
             break
         factor += 1
     if factor > 1:
         caption += f"; {factor}×{factor} pixels as one"
-    panel = sized(png, codes.shape[1], caption)
+    panel = sized(png, codes.shape, caption)
     # What was averaged to spare bytes is shown as large as it would have been.
-    return panel if factor == 1 else replace(panel, width=min(codes.shape[1] * factor, LARGEST_SIDE))
+    return panel if factor == first else replace(panel, width=codes.shape[1] * factor // first)
 
 
-def sized(png: bytes, columns: int, caption: str) -> Panel:
-    """A panel of a picture so many pixels wide, magnified where it is small."""
-    times = max(MAGNIFIED_TO // columns, 1)
-    return Panel(png, columns * times, caption, pixelated=times > 1)
+def sized(png: bytes, shape: tuple[int, ...], caption: str) -> Panel:
+    """A panel of a picture of so many rows and columns, magnified where it is small."""
+    times = max(MAGNIFIED_TO // max(shape[:2]), 1)
+    return Panel(png, shape[1] * times, caption, pixelated=times > 1)
 
 
 def encoded(codes: Array) -> bytes:
