@@ -117,7 +117,7 @@ class Page:
 
     def middle(self, name):
         """Of its drawing, pixels of the page."""
-        box = self.part(name).locator(".back").bounding_box()
+        box = self.part(name).locator(".strip").bounding_box()
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 3
 
     def button(self, name):

@@ -17,6 +17,16 @@ export class EditorView extends Part {
     field?.select();
   }
 
+  /** The name of what is selected is in sight, however many there are. */
+  protected override updated(): void {
+    const chips = this.renderRoot.querySelector<HTMLElement>(".chips");
+    const chosen = chips?.querySelector<HTMLElement>('[aria-selected="true"]');
+    if (!chips || !chosen) return;
+    const from = chosen.offsetLeft - chips.offsetLeft;
+    if (from < chips.scrollLeft) chips.scrollLeft = from - 8;
+    else if (from + chosen.offsetWidth > chips.scrollLeft + chips.clientWidth) chips.scrollLeft = from + chosen.offsetWidth - chips.clientWidth;
+  }
+
   private get order(): number[] {
     const side = this.bench.side;
     return this.bench.elements.map((_, number) => number).sort((one, other) => (side?.elements[one]?.z ?? 0) - (side?.elements[other]?.z ?? 0) || one - other);

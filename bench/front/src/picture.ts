@@ -10,6 +10,8 @@ type Compare = "alone" | "beside" | "wipe" | "difference";
 const MODES: [Compare, string][] = [["alone", "Picture"], ["beside", "Side by side"], ["wipe", "Wipe"], ["difference", "Difference ×4"]];
 const MOST_ZOOM = 64;
 const WHEEL = 0.0016;
+/** Share of the rays from which on it is said that they are missing. */
+const MISSING = 0.005;
 /** From so many pixels of the screen on, a pixel of the picture has an outline when it is pointed at. */
 const OUTLINED = 6;
 
@@ -382,7 +384,7 @@ export class PictureView extends Part {
     const about = this.bench.picture?.about;
     if (!about) return nothing;
     return html`
-      ${about.missing > 0.0005 ? html`<span class="missing" title="Rays that the light field does not hold: pixels are darker there than they would be">${plain(100 * about.missing, 2)} % of the rays missing</span>` : nothing}
+      ${about.missing > MISSING ? html`<span class="missing" title="Rays that the light field does not hold: pixels are darker there than they would be">${plain(100 * about.missing, 2)} % of the rays missing</span>` : nothing}
       <span>${this.shape[1]} × ${this.shape[0]}${about.coarse ? ", coarse" : ""} · ${plain(about.took, 3)} ms</span>`;
   }
 
@@ -391,7 +393,6 @@ export class PictureView extends Part {
     css`
       :host { display: flex; flex-direction: column; min-height: 0; min-width: 0; container-type: inline-size; }
       .short { display: none; }
-      @container (max-width: 540px) { .short { display: inline; } .long { display: none; } .bar { gap: 2px 2px; } }
       .bar { display: flex; flex-wrap: wrap; align-items: center; gap: 2px 8px; padding: 6px 8px; }
       .group { display: flex; align-items: center; gap: 2px; }
       .spring { flex: 1; }
@@ -409,6 +410,7 @@ export class PictureView extends Part {
       .line { display: flex; gap: 14px; min-height: 26px; align-items: center; padding: 0 10px; font-size: 12px; color: var(--quiet); white-space: nowrap; overflow: hidden; }
       .line > span { overflow: hidden; text-overflow: ellipsis; white-space: pre; }
       .line > .missing { color: var(--warn-ink); }
+      @container (max-width: 540px) { .short { display: inline; } .long { display: none; } .bar { gap: 2px; padding: 6px 4px; } button { padding: 0 6px; } label.check { gap: 5px; } .icon { width: 26px; padding: 0; } }
     `,
   ];
 }

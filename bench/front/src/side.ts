@@ -233,6 +233,7 @@ export class SideView extends Part {
         @pointerdown=${this.down} @pointermove=${this.move} @pointerup=${this.up} @pointercancel=${this.up}
         @pointerleave=${() => (this.hover = null)}>
         <path class="axis" d="M0 ${scale.y(0)}H${this.width}"></path>
+        ${this.parts().map((which) => this.drawBack(which, side, scale))}
         ${this.parts().map((which) => this.drawPart(which, side, scale))}
         <g class="rays">${side.rays.map((each) => this.drawRays(each, scale))}</g>
         ${this.drawSnap(scale)}
@@ -276,20 +277,34 @@ export class SideView extends Part {
     </g>`;
   }
 
+  /** The strip of the drawing by which a part is taken. */
+  private strip(which: number | "sensor", side: Side, scale: Scale) {
+    const z = this.placeOf(which);
+    const length = which === "sensor" ? 1.1 * scale.thick : scale.x(z + side.elements[which]!.length) - scale.x(z);
+    const spare = length > 0 ? 6 : 9;
+    return { x: scale.x(z) - spare, y: scale.top - 4, width: length + 2 * spare, height: scale.bottom - scale.top + 8 };
+  }
+
+  /** What is selected or pointed at stands out, behind all parts: several may stand in one plane. */
+  private drawBack(which: number | "sensor", side: Side, scale: Scale) {
+    const state = this.bench.selected === which ? "selected" : this.hover === which ? "hover" : "";
+    if (!state) return nothing;
+    const { x, y, width, height } = this.strip(which, side, scale);
+    return svg`<rect class="back ${state}" x=${x} y=${y} width=${width} height=${height} rx="5"></rect>`;
+  }
+
   private drawPart(which: number | "sensor", side: Side, scale: Scale) {
     const z = this.placeOf(which);
     const part = which === "sensor" ? side.sensor : side.elements[which]!;
     const reach = (this.frame!.end - this.frame!.start) * 1e3;
-    const state = `${this.bench.selected === which ? "selected" : ""} ${this.hover === which ? "hover" : ""}`;
-    const length = which === "sensor" ? 1.1 * scale.thick : scale.x(z + side.elements[which]!.length) - scale.x(z);
-    const spare = length > 0 ? 6 : 9;
-    return svg`<g class="part ${state}" data-part=${which} tabindex="0" role="slider"
+    const { x, y, width, height } = this.strip(which, side, scale);
+    return svg`<g class="part" data-part=${which} tabindex="0" role="slider"
         aria-label="${part.label.join(", ")}: place on the axis" aria-orientation="horizontal"
         aria-valuemin=${(this.frame!.start * 1e3).toFixed(1)} aria-valuemax=${(this.frame!.start * 1e3 + 2 * reach).toFixed(1)}
         aria-valuenow=${(z * 1e3).toFixed(3)} aria-valuetext=${short(z, 6)}
         @keydown=${(event: KeyboardEvent) => this.key(event, which)}
         @focus=${() => this.bench.select(which)} @blur=${() => this.keysDone()}>
-      <rect class="back" x=${scale.x(z) - spare} y=${scale.top - 4} width=${length + 2 * spare} height=${scale.bottom - scale.top + 8} rx="5"></rect>
+      <rect class="strip" x=${x} y=${y} width=${width} height=${height} rx="5"></rect>
       ${which === "sensor" ? drawnSensor(side.sensor, z, scale) : drawn({ ...side.elements[which]!, z }, z, scale)}
     </g>`;
   }
@@ -365,10 +380,10 @@ export class SideView extends Part {
       g.ray.far path { stroke: var(--far); } g.ray.far circle { fill: var(--far); }
       g.ray.off-axis path { stroke: var(--aside); } g.ray.off-axis circle { fill: var(--aside); }
       .part { outline: none; }
-      .back { fill: transparent; }
-      .part.hover .back { fill: var(--hover); }
-      .part.selected .back { fill: var(--chosen); }
-      .part:focus-visible .back { stroke: var(--accent); stroke-width: 2; }
+      .back.hover { fill: var(--hover); }
+      .back.selected { fill: var(--chosen); }
+      .strip { fill: transparent; }
+      .part:focus-visible .strip { stroke: var(--accent); stroke-width: 2; }
       .glass { fill: var(--glass); stroke: var(--glass-edge); stroke-width: 1.2; fill-opacity: 0.85; }
       .glass.block { fill-opacity: 0.5; }
       .glass.open { stroke-dasharray: 4 3; }
