@@ -121,7 +121,7 @@ def lenslets(bench: Bench) -> None:
     bench.page.mouse.move(*place)
     for _ in range(4):
         bench.page.mouse.wheel(0, -300)
-    bench.page.mouse.move(place[0] + 9, place[1] + 9)
+    bench.page.mouse.move(place[0] - 12, place[1] - 10)
     bench.settle()
 
 

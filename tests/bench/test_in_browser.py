@@ -1,6 +1,9 @@
 """The bench in headless Chromium: by mouse, keys and typing, in two windows, without a server."""
 
 import json
+import tomllib
+import zipfile
+from pathlib import Path
 
 import pytest
 
@@ -183,6 +186,21 @@ def test_pinned_picture_is_compared_with(page):
         page.page.get_by_label("Compare with the pinned picture").select_option(mode)
         pictures.add(page.picture())
     assert len(pictures) == 4
+
+
+def test_camera_and_film_are_taken_away(page):
+    page.page.get_by_text("Export").click()
+    with page.page.expect_download() as taken:
+        page.page.get_by_role("menuitem", name="Camera file").click()
+    with zipfile.ZipFile(taken.value.path()) as archive:  # with the cells of its mask
+        assert tomllib.loads(archive.read("camera.toml").decode())["sensor"]["z"] == "52 mm"
+    page.page.get_by_text("Export").click()
+    page.page.get_by_role("menuitem", name="Film").click()
+    page.page.locator('input[name="frames"]').fill("3")
+    with page.page.expect_download() as taken:
+        page.button("Make the film").click()
+    assert Path(taken.value.path()).read_bytes().startswith(b"GIF8")
+    assert page.place("sensor") == "52 mm"
 
 
 def test_click_focuses_where_it_was_clicked(page):

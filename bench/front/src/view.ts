@@ -8,7 +8,7 @@ import { PictureView } from "./picture";
 import { SideView } from "./side";
 import { OF_A_POINT, QUESTIONS, answerStyles, drawnAnswer } from "./answers";
 import { sign } from "./signs";
-import { withUnit } from "./numbers";
+import { metres, plain, split, withUnit } from "./numbers";
 import type { Where } from "./protocol";
 
 type Beside = "parts" | "notes" | string;
@@ -22,8 +22,10 @@ const EXPORTS: [string, string][] = [
 ];
 
 export class BenchView extends Part {
-  static override properties = { ...Part.properties, beside: { state: true } };
+  static override properties = { ...Part.properties, beside: { state: true }, film: { state: true } };
   declare beside: Beside;
+  /** Which number is to be swept in a film, while that is asked for. */
+  declare film: string | null;
   /** Of the point whose picture is asked for; empty for the one in focus. */
   private distance = "";
   private askedFor = "";
@@ -32,6 +34,7 @@ export class BenchView extends Part {
   constructor() {
     super();
     this.beside = "parts";
+    this.film = null;
   }
 
   override connectedCallback(): void {
@@ -206,7 +209,49 @@ export class BenchView extends Part {
   }
 
   private keeping() {
-    return this.menu("Export", EXPORTS.map(([what, words]) => html`<button role="menuitem" @click=${() => this.bench.export(what)}>${words}</button>`));
+    return this.menu("Export", html`
+      ${EXPORTS.map(([what, words]) => html`<button role="menuitem" @click=${() => this.bench.export(what)}>${words}</button>`)}
+      <hr><button role="menuitem" data-stays aria-expanded=${this.film !== null} @click=${() => (this.film = this.film === null ? "z" : null)}>Film of a sweep …</button>
+      ${this.film === null ? nothing : this.filming(this.film)}`);
+  }
+
+  /** A sweep of a number of what is selected, between two values about the present one. */
+  private filming(name: string) {
+    const { bench } = this;
+    const selected = bench.selected === "light field" ? "sensor" : bench.selected;
+    const table = selected === "sensor" ? bench.document!.camera.sensor : (bench.elements[selected] ?? {});
+    const kind = bench.parts!.kinds.find((each) => each.kind === table["kind"]);
+    const all = (selected === "sensor" ? bench.parts!.sensor : (kind?.parameters ?? [])).filter(
+      (each) => each.takes.includes("number") && split(String(table[each.name] ?? "")) !== null,
+    );
+    const chosen = all.find((each) => each.name === name) ?? all[0];
+    const label = bench.partOf(selected)?.label[0] ?? "";
+    if (!chosen) return html`<p class="quiet">${label} has no number to be swept.</p>`;
+    const value = split(String(table[chosen.name]))!;
+    const around = chosen.name === "z" ? 1e-3 / metres(`1 ${value.unit}`) : 0.2 * Math.abs(value.number);
+    const end = (side: number) => `${plain(value.number + side * around, 5)} ${value.unit}`.trim();
+    const typed = (given: FormData, field: string) => {
+      const words = withUnit(String(given.get(field)), table[chosen.name], "");
+      return chosen.unit ? words : Number(words);
+    };
+    return html`<form @submit=${(event: SubmitEvent) => {
+        event.preventDefault();
+        const form = event.target as HTMLFormElement;
+        const given = new FormData(form);
+        bench.export("film", {
+          where: [...bench.whereOf(selected), chosen.name], from: typed(given, "from"), to: typed(given, "to"),
+          frames: Number(given.get("frames")), format: given.get("format"),
+        });
+        form.closest("details")!.open = false;
+        this.film = null;
+      }}>
+      <label>${label} <select name="parameter" @change=${(event: Event) => (this.film = (event.target as HTMLSelectElement).value)}>
+        ${all.map((each) => html`<option value=${each.name} ?selected=${each === chosen}>${each.name.replaceAll("_", " ")}</option>`)}</select></label>
+      <label>from <input type="text" name="from" .value=${end(-1)}></label>
+      <label>to <input type="text" name="to" .value=${end(1)}></label>
+      <label>frames <input type="number" name="frames" min="2" max="200" value="30"></label>
+      <label>as <select name="format"><option value="gif">GIF</option><option value="mp4">MP4</option></select></label>
+      <button class="main">Make the film</button></form>`;
   }
 
   private menu(words: string, items: unknown) {
@@ -218,7 +263,7 @@ export class BenchView extends Part {
           event.stopPropagation();
         }
         const by = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-        if (!by || event.target instanceof HTMLInputElement) return;
+        if (!by || (event.target as Element).matches("input, select")) return;
         event.preventDefault();
         details.open = true;
         const all = [...details.querySelectorAll<HTMLElement>('[role="menuitem"]')];
@@ -232,7 +277,7 @@ export class BenchView extends Part {
       @click=${(event: Event) => {
         const details = event.currentTarget as HTMLDetailsElement;
         const item = (event.target as Element).closest('[role="menuitem"]');
-        if (item && !item.nextElementSibling?.matches("input")) details.open = false;
+        if (item && !item.matches("[data-stays]") && !item.nextElementSibling?.matches("input")) details.open = false;
       }}>
       <summary>${words}${sign("down")}</summary><div class="items">${items}</div></details>`;
   }
@@ -300,6 +345,10 @@ export class BenchView extends Part {
       .items { position: absolute; right: 0; top: 32px; min-width: 210px; max-height: 420px; overflow-y: auto; padding: 5px; background: var(--well); border: 1px solid var(--line); border-radius: 8px; box-shadow: 0 6px 24px rgb(0 0 0 / 14%); display: grid; }
       .items button { justify-content: start; }
       .items hr { width: 100%; border: 0; border-top: 1px solid var(--line); margin: 4px 0; }
+      .items form { display: grid; gap: 6px; padding: 6px 9px; }
+      .items form label { display: grid; grid-template-columns: 84px 1fr; align-items: center; overflow-wrap: anywhere; line-height: 1.2; }
+      .items form select { border: 1px solid var(--line); background-color: var(--well); }
+      .items .main { background: var(--accent); color: var(--ground); justify-content: center; }
       .toasts { position: absolute; left: 50%; bottom: 36px; translate: -50%; display: grid; gap: 8px; width: min(560px, 92%); pointer-events: none; z-index: 4; }
       .toast { display: flex; align-items: center; justify-content: space-between; gap: 12px; padding: 8px 8px 8px 14px; border-radius: 8px; border: 1px solid var(--line); background: var(--well); box-shadow: 0 6px 24px rgb(0 0 0 / 14%); pointer-events: auto; overflow-wrap: anywhere; }
       .toast.error { background: var(--error-ground); }
