@@ -196,10 +196,10 @@ export class BenchView extends Part {
   private opening() {
     const { bench } = this;
     return this.menu("Open", html`
-      <button role="menuitem" @click=${(event: Event) => ((event.currentTarget as Element).nextElementSibling as HTMLInputElement).click()}>Camera file …</button>
+      <button data-item @click=${(event: Event) => ((event.currentTarget as Element).nextElementSibling as HTMLInputElement).click()}>Camera file …</button>
       <input type="file" hidden accept=".toml" aria-label="Camera file" @change=${(event: Event) => void this.load(event.target as HTMLInputElement)}>
       ${bench.parts!.gallery.length ? html`<hr>` : nothing}
-      ${bench.parts!.gallery.map((each) => html`<button role="menuitem" @click=${() => bench.act({ do: "load", gallery: each })}>${each}</button>`)}`);
+      ${bench.parts!.gallery.map((each) => html`<button data-item @click=${() => bench.act({ do: "load", gallery: each })}>${each}</button>`)}`);
   }
 
   private async load(input: HTMLInputElement): Promise<void> {
@@ -210,8 +210,8 @@ export class BenchView extends Part {
 
   private keeping() {
     return this.menu("Export", html`
-      ${EXPORTS.map(([what, words]) => html`<button role="menuitem" @click=${() => this.bench.export(what)}>${words}</button>`)}
-      <hr><button role="menuitem" data-stays aria-expanded=${this.film !== null} @click=${() => (this.film = this.film === null ? "z" : null)}>Film of a sweep …</button>
+      ${EXPORTS.map(([what, words]) => html`<button data-item @click=${() => this.bench.export(what)}>${words}</button>`)}
+      <hr><button data-item data-stays aria-expanded=${this.film !== null} @click=${() => (this.film = this.film === null ? "z" : null)}>Film of a sweep …</button>
       ${this.film === null ? nothing : this.filming(this.film)}`);
   }
 
@@ -266,7 +266,7 @@ export class BenchView extends Part {
         if (!by || (event.target as Element).matches("input, select")) return;
         event.preventDefault();
         details.open = true;
-        const all = [...details.querySelectorAll<HTMLElement>('[role="menuitem"]')];
+        const all = [...details.querySelectorAll<HTMLElement>('[data-item]')];
         const at = all.indexOf(event.target as HTMLElement);
         all[(at + by + all.length) % all.length]?.focus();
       }}
@@ -276,7 +276,7 @@ export class BenchView extends Part {
       }}
       @click=${(event: Event) => {
         const details = event.currentTarget as HTMLDetailsElement;
-        const item = (event.target as Element).closest('[role="menuitem"]');
+        const item = (event.target as Element).closest('[data-item]');
         if (item && !item.matches("[data-stays]") && !item.nextElementSibling?.matches("input")) details.open = false;
       }}>
       <summary>${words}${sign("down")}</summary><div class="items">${items}</div></details>`;

@@ -338,12 +338,12 @@ async function Le(r,s){let e=new Blob([r]).stream().pipeThrough(s);return new Ui
       ${i?gt(i):d`<p class="quiet">…</p>`}</div>`}toasts(){let{bench:e}=this,{progress:t,refused:i}=e;return d`
       ${i&&!this.saidAtField(i.where)?d`<div class="toast error"><span>${i.words}</span><button @click=${()=>e.forgive()}>Close</button></div>`:u}
       ${t?d`<div class="toast"><span>${t.words}</span><progress aria-label=${t.words} max=${t.total} value=${t.done}></progress></div>`:u}`}saidAtField(e){let{selected:t}=this.bench;return!e||this.beside!=="parts"||t==="light field"?!1:this.bench.whereOf(t).every((i,n)=>e[n]===i)&&e.length>(t==="sensor"?1:2)}opening(){let{bench:e}=this;return this.menu("Open",d`
-      <button role="menuitem" @click=${t=>t.currentTarget.nextElementSibling.click()}>Camera file …</button>
+      <button data-item @click=${t=>t.currentTarget.nextElementSibling.click()}>Camera file …</button>
       <input type="file" hidden accept=".toml" aria-label="Camera file" @change=${t=>{this.load(t.target)}}>
       ${e.parts.gallery.length?d`<hr>`:u}
-      ${e.parts.gallery.map(t=>d`<button role="menuitem" @click=${()=>e.act({do:"load",gallery:t})}>${t}</button>`)}`)}async load(e){let t=e.files?.[0];t&&this.bench.act({do:"load",toml:await t.text()}),e.value=""}keeping(){return this.menu("Export",d`
-      ${xs.map(([e,t])=>d`<button role="menuitem" @click=${()=>this.bench.export(e)}>${t}</button>`)}
-      <hr><button role="menuitem" data-stays aria-expanded=${this.film!==null} @click=${()=>this.film=this.film===null?"z":null}>Film of a sweep …</button>
+      ${e.parts.gallery.map(t=>d`<button data-item @click=${()=>e.act({do:"load",gallery:t})}>${t}</button>`)}`)}async load(e){let t=e.files?.[0];t&&this.bench.act({do:"load",toml:await t.text()}),e.value=""}keeping(){return this.menu("Export",d`
+      ${xs.map(([e,t])=>d`<button data-item @click=${()=>this.bench.export(e)}>${t}</button>`)}
+      <hr><button data-item data-stays aria-expanded=${this.film!==null} @click=${()=>this.film=this.film===null?"z":null}>Film of a sweep …</button>
       ${this.film===null?u:this.filming(this.film)}`)}filming(e){let{bench:t}=this,i=t.selected==="light field"?"sensor":t.selected,n=i==="sensor"?t.document.camera.sensor:t.elements[i]??{},o=t.parts.kinds.find(g=>g.kind===n.kind),a=(i==="sensor"?t.parts.sensor:o?.parameters??[]).filter(g=>g.takes.includes("number")&&H(String(n[g.name]??""))!==null),l=a.find(g=>g.name===e)??a[0],c=t.partOf(i)?.label[0]??"";if(!l)return d`<p class="quiet">${c} has no number to be swept.</p>`;let h=H(String(n[l.name])),p=l.name==="z"?.001/tt(`1 ${h.unit}`):.2*Math.abs(h.number),m=g=>`${v(h.number+g*p,5)} ${h.unit}`.trim(),f=(g,y)=>{let w=Z(String(g.get(y)),n[l.name],"");return l.unit?w:Number(w)};return d`<form @submit=${g=>{g.preventDefault();let y=g.target,w=new FormData(y);t.export("film",{where:[...t.whereOf(i),l.name],from:f(w,"from"),to:f(w,"to"),frames:Number(w.get("frames")),format:w.get("format")}),y.closest("details").open=!1,this.film=null}}>
       <label>${c} <select name="parameter" @change=${g=>this.film=g.target.value}>
         ${a.map(g=>d`<option value=${g.name} ?selected=${g===l}>${g.name.replaceAll("_"," ")}</option>`)}</select></label>
@@ -351,9 +351,9 @@ async function Le(r,s){let e=new Blob([r]).stream().pipeThrough(s);return new Ui
       <label>to <input type="text" name="to" .value=${m(1)}></label>
       <label>frames <input type="number" name="frames" min="2" max="200" value="30"></label>
       <label>as <select name="format"><option value="gif">GIF</option><option value="mp4">MP4</option></select></label>
-      <button class="main">Make the film</button></form>`}menu(e,t){return d`<details class="menu" @keydown=${i=>{let n=i.currentTarget;i.key==="Escape"&&(n.open=!1,n.querySelector("summary").focus(),i.stopPropagation());let o={ArrowDown:1,ArrowUp:-1}[i.key];if(!o||i.target.matches("input, select"))return;i.preventDefault(),n.open=!0;let a=[...n.querySelectorAll('[role="menuitem"]')],l=a.indexOf(i.target);a[(l+o+a.length)%a.length]?.focus()}}
+      <button class="main">Make the film</button></form>`}menu(e,t){return d`<details class="menu" @keydown=${i=>{let n=i.currentTarget;i.key==="Escape"&&(n.open=!1,n.querySelector("summary").focus(),i.stopPropagation());let o={ArrowDown:1,ArrowUp:-1}[i.key];if(!o||i.target.matches("input, select"))return;i.preventDefault(),n.open=!0;let a=[...n.querySelectorAll("[data-item]")],l=a.indexOf(i.target);a[(l+o+a.length)%a.length]?.focus()}}
       @focusout=${i=>{let n=i.currentTarget;i.relatedTarget&&!n.contains(i.relatedTarget)&&(n.open=!1)}}
-      @click=${i=>{let n=i.currentTarget,o=i.target.closest('[role="menuitem"]');o&&!o.matches("[data-stays]")&&!o.nextElementSibling?.matches("input")&&(n.open=!1)}}>
+      @click=${i=>{let n=i.currentTarget,o=i.target.closest("[data-item]");o&&!o.matches("[data-stays]")&&!o.nextElementSibling?.matches("input")&&(n.open=!1)}}>
       <summary>${e}${$("down")}</summary><div class="items">${t}</div></details>`}static{this.styles=[P,bt,x`
       :host {
         color-scheme: var(--bench-scheme, light dark);
