@@ -56,6 +56,11 @@ def test_elements_keep_the_order_in_which_they_are_listed():
             {"name": "mura", "prime": 10007},
             "prime is 10007; on a bench it is up to 1024",
         ),
+        (
+            ["elements", 1],
+            {"kind": "phase_plate", "surface": {"name": "zernike", "coefficients": ["1 nm"] * 301}},
+            "coefficients has 301 entries, and on a bench there are up to 300",
+        ),
         (["elements", 7, "z"], "1 mm", "the bench: camera: elements has 2 entries: there is no number 7"),
         (["elements", 1, "pattern"], "secret.npy", "not among the files that may be read here"),
         (["elements", 0, "kind"], "lense", 'did you mean "lens"?'),

@@ -20,7 +20,7 @@ from tests.bench.on_bench import CAMERA, NOWHERE, PIXELS, START, Client, noise, 
 from vcc.bench.document import Document
 from vcc.bench.offered import Field
 from vcc.bench.picture import COARSER, WHOLE, Pace, Taken, codes, take
-from vcc.bench.session import MOST_WAITING, Broken
+from vcc.bench.session import CHANGES, MOST_WAITING, QUESTIONS, Broken
 from vcc.camera_file import ELEMENT_KINDS
 from vcc.files.pictures import auto_exposure
 
@@ -526,3 +526,57 @@ def test_a_film_is_broken_off_by_a_change(client):
         client.do("set", where=["sensor", "z"], value="53 mm", turn=9)
     assert "broken off" in client.until("refused", "file")[0]["words"]
     assert client.at_rest()["turn"] == 9
+
+
+# --- whatever comes ---
+
+JUNK = some.recursive(
+    some.none()
+    | some.booleans()
+    | some.integers(-3, 30)
+    | some.sampled_from([1e300, -1e-300, 10**400, "", "5 mm", "lens", "mask.png", "1 deg", "elements"])
+    | some.sampled_from([["elements", 1, "pattern"], ["sensor", "z"], ["elements", 0], {"name": "mura"}]),
+    lambda inner: some.lists(inner, max_size=3) | some.dictionaries(some.sampled_from(["name", "kind"]), inner),
+    max_leaves=5,
+)
+FIELDS = [
+    "where",
+    "value",
+    "kind",
+    "z",
+    "element",
+    "by",
+    "what",
+    "x",
+    "y",
+    "on",
+    "document",
+    "toml",
+    "gallery",
+    "name",
+]
+FIELDS += ["from", "to", "frames", "format", "distance", "moving"]
+
+
+@given(
+    some.lists(
+        some.tuples(
+            some.sampled_from(CHANGES + QUESTIONS), some.dictionaries(some.sampled_from(FIELDS), JUNK, max_size=4)
+        ),
+        min_size=1,
+        max_size=8,
+    )
+)
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+def test_whatever_comes_is_done_or_refused_in_words(messages):
+    """No message ends in a fault of the program, and the bench goes on after each."""
+    client = Client()
+    for what, fields in messages:
+        client.session.receive({"do": what} | fields, [b"junk"])
+    client.do("hello", turn=77)
+    while True:
+        message, _ = client.until("picture", "no picture", "failed", "state")
+        assert message["is"] != "failed", message
+        if message.get("turn") == 77 and message["is"] != "state":
+            break
+    client.close()

@@ -158,7 +158,7 @@ def new_element(kind: Any, z: Any, train: Train, names: set[str]) -> Json:
     Raises:
         InputError: there is no such kind, or what z says is no length.
     """
-    if kind not in ELEMENT_KINDS:
+    if not isinstance(kind, str) or kind not in ELEMENT_KINDS:
         raise InputError(f"there is no element of kind {shown(kind)}: there are {', '.join(ELEMENT_KINDS)}")
     place = units.parse(z, "length", "z")
     long, wide = max(train.sensor.z, 1e-3), _width_at(train, place)

@@ -23,6 +23,8 @@ MOST_PIXELS = 2**22
 """Of a sensor on a bench: more would keep its memory and its user waiting."""
 MOST_CELLS = 2**20
 """Of a mask that is asked for by name and size."""
+MOST_QUANTITIES = 300
+"""In a list, such as the coefficients of a plate: each costs time at each place of the plate."""
 MOST_ELEMENTS = 100
 MOST_STEPS = 100
 """So many steps can be undone."""
@@ -275,6 +277,8 @@ def _check_sizes(tree: Any, place: str) -> None:
         if type(prime) is int and prime * prime > MOST_CELLS:
             raise InputError(f"{place}: prime is {prime}; on a bench it is up to {math.isqrt(MOST_CELLS)}")
     elif isinstance(tree, list):
+        if len(tree) > MOST_QUANTITIES and isinstance(tree[0], str):
+            raise InputError(f"{place} has {len(tree)} entries, and on a bench there are up to {MOST_QUANTITIES}")
         for number, each in enumerate(tree, start=1):
             _check_sizes(each, f"{place} {number}")
     elif not isinstance(tree, str | int | float) or (isinstance(tree, float) and not math.isfinite(tree)):

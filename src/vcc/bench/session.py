@@ -156,6 +156,11 @@ class Session:
                     self._answer(message, buffers)
             except Superseded:
                 continue
+            except MemoryError:
+                self._wanted = None
+                self._tell(
+                    {"is": "failed", "words": "there is not enough memory for this camera: make it smaller"}
+                )
             except Exception as error:  # a fault of ours; the client is told, and the bench goes on
                 log.exception("a fault on the bench")
                 self._wanted = None
