@@ -206,7 +206,6 @@ export class Bench extends EventTarget {
         this.accepted = message.document;
         if (message.turn >= this.turn && !this.next) {
           this.document = message.document;
-          this.refused = null;
           this.keepAddress();
         }
         if (message.turn >= this.selectAt) {
@@ -317,6 +316,7 @@ export class Bench extends EventTarget {
 
   private ask(message: object, buffers?: ArrayBuffer[]): void {
     this.turn += 1;
+    this.refused = null;
     this.waiting = this.open;
     this.host.send({ ...message, turn: this.turn }, buffers);
   }

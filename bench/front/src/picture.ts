@@ -4,6 +4,7 @@ import { html, css, nothing } from "lit";
 
 import { plain } from "./numbers";
 import { Part, controls } from "./part";
+import type { PictureMessage } from "./protocol";
 import { sign } from "./signs";
 
 type Compare = "alone" | "beside" | "wipe" | "difference";
@@ -39,6 +40,7 @@ export class PictureView extends Part {
   private readonly pointers = new Map<number, Place>();
   private gesture: "pan" | "wipe" | null = null;
   private travelled = 0;
+  private asked: PictureMessage | null = null;
   private readonly scratch = document.createElement("canvas");
   private readonly watch = new ResizeObserver(([entry]) => {
     this.width = entry!.contentRect.width;
@@ -230,7 +232,16 @@ export class PictureView extends Part {
 
   // --- drawing ---
 
+  /** What the pixel that is pointed at holds in a new picture. */
+  private askAgain(): void {
+    const about = this.bench.picture?.about;
+    if (about === this.asked || !about || about.coarse) return;
+    this.asked = about;
+    if (this.at) this.bench.askValue(this.at.x, this.at.y);
+  }
+
   protected override updated(): void {
+    this.askAgain();
     const { canvas } = this;
     const sharp = window.devicePixelRatio || 1;
     const [wide, high] = [Math.round(this.width * sharp), Math.round(this.height * sharp)];
