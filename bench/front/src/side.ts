@@ -54,8 +54,6 @@ export class SideView extends Part {
   declare height: number;
   declare drag: Drag | null;
   declare hover: number | "sensor" | null;
-  /** Nothing was moved yet: it is said that it can be. */
-  private untouched = true;
   private frame: Frame | null = null;
   private keyTimer = 0;
   private readonly watch = new ResizeObserver(([entry]) => {
@@ -165,7 +163,6 @@ export class SideView extends Part {
     if (snap && Math.abs(scale.x(snap.z) - x) < PULL) z = snap.z;
     if (z === this.drag.z && this.drag.moved) return;
     if (!this.drag.moved && Math.abs(scale.x(z) - scale.x(this.drag.from)) < 2) return;
-    this.untouched = false;
     this.drag = { ...this.drag, z, snap, moved: true };
     this.bench.set([...this.bench.whereOf(this.drag.which), "z"], inMillimetres(z), true);
   }
@@ -242,7 +239,6 @@ export class SideView extends Part {
         ${this.drawSnap(scale)}
         ${this.drawLabels(side, scale)}
         ${this.drawDistances(side, scale)}
-        ${this.untouched ? svg`<text class="hint" x="10" y="18">Drag the sensor, or what stands before it.</text>` : nothing}
       </svg>
       <ul class="legend">
         ${side.rays.map((each) => html`<li><i class="ray ${each.colour.replace(" ", "-")}"></i>${brief(each)}</li>`)}

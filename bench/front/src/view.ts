@@ -114,6 +114,7 @@ export class BenchView extends Part {
           <button class="icon" title="Undo (Ctrl+Z)" aria-label="Undo" ?disabled=${!bench.canUndo} @click=${() => bench.act({ do: "undo" })}>${sign("undo")}</button>
           <button class="icon" title="Redo (Ctrl+Shift+Z)" aria-label="Redo" ?disabled=${!bench.canRedo} @click=${() => bench.act({ do: "redo" })}>${sign("redo")}</button>
         </div>
+        ${bench.side && !bench.canUndo && !bench.canRedo ? html`<span class="quiet hint">Drag the sensor, or what stands before it.</span>` : nothing}
         <span class="spring"></span>
         ${bench.parts ? [this.opening(), this.keeping()] : nothing}
       </header>
@@ -326,6 +327,7 @@ export class BenchView extends Part {
       h1 { margin: 0; font-size: 13px; font-weight: 600; letter-spacing: -0.01em; }
       .group { display: flex; }
       .spring { flex: 1; }
+      @container (max-width: 699px) { .hint { display: none; } }
       .bench { grid-area: bench; min-height: 0; min-width: 0; display: grid; border-bottom: 1px solid var(--line); }
       .picture { grid-area: picture; min-height: 0; min-width: 0; display: grid; border-left: var(--aside-border, 1px) solid var(--line); }
       .beside { grid-area: beside; min-height: 0; min-width: 0; display: flex; flex-direction: column; }
