@@ -58,8 +58,8 @@ def test_elements_keep_the_order_in_which_they_are_listed():
         ),
         (
             ["elements", 1],
-            {"kind": "phase_plate", "surface": {"name": "zernike", "coefficients": ["1 nm"] * 301}},
-            "coefficients has 301 entries, and on a bench there are up to 300",
+            {"kind": "phase_plate", "surface": {"name": "zernike", "coefficients": ["1 nm"] * 121}},
+            "coefficients has 121 entries, and on a bench there are up to 120",
         ),
         (["elements", 7, "z"], "1 mm", "the bench: camera: elements has 2 entries: there is no number 7"),
         (["elements", 1, "pattern"], "secret.npy", "not among the files that may be read here"),

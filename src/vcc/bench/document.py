@@ -23,7 +23,7 @@ MOST_PIXELS = 2**22
 """Of a sensor on a bench: more would keep its memory and its user waiting."""
 MOST_CELLS = 2**20
 """Of a mask that is asked for by name and size."""
-MOST_QUANTITIES = 300
+MOST_QUANTITIES = 120
 """In a list, such as the coefficients of a plate: each costs time at each place of the plate."""
 MOST_ELEMENTS = 100
 MOST_STEPS = 100
