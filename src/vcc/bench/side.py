@@ -56,8 +56,8 @@ DIGITS = 5
 PROFILE_POINTS = 160
 MOST_PIECES = 400
 """Of a mask's pattern: of a finer one, pieces are the mean of several."""
-CLOSE = 1e-9
-"""Metres: a place on the axis that is the same but for rounding."""
+AS_SHARP = 0.01
+"""Of 1/Z: what is no farther from the distance in focus shows no other rays."""
 
 
 def side(elements: Sequence[Element], train: Train, light_field: InMemory | None, grid: Grid | None) -> Json:
@@ -69,7 +69,7 @@ def side(elements: Sequence[Element], train: Train, light_field: InMemory | None
         light_field: whose width the rays fill; None fills the first lens.
         grid: whose scene tells what distances matter; None for none.
     """
-    points = points_to_show(train, None, AXIS)
+    points = _points(train, grid)
     start = -scene_length(train, points)
     scattering = any(stage.faces.spread is not None for stage in train.stages)
     rays = RAYS_THAT_SPLIT if scattering else RAYS
@@ -184,6 +184,25 @@ def _sensor_label(train: Train) -> list[str]:
 
 
 # --- rays ---
+
+
+def _points(train: Train, grid: Grid | None) -> list[Point]:
+    """The points whose rays are drawn: in focus, also off the axis, and the scene's ends if they are known."""
+    found = points_to_show(train, None, AXIS)
+    scene = {} if grid is None else scene_distances(grid)
+    apart = {
+        role: distance
+        for role, distance in zip(("near", "far"), scene.values(), strict=False)
+        if distance > 0 and abs(1 / distance - 1 / found[0].distance) > AS_SHARP / found[0].distance
+    }
+    if not apart:
+        return found
+    ends = [Point(distance, 0.0, role, f"{role}: {_away(distance)}") for role, distance in apart.items()]
+    return [point for point in found if point.role != "near"] + ends
+
+
+def _away(distance: float) -> str:
+    return "at infinity" if math.isinf(distance) else f"{distance_in_words(distance)} away"
 
 
 def _rays(point: Point, paths: Paths) -> Json:
