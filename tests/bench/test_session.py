@@ -335,7 +335,7 @@ def test_the_pace_is_kept_for_each_kind_of_camera():
     assert pace.fineness("new") == COARSER[0]
     pace.noted("quick", WHOLE, timed(taken, 0.01))
     assert pace.fineness("quick") == WHOLE
-    pace.noted("slow", WHOLE, timed(taken, 0.19))
+    pace.noted("slow", WHOLE, timed(taken, 0.11))
     assert pace.fineness("slow") == COARSER[0]
     pace.noted("slower", WHOLE, timed(taken, 100.0))
     assert pace.fineness("slower") == COARSER[-1]

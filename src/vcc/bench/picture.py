@@ -32,7 +32,7 @@ from vcc.run.expose import Exposure
 
 Picture = NDArray[np.float32]
 
-IN_TIME = 0.05
+IN_TIME = 0.03
 """Seconds that a picture may take while something moves: a coarser one is made where a finer takes longer."""
 RECENT = 0.4
 """How much the last picture counts in what the next is expected to take."""
@@ -42,8 +42,10 @@ RAYS = 64
 """A pixel, in a whole picture."""
 SHADES = 4096
 """Of linear light, told apart in pictures for the screen."""
-QUALITY = {False: 90, True: 75}
+QUALITY = {False: 95, True: 75}
 """Of JPEG, whole and coarse."""
+SUBSAMPLING = {False: "444", True: "420"}
+"""Of JPEG's colours: single pixels of a whole picture are looked at."""
 
 
 @dataclass(frozen=True)
@@ -230,7 +232,9 @@ def jpeg(values: Picture, white: float, coarse: bool = False) -> bytes:
     """
     import imagecodecs
 
-    return bytes(imagecodecs.jpeg_encode(codes(values, white), level=QUALITY[coarse]))
+    return bytes(
+        imagecodecs.jpeg_encode(codes(values, white), level=QUALITY[coarse], subsampling=SUBSAMPLING[coarse])
+    )
 
 
 @functools.cache

@@ -433,7 +433,7 @@ class Session:
             "psnr": None if compared is None or math.isinf(compared) else compared,
             "same": compared is not None and bool(math.isinf(compared)),
         }
-        self._tell(message, [jpeg(taken.values, white, taken.coarse)])
+        self._tell(message, [jpeg(taken.values, white, taken.coarse or wanted.moving)])
 
     def _notes(self, taken: Taken) -> list[Json]:
         """What to beware of, each at the element that its words name."""
