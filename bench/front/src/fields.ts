@@ -155,9 +155,9 @@ function cells(bench: Bench, value: Value, where: Where, id: string): TemplateRe
   };
   // The text below says the same to keys and readers of screens.
   return html`<div class="cells">
-    <div class="grid" aria-hidden="true" style="grid-template-columns: repeat(${columns}, ${side}px)">
+    ${where.includes("pattern") ? html`<div class="grid" aria-hidden="true" style="grid-template-columns: repeat(${columns}, ${side}px)">
       ${grid.map((row, r) => row.map((cell, c) => html`<i style="height:${side}px;background:color-mix(in srgb, #fff ${100 * Math.min(Math.max(cell, 0), 1)}%, #000)" @click=${() => flip(r, c)}></i>`))}
-    </div>
+    </div>` : nothing}
     <textarea id=${id} rows=${Math.min(grid.length, 6)} spellcheck="false" .value=${grid.map((row) => row.join(" ")).join("\n")} @change=${typed}></textarea>
   </div>`;
 }

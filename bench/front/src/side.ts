@@ -17,6 +17,8 @@ const REACH = 18;
 const LOOSE = 1.35;
 /** Behind the sensor, as a share of the drawing: there is room to drag it to. */
 const ROOM = 0.06;
+/** In a wider drawing all rays are named, in a narrower one those of the axis. */
+const ALL_RAYS = 500;
 const KEY_PAUSE = 500;
 
 interface Drag {
@@ -241,7 +243,7 @@ export class SideView extends Part {
         ${this.drawDistances(side, scale)}
       </svg>
       <ul class="legend">
-        ${side.rays.map((each) => html`<li><i class="ray ${each.colour.replace(" ", "-")}"></i>${brief(each)}</li>`)}
+        ${side.rays.filter((each) => this.width > ALL_RAYS || each.colour !== "off axis").map((each) => html`<li><i class="ray ${each.colour.replace(" ", "-")}"></i>${brief(each)}</li>`)}
       </ul>`;
   }
 
@@ -405,7 +407,7 @@ export class SideView extends Part {
       .snap.held text { fill-opacity: 1; font-weight: 600; }
       .distances path { stroke: var(--edge); fill: none; }
       .distances rect { fill: var(--ground); }
-      .legend { position: absolute; left: 10px; right: 10px; bottom: 0; margin: 0; padding: 0; list-style: none; display: flex; flex-wrap: wrap; justify-content: center; gap: 0 16px; font-size: 11.5px; line-height: 16px; color: var(--quiet); pointer-events: none; }
+      .legend { position: absolute; left: 10px; right: 10px; bottom: 0; margin: 0; padding: 0; list-style: none; display: flex; justify-content: center; gap: 0 16px; white-space: nowrap; font-size: 11.5px; line-height: 16px; color: var(--quiet); pointer-events: none; }
       .legend i { display: inline-block; width: 14px; height: 2px; margin-right: 6px; vertical-align: 3px; border-radius: 1px; }
       i.focused { background: var(--focused); } i.near { background: var(--near); } i.far { background: var(--far); } i.off-axis { background: var(--aside); }
     `,
