@@ -3,6 +3,7 @@
 import json
 import re
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from asyncio import base_events
 from contextlib import ExitStack, contextmanager
 
 import pytest
@@ -208,6 +210,15 @@ def test_bytes_are_a_message_or_damaged(data):
     except Damaged:
         return
     assert isinstance(message, dict)
+
+
+def test_what_is_sent_does_not_wait_for_what_was_sent_before():
+    """By asyncio's own rule (`asyncio.base_events._set_nodelay`) a socket must be known to be one of TCP."""
+    with listening("127.0.0.1", 0) as made, socket.create_connection(made.getsockname()):
+        accepted, _ = made.accept()
+        with accepted:
+            base_events._set_nodelay(accepted)
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 def test_a_port_that_is_taken_is_refused():
