@@ -1,5 +1,6 @@
 """Sessions of the bench: what a client says and is told; without sockets."""
 
+import dataclasses
 import io
 import json
 import runpy
@@ -518,11 +519,19 @@ def test_films_that_cannot_be_made_are_refused(client, changes, words):
     assert words in client.until("refused", "file")[0]["words"]
 
 
-def test_a_film_is_broken_off_by_a_change(client):
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"what": "film", "where": ["sensor", "z"], "from": "50 mm", "to": "54 mm", "frames": 100},
+        {"what": "png"},
+    ],
+)
+def test_what_takes_long_is_broken_off_by_a_change(client, asked):
     client.do("hello")
     client.at_rest()
+    client.session._taken = dataclasses.replace(client.session._taken, coarse=True)  # a whole one is to be made
     with client.session.offered.turn:
-        client.do("export", what="film", where=["sensor", "z"], **{"from": "50 mm", "to": "54 mm"}, frames=100)
+        client.do("export", **asked)
         client.do("set", where=["sensor", "z"], value="53 mm", turn=9)
     assert "broken off" in client.until("refused", "file")[0]["words"]
     assert client.at_rest()["turn"] == 9

@@ -179,6 +179,8 @@ class Session:
                 getattr(self, f"_do_{doing}")(message)
         except InputError as error:
             self._refuse(message, error)
+        except Superseded:
+            self._refuse(message, InputError(f"{doing} was broken off: something else was asked for meanwhile"))
 
     def _refuse(self, message: Json, error: InputError) -> None:
         where, turn = message.get("where"), _turn(message)
@@ -518,15 +520,11 @@ class Session:
         """A film of a sweep: each picture whole, all with the white of the present one."""
         self._whole_picture()
         frames, words = [], "Making the film"
-        try:
-            for number, document in enumerate(sweep.documents):
-                self._tell({"is": "progress", "done": number, "total": sweep.frames, "words": words})
-                checked, described = self._checked(document)
-                taken = self._take(WHOLE, checked, described)
-                frames.append(codes(taken.values, self._shown_white))
-        except Superseded:
-            self._refuse(message, InputError("the film was broken off: something else was asked for meanwhile"))
-            raise
+        for number, document in enumerate(sweep.documents):
+            self._tell({"is": "progress", "done": number, "total": sweep.frames, "words": words})
+            checked, described = self._checked(document)
+            taken = self._take(WHOLE, checked, described)
+            frames.append(codes(taken.values, self._shown_white))
         self._tell({"is": "progress", "done": sweep.frames, "total": sweep.frames, "words": words})
         name, kind, data = sweep.film(frames)
         self._tell({"is": "file", "name": name, "type": kind}, [data])
