@@ -76,10 +76,16 @@ def test_arrow_keys_step_and_those_that_follow_one_another_are_one_movement(page
     ):
         page.page.keyboard.press(key)
         assert page.place("sensor") == place
-    page.page.wait_for_selector('button[aria-label="Undo"]:not([disabled])')
+    page.page.wait_for_timeout(700)  # longer than the pause that ends a movement
+    page.part("sensor").evaluate(
+        "part => { for (let n = 0; n < 3; n++)"
+        " part.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight', bubbles: true })) }"
+    )
+    page.wait_for_place("sensor", "53.29 mm")
+    page.page.wait_for_timeout(700)
     page.settle()
     page.button("Undo").click()
-    page.wait_for_place("sensor", "52 mm")
+    page.wait_for_place("sensor", "52.99 mm")
 
 
 def focused(page):
@@ -147,11 +153,11 @@ def test_elements_are_added_edited_and_removed(page):
 
 
 def test_address_holds_the_camera_for_another_window_and_for_a_reload(page, browser, served):
+    page.page.wait_for_url("**#d=*")
+    before = page.page.url
     page.page.locator("#sensor-z").fill("50.5 mm")
     page.page.keyboard.press("Enter")
-    page.page.wait_for_url("**#d=*")
-    page.settle()
-    page.page.wait_for_timeout(400)  # the address is written when the bench rests
+    page.page.wait_for_url(lambda address: address != before)  # it is written when the bench rests
     other = Page(browser, page.page.url)
     assert other.place("sensor") == "50.5 mm"
     other.page.locator("#sensor-z").fill("51 mm")
