@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks, units
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.reading import check_file, expanded, in_words, read_bytes, reading
 from vcc.files.camera_families import (
@@ -48,8 +49,8 @@ LIKELY = 0.75
 _ARRAY_LIKE = set(get_args(ArrayLike))
 
 
-@dataclasses.dataclass(frozen=True)
-class Beside:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Beside(Brief):
     """The files that a camera's tables may name.
 
     Args:
