@@ -8,7 +8,7 @@ from os import PathLike
 from typing import Any, Literal, Self, TypeVar, Unpack
 
 from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
-from vcc.advice.darkness import why_dark
+from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.explain import Explanation, explained
 from vcc.base import checks, late
 from vcc.base.errors import InputError, warn_of_result
@@ -34,9 +34,6 @@ from vcc.run.operators import carried_to
 
 Field = TypeVar("Field", bound=InMemory)
 
-MUCH_MISSING = 0.01
-"""Share of the rays asked for that may be missing without a warning."""
-
 
 def _check_of_the_run(options: Options) -> None:
     """Refuse options that decide how a plan is made, where one is given."""
@@ -51,12 +48,9 @@ def _check_of_the_run(options: Options) -> None:
 def _caution(plan: Plan, light_field: Samples, found: Recorded, absurd: str) -> str:
     """What to say of a picture that is dark or lacks rays, with absurd lengths, which may be the reason."""
     caution = why_dark(plan, light_field, found) or ""
-    if not caution and found.missing_rays > MUCH_MISSING:
+    if not caution and (darker := why_darker(found)):
         absurd = absurd if found.missing_rays > MANY_MISSING else ""
-        caution = (
-            f"{found.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
-            f"({found.missing_reason}); the picture is darker there"
-        )
+        caution = darker
     if not caution and absurd and is_faint(found, light_field):
         caution = "the picture is nearly black"
     return f"{caution}. {absurd}" if caution and absurd else caution

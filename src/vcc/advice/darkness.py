@@ -1,4 +1,4 @@
-"""Why a picture is dark throughout although the light field is not, in a sentence."""
+"""Why a picture is dark although the light field is not, throughout or where rays are missing, in a sentence."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from vcc.plan.model import Plan
 from vcc.plan.operators import OnSensor
 from vcc.plan.rays.model import Rays
 from vcc.run.drive import Recorded
+
+MUCH_MISSING = 0.01
+"""Share of the rays asked for that may be missing without a word."""
 
 
 def why_dark(plan: Plan, samples: Samples, found: Recorded) -> str | None:
@@ -41,6 +44,20 @@ def why_dark(plan: Plan, samples: Samples, found: Recorded) -> str | None:
         f"the picture is 0 everywhere, and the light field is not: {why}{lacking}. Check where the elements, the "
         "sensor and the light field stand (camera.explain, camera.plot)"
     )
+
+
+def why_darker(found: Recorded) -> str | None:
+    """A sentence that says how many rays are missing, and why; None where they are few.
+
+    Args:
+        found: what the run told.
+    """
+    if found.missing_rays > MUCH_MISSING:
+        return (
+            f"{found.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
+            f"({found.missing_reason}); the picture is darker there"
+        )
+    return None
 
 
 def _lit(picture: np.ndarray[Any, Any]) -> bool:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import io
-import tempfile
 import zipfile
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +19,7 @@ from vcc.bench.document import Document, shown
 from vcc.bench.picture import Taken
 from vcc.files.camera_families import FAMILIES, needed, parameters_of, unit_of
 from vcc.files.camera_reading import Beside
-from vcc.files.camera_writing import tables_of_train
+from vcc.files.camera_writing import NOWHERE, tables_of_train
 from vcc.optics import Element
 from vcc.optics.electronics import Electronics
 from vcc.optics.sensor import Sensor
@@ -70,15 +68,10 @@ def exported(what: Any, bench: OnBench, taken: Taken | None, white: float) -> tu
         return _with_arrays("picture", "py", "text/x-python", text, arrays)
     if what in ("png", "exr") and taken is not None:
         kind = {"png": "image/png", "exr": "image/x-exr"}[what]
-        return f"picture.{what}", kind, _saved(taken, f".{what}", white)
+        stream = io.BytesIO()
+        taken.image.save(stream, format=what, exposure=1 / white if what == "png" else "auto")
+        return f"picture.{what}", kind, stream.getvalue()
     raise InputError(f"a bench exports {', '.join(KINDS)}, not {shown(what)}")
-
-
-def _saved(taken: Taken, ending: str, white: float) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"picture{ending}"
-        taken.image.save(path, exposure=1 / white if ending == ".png" else "auto")
-        return path.read_bytes()
 
 
 def _with_arrays(
@@ -101,8 +94,7 @@ def camera_file(train: Train) -> tuple[str, dict[str, NDArray[np.float64]]]:
     """The text of a camera file, and the arrays that stand beside it, by their names."""
     import tomli_w
 
-    nowhere = Path(tempfile.gettempdir()) / "no-such-folder" / "camera.toml"  # no file beside it is named instead
-    tables, arrays = tables_of_train(train, nowhere)
+    tables, arrays = tables_of_train(train, NOWHERE / "camera.toml")
     return tomli_w.dumps(tables), arrays
 
 

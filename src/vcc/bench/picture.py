@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
@@ -144,15 +143,15 @@ def light_field_of(field: Field, views: Views | None, fineness: Fineness, progre
     if views is not None:
         views.check(chosen.shape)
         chosen = chosen[views.slices]
-    (_, rows), (_, columns) = (_every(size, fineness.views) for size in chosen.shape[:2])
+    rows, columns = (_every(size, fineness.views) for size in chosen.shape[:2])
     return chosen if fineness.views == 1 else chosen[rows, columns]
 
 
-def _every(size: int, step: int) -> tuple[int, slice]:
+def _every(size: int, step: int) -> slice:
     """Every so-many-th of a row of views, the same distance from both ends."""
     count = (size - 1) // step + 1
     first = (size - 1 - (count - 1) * step) // 2
-    return count, slice(first, first + (count - 1) * step + 1, step)
+    return slice(first, first + (count - 1) * step + 1, step)
 
 
 def coarser_sensor(train: Train, step: int) -> Train:
@@ -281,8 +280,3 @@ def pixel_at(shape: Sequence[int], x: Any, y: Any) -> tuple[int, int]:
     if type(x) is not int or type(y) is not int or not (0 <= x < columns and 0 <= y < rows):
         raise InputError(f"the picture has no pixel ({x}, {y}): it has {columns} columns and {rows} rows")
     return rows - 1 - y, columns - 1 - x
-
-
-def place_at(frame: Affine, pixel: tuple[int, int]) -> NDArray[np.float64]:
-    """(x, y) on the sensor of (row, column), metres."""
-    return np.asarray(frame([pixel[1], pixel[0]]))

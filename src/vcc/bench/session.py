@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from vcc.advice.darkness import why_dark
+from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.limits import sampling_limits
 from vcc.base import units
 from vcc.base.errors import InputError
 from vcc.bench import additions, answers, export
-from vcc.bench.document import Document, History, Views, shown
+from vcc.bench.document import Document, History, shown
 from vcc.bench.focusing import distance_at
 from vcc.bench.offered import Offered
 from vcc.bench.picture import WHOLE, Fineness, Pace, Picture, Taken, codes, jpeg, pixel_at, psnr, take, white_of
@@ -42,8 +42,6 @@ MOST_WAITING = 200
 """Messages that may wait: who sends more is not listened to any longer."""
 SLOW = 0.4
 """Seconds from which on a whole picture is shown coarsely first."""
-MISSING = 0.01
-"""Share of the rays from which on it is said that they are missing."""
 
 CHANGES = ("hello", "set", "upload", "add", "remove", "duplicate", "reorder", "undo", "redo", "load", "focus")
 """What a client may do that shows another picture."""
@@ -350,8 +348,7 @@ class Session:
         field = self.offered.field(document.light_field)
         grid, seen = None, None
         if field.is_open:
-            grid = field.whole().grid
-            seen = field.whole() if document.views is None else _seen(field.whole(), document.views)
+            grid, seen = field.whole().grid, self._light_field()
         self._tell(
             {
                 "is": "state",
@@ -441,13 +438,8 @@ class Session:
         """What to beware of, each at the element that its words name."""
         train, field = self._described.train, self._light_field()
         said = list(taken.plan.cautions)
-        if dark := why_dark(taken.plan, field, taken.found):
+        if dark := why_dark(taken.plan, field, taken.found) or why_darker(taken.found):
             said.append(dark)
-        elif taken.found.missing_rays > MISSING:
-            said.append(
-                f"{taken.found.missing_rays:.1%} of the rays that this camera asks for are not in the light field "
-                f"({taken.found.missing_reason}); the picture is darker there"
-            )
         far_near = vergences(field.grid, None)
         scene = None if far_near is None else (float(far_near.min()), float(far_near.max()))
         told = {item.advice: item for item in sampling_limits(train, field.grid, scene).to_watch}
@@ -528,10 +520,6 @@ class Session:
         self._tell({"is": "progress", "done": sweep.frames, "total": sweep.frames, "words": words})
         name, kind, data = sweep.film(frames)
         self._tell({"is": "file", "name": name, "type": kind}, [data])
-
-
-def _seen(light_field: LightField, views: Views) -> LightField:
-    return light_field[views.slices]
 
 
 def _checked(message: object) -> Json:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from vcc.base import units
 from vcc.base.errors import InputError
 from vcc.bench.document import Document, shown
+from vcc.files.destination import Destination
 from vcc.formats.films import Film
 
 FRAMES, FRAMES_PER_SECOND = 30, 12
@@ -51,10 +51,10 @@ class Sweep:
         back = list(frames[-2:0:-1]) if self.there_and_back else []
         ending = self.writer.ending
         coloured = [each if each.ndim == 3 else np.repeat(each[..., None], 3, axis=2) for each in [*frames, *back]]
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / f"film{ending}"
+        stream = io.BytesIO()
+        with Destination(ending, buffer=stream).opened() as path:
             self.writer.write(coloured, path, f"the film{ending}")
-            return f"film{ending}", TYPES[ending], path.read_bytes()
+        return f"film{ending}", TYPES[ending], stream.getvalue()
 
 
 def sweep_of(message: dict[str, Any], document: Document) -> Sweep:

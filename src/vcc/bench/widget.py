@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import functools
-import tempfile
 from collections.abc import Sequence
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 from vcc.base import checks
@@ -17,7 +15,7 @@ from vcc.bench.session import Broken, Session
 from vcc.camera import Camera
 from vcc.fields.samples import check_is_light_field
 from vcc.files.camera_reading import Beside
-from vcc.files.camera_writing import tables_of_train
+from vcc.files.camera_writing import NOWHERE, tables_of_train
 from vcc.light_field import LightField
 from vcc.optics.train import Train
 
@@ -34,11 +32,9 @@ def bench_of(camera: Train, light_field: LightField) -> Any:
 
 
 def _offered(camera: Train, light_field: LightField) -> Offered:
-    # No file beside it is read: what a camera of Python's holds is in memory.
-    nowhere = Path(tempfile.gettempdir()) / "no-such-folder"
-    tables, arrays = tables_of_train(camera, nowhere / "camera.toml")
+    tables, arrays = tables_of_train(camera, NOWHERE / "camera.toml")
     document = Document({"elements": [], **tables}, NAME)
-    return Offered({NAME: Field(light_field)}, document, Beside(nowhere, frozenset(), arrays))
+    return Offered({NAME: Field(light_field)}, document, Beside(NOWHERE, frozenset(), arrays))
 
 
 @functools.cache

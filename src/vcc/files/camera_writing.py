@@ -6,6 +6,7 @@ import dataclasses
 import inspect
 import math
 import re
+import tempfile
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -49,6 +50,10 @@ def write_train(train: Train, path: str | PathLike[str]) -> None:
             np.save(stream, values)
     with atomic_path(file) as temporary:
         temporary.write_text(tomli_w.dumps(tables), encoding="utf-8")
+
+
+NOWHERE = Path(tempfile.gettempdir()) / "no-such-folder"
+"""Where a camera stands that comes from no file: no file beside it is read or named."""
 
 
 def tables_of_train(train: Train, file: Path) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:

@@ -88,9 +88,8 @@ class CameraFunction:
         self._work = Work.of(camera, light_field, by_an_engine(How.of(how, options)), names)
         self._scales = {name: kept_in(camera, name) for name in names}
         self._shapes = {name: read(camera, name).shape for name in names}
-        self._alone = (
-            threading.Lock()
-        )  # callbacks come from several threads, and plans share what they are made of
+        # Callbacks come from several threads, and plans share what they are made of.
+        self._alone = threading.Lock()
         self._pictures = jax.custom_vjp(self._ahead)
         self._pictures.defvjp(self._kept, self._back, symbolic_zeros=True)
         self._gradient = jax.custom_vjp(self._weighed)
