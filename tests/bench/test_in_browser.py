@@ -66,6 +66,21 @@ def test_drag_is_pulled_to_where_the_scene_is_sharp(page):
     assert ("53.3333 mm", "nearest of the scene, 800 mm, is sharp") in places
 
 
+def test_lens_is_pulled_to_where_the_sensor_as_it_stands_sees_the_scene_sharp(page):
+    x, y = page.middle("0")
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    places = set()
+    for step in range(1, 16):
+        page.page.mouse.move(x + step, y)
+        held = page.page.locator(".snap.held text")
+        if held.count():
+            places.add((page.place("0"), held.text_content()))
+    page.page.mouse.up()
+    # T = 3.052 m from the town to the sensor: by Bessel the lens stands (T + √(T² − 4·f·T))/2 − 3 m behind z = 0
+    assert ("1.15287 mm", "farthest of the scene, 3 m, is sharp") in places
+
+
 def test_arrow_keys_step_and_those_that_follow_one_another_are_one_movement(page):
     page.part("sensor").focus()
     for key, place in (

@@ -170,3 +170,17 @@ def test_faces_that_cannot_be_made_name_their_element(given, message):
     camera = vcc.Camera([Wrong(given, name="mine")], SENSOR)
     with pytest.raises(vcc.InputError, match=message):
         camera.capture(light_field())
+
+
+def test_what_is_named_after_its_kind_is_called_so_once():
+    for name, called, label in (
+        ("main", "lens main", 'lens "main"'),
+        ("lens", "lens", '"lens"'),
+        ("lens 2", "lens 2", '"lens 2"'),
+        ("lens of glass", "lens lens of glass", 'lens "lens of glass"'),
+        ("", "lens", "lens at z = 0 mm"),
+    ):
+        lens = vcc.Lens(50 * mm, name=name)
+        assert (lens.called, lens.label) == (called, label)
+    assert '\n  z =         0 mm  "lens 2", ' in repr(vcc.Camera([vcc.Lens(50 * mm, name="lens 2")], SENSOR))
+    assert vcc.FirstOrder([[1, 0], [0, 1]], name="first order").called == "first order"

@@ -199,7 +199,7 @@ export class Bench extends EventTarget {
         this.parts = message;
         break;
       case "state":
-        this.side = called(message.side);
+        this.side = message.side;
         this.views = message.grid ? [message.grid[0]!, message.grid[1]!] : null;
         this.canUndo = message.undo;
         this.canRedo = message.redo;
@@ -359,12 +359,6 @@ function put(at: Value, path: Where, value: Value, takesAway: boolean): Value {
   const copy = { ...at, [step]: put(at[step] ?? null, rest, value, takesAway) };
   if (takesAway && copy[step] === null) delete copy[step];
   return copy;
-}
-
-/** An element that is named after its kind is called so once: "diffuser", and "diffuser 2", not "diffuser diffuser 2". */
-function called(side: Side): Side {
-  const once = ([name = "", ...more]: string[]) => [name.replace(/^(.+) \1( \d+)?$/, "$1$2"), ...more];
-  return { ...side, elements: side.elements.map((each) => ({ ...each, label: once(each.label) })) };
 }
 
 function bytesOf(view: DataView): Uint8Array<ArrayBuffer> {

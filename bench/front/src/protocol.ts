@@ -77,6 +77,8 @@ export interface SideElement {
   shades?: [number, number, number][];
   /** [height, strength from 0 to 1]. */
   roughness?: [number, number][];
+  /** Where it would have to stand for what matters in the scene to be sharp on the sensor. */
+  snaps?: Snap[];
 }
 
 export interface SideSensor {

@@ -27,6 +27,8 @@ interface Drag {
   grip: number;
   from: number;
   z: number;
+  /** Places to which it is pulled, as they were when it began. */
+  snaps: Snap[];
   snap: Snap | null;
   moved: boolean;
 }
@@ -146,7 +148,7 @@ export class SideView extends Part {
     if (!found || event.button !== 0) return;
     this.bench.select(found.which);
     const z = this.placeOf(found.which);
-    this.drag = { which: found.which, grip: found.x - this.scale(this.bench.side!).x(z), from: z, z, snap: null, moved: false };
+    this.drag = { which: found.which, grip: found.x - this.scale(this.bench.side!).x(z), from: z, z, snaps: this.snapsOf(found.which), snap: null, moved: false };
     (event.currentTarget as Element).setPointerCapture(event.pointerId);
     this.renderRoot.querySelector<SVGElement>(`[data-part="${found.which}"]`)?.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
     event.preventDefault();
@@ -161,7 +163,7 @@ export class SideView extends Part {
     const step = axisStep(this.frame!.end - this.frame!.start) / 10;
     const x = event.clientX - this.getBoundingClientRect().left - this.drag.grip;
     let z = Math.round(scale.z(x) / step) * step;
-    const snap = event.altKey ? null : this.snapNear(this.drag.which, x, scale);
+    const snap = event.altKey ? null : this.snapNear(this.drag.snaps, x, scale);
     if (snap && Math.abs(scale.x(snap.z) - x) < PULL) z = snap.z;
     if (z === this.drag.z && this.drag.moved) return;
     if (!this.drag.moved && Math.abs(scale.x(z) - scale.x(this.drag.from)) < 2) return;
@@ -185,8 +187,11 @@ export class SideView extends Part {
     else window.setTimeout(settled, 400);
   }
 
-  private snapNear(which: number | "sensor", x: number, scale: Scale): Snap | null {
-    const snaps = which === "sensor" ? (this.bench.side?.snaps ?? []) : [];
+  private snapsOf(which: number | "sensor"): Snap[] {
+    return (which === "sensor" ? this.bench.side?.snaps : this.bench.side?.elements[which]?.snaps) ?? [];
+  }
+
+  private snapNear(snaps: Snap[], x: number, scale: Scale): Snap | null {
     let found: Snap | null = null;
     for (const each of snaps)
       if (Math.abs(scale.x(each.z) - x) < NEAR && (!found || Math.abs(scale.x(each.z) - x) < Math.abs(scale.x(found.z) - x))) found = each;
@@ -200,7 +205,7 @@ export class SideView extends Part {
       const step = axisStep(this.frame!.end - this.frame!.start) * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1);
       const z = (this.drag?.which === which ? this.drag.z : this.placeOf(which)) + by * step;
       const from = this.drag?.from ?? this.placeOf(which);
-      this.drag = { which, grip: 0, from, z: Math.round(z / (step / 10)) * (step / 10), snap: null, moved: true };
+      this.drag = { which, grip: 0, from, z: Math.round(z / (step / 10)) * (step / 10), snaps: [], snap: null, moved: true };
       this.bench.set([...this.bench.whereOf(which), "z"], inMillimetres(this.drag.z), true);
       window.clearTimeout(this.keyTimer);
       this.keyTimer = window.setTimeout(() => this.keysDone(), KEY_PAUSE);

@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.advice.words import distance_in_words
-from vcc.base.errors import InputError
 from vcc.base.units import short
+from vcc.bench.snapping import snaps_of_elements, snaps_of_sensor, told_once
 from vcc.fields.grid import Grid
 from vcc.fields.samples import InMemory
 from vcc.optics import CellDeflection, Element, Faces, FirstOrder, Lens, Prism
-from vcc.optics.focusing import focused_train
 from vcc.optics.train import Train
 from vcc.plot.elements import (
     Span,
@@ -80,11 +79,17 @@ def side(elements: Sequence[Element], train: Train, light_field: InMemory | None
     half = half_height(train, paths, AXIS)
     span = Span(AXIS, -half, half)
     focus = focused_distance(train)
+    scene = {} if grid is None else {f"{name} of the scene": z for name, z in scene_distances(grid).items()}
+    places = told_once(scene | ({} if focus is None else {"what is sharp now": focus}))
+    pulled = snaps_of_elements(elements, train, places)
     return {
         "from": _short(start),
         "to": _short(train.sensor.z),
         "half": _short(half),
-        "elements": [_element(number, one, span, paths) for number, one in enumerate(elements)],
+        "elements": [
+            _element(number, one, span, paths) | {"snaps": snaps}
+            for number, (one, snaps) in enumerate(zip(elements, pulled, strict=True))
+        ],
         "sensor": {
             "z": train.sensor.z,
             "half": train.sensor.size[1 - AXIS] / 2,
@@ -93,7 +98,7 @@ def side(elements: Sequence[Element], train: Train, light_field: InMemory | None
         },
         "rays": [_rays(point, path) for point, path in zip(points, paths, strict=True)],
         "focus": _distance(focus),
-        "snaps": _snaps(train, grid),
+        "snaps": snaps_of_sensor(train, scene),
         "words": _words(train, focus, grid),
     }
 
@@ -237,18 +242,6 @@ def scene_distances(grid: Grid) -> dict[str, float]:
         return {}
     far, near = (grid.distance_of(disparity) for disparity in found)
     return {"nearest": near, "farthest": far if far > 0 else math.inf}
-
-
-def _snaps(train: Train, grid: Grid | None) -> list[Json]:
-    """Where the sensor would have to stand for what matters to be sharp."""
-    snaps = []
-    for name, distance in ({} if grid is None else scene_distances(grid)).items():
-        try:
-            z = focused_train(train.elements, train.sensor, distance).sensor.z
-        except InputError:  # of that distance there is no image
-            continue
-        snaps.append({"z": z, "words": f"{name} of the scene, {distance_in_words(distance)}, is sharp"})
-    return sorted(snaps, key=lambda snap: float(snap["z"]))
 
 
 def _words(train: Train, focus: float | None, grid: Grid | None) -> list[str]:

@@ -8,6 +8,7 @@ thin element does may depend on where a ray meets it, not on the ray's slope (a 
 from __future__ import annotations
 
 import abc
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -158,7 +159,18 @@ class Element(Shown, abc.ABC):
     @property
     def label(self) -> str:
         """How messages and plots call this element."""
-        return f'{self.kind} "{self.name}"' if self.name else f"{self.kind} at z = {self.z * 1e3:g} mm"
+        if not self.name:
+            return f"{self.kind} at z = {self.z * 1e3:g} mm"
+        return f'"{self.name}"' if self._named_by_kind else f'{self.kind} "{self.name}"'
+
+    @property
+    def called(self) -> str:
+        """Its kind and its name, as drawings have them: ``lens main``; ``lens 2`` where the name says both."""
+        return self.name if self._named_by_kind else f"{self.kind} {self.name}".strip()
+
+    @property
+    def _named_by_kind(self) -> bool:
+        return re.fullmatch(rf"{re.escape(self.kind)}( \d+)?", self.name) is not None
 
     def described(self) -> str:
         """The element's parameters in words, for `explain`."""

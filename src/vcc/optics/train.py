@@ -234,8 +234,8 @@ class Train(Value, Shown):
         """The elements in order and the sensor, a line each: place, kind, name and parameters."""
         lines = []
         for element in self.elements:
-            name, parameters = f' "{element.name}"' if element.name else "", element.described()
-            lines.append(f"{_place(element.z)}{element.kind}{name}" + (f", {parameters}" if parameters else ""))
+            called, parameters = element.label if element.name else element.kind, element.described()
+            lines.append(f"{_place(element.z)}{called}" + (f", {parameters}" if parameters else ""))
         rows, columns = self.sensor.shape
         vertical, horizontal = self.sensor.pitches
         pitch = short(vertical) if vertical == horizontal else f"{short(vertical)} × {short(horizontal)}"

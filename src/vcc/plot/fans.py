@@ -60,21 +60,32 @@ def _lenslets(camera: Train) -> Stage | None:
     return found
 
 
-def _to_focus(camera: Train) -> Affine:
-    """Rays from the entrance plane to the plane in which a picture must stand to be sharp on the sensor."""
+def plane_to_focus(camera: Train) -> tuple[float, float]:
+    """Where a picture must stand to be sharp on the sensor, metres.
+
+    Returns:
+        The place up to which elements count, that of the sensor or of the last array of lenslets; and how far from
+        there the plane is, which lenslets look at.
+    """
     stage = _lenslets(camera)
     if stage is None:
-        return camera.rays_at(camera.sensor.z, before=True)
+        return camera.sensor.z, 0.0
     assert isinstance(stage.faces.bending, CellDeflection)
     behind = camera.sensor.z - stage.z
     vergence = float(stage.faces.bending.powers.flat[0]) - 1 / behind
-    to_array = camera.rays_at(stage.z)
-    if abs(vergence * behind) > 1e-6:
-        return Affine.propagation(-1 / vergence) @ to_array
-    if to_array.matrix[2, 0] == 0 or to_array.matrix[0, 2] == 0:
+    return stage.z, -1 / vergence if abs(vergence * behind) > 1e-6 else 0.0
+
+
+def _to_focus(camera: Train) -> Affine:
+    """Rays from the entrance plane to the plane in which a picture must stand to be sharp on the sensor."""
+    z, beyond = plane_to_focus(camera)
+    if z == camera.sensor.z:
+        return camera.rays_at(z, before=True)
+    to_array = camera.rays_at(z)
+    if beyond == 0.0 and (to_array.matrix[2, 0] == 0 or to_array.matrix[0, 2] == 0):
         # Nothing before the array can focus on it: light that is parallel there is sharp, x = s.
         return Affine.abcd(((0.0, 1.0), (-1.0, 0.0))) @ to_array
-    return to_array
+    return Affine.propagation(beyond) @ to_array
 
 
 @dataclass(frozen=True)

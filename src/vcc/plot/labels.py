@@ -118,7 +118,7 @@ def _merged(things: list[tuple[float, str]]) -> list[tuple[float, str]]:
 
 def label_of(element: Element, pen: Span) -> str:
     """What stands above an element: its kind and name, and what matters most of it."""
-    first = f"{element.kind} {element.name}".strip()
+    first = element.called
     for kind, words in _WORDS.items():
         if isinstance(element, kind):
             return "\n".join([first, *(line for line in words(element, pen) if line)])

@@ -320,7 +320,7 @@ def _planes(camera: Train) -> list[tuple[float, str]]:
     """The places behind elements and the sensor's, each with a title."""
     behind: dict[float, str] = {}
     for element in camera.elements:
-        name = f"{element.kind} {element.name}".strip()
+        name = element.called
         z = element.z + element.length
         behind[z] = f"{behind[z]} and {name}" if z in behind else name
     planes = [(z, f"behind {names}, z = {z / mm:g} mm") for z, names in behind.items()]
