@@ -58,6 +58,12 @@ class Served:
         while not self._server.started:
             time.sleep(0.01)
 
+    def break_off(self) -> None:
+        """Break all connections; the server stays."""
+        loop = self._server.servers[0].get_loop()
+        for each in list(self._server.server_state.connections):
+            loop.call_soon_threadsafe(each.transport.abort)
+
     def stop(self) -> None:
         """End, with all connections."""
         self._server.should_exit = True

@@ -196,6 +196,23 @@ def test_server_goes_and_comes_back_and_the_camera_is_still_there(page, served):
     assert page.place("sensor") == "51.25 mm"
 
 
+def test_connection_breaks_and_steps_and_pinned_picture_are_still_there(page, served):
+    page.button("Pin").click()
+    page.page.get_by_text("now · the same").wait_for()
+    page.page.locator("#sensor-z").fill("51.5 mm")
+    page.page.keyboard.press("Enter")
+    page.settle()
+    said = page.page.get_by_text("dB").text_content()
+    served.break_off()
+    page.page.get_by_text("The server is gone").wait_for()
+    page.page.get_by_text("The server is gone").wait_for(state="detached")
+    page.settle()
+    assert page.page.get_by_text("dB").text_content() == said
+    page.button("Undo").click()
+    page.wait_for_place("sensor", "52 mm")
+    page.page.get_by_text("now · the same").wait_for()
+
+
 def test_pinned_picture_is_compared_with(page):
     page.button("Pin").click()
     page.page.get_by_text("now · the same").wait_for()

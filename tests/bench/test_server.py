@@ -20,13 +20,14 @@ from hypothesis import strategies as some
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from tests.bench.on_bench import offered
+from tests.bench.on_bench import CAMERA, offered
 from vcc import InputError
 from vcc.bench import server
 from vcc.bench.carried import Damaged, packed, unpacked
 from vcc.bench.server import LARGEST_MESSAGE, MOST_CLIENTS, Door, Outbox, application, listening
 
 PAGES = {"index.html": b"<p>A bench.</p>", "bench.js": b"export {};", "notes.txt": b"not a page"}
+SHUTDOWN = socket.SHUT_RDWR
 uvicorn = pytest.importorskip("uvicorn")
 
 
@@ -168,15 +169,102 @@ def test_ten_clients_each_with_a_bench_of_its_own(bench):
             state, _ = told(socket, "state")
             assert state["document"]["camera"]["sensor"]["z"] == f"{52 + turn / 10} mm"
             assert told(socket, "picture")[0]["turn"] == turn
-    for _ in range(100):  # those who went make room
-        with connect(f"ws://{bench}/bench") as again:
-            again.send(packed({"do": "hello"}))
+    with let_in(bench):  # those who went make room
+        pass
+
+
+def coming(bench, key=""):
+    """A client's socket: one that comes, or comes back with a key."""
+    return connect(f"ws://{bench}/bench{key and f'?key={key}'}", max_size=None)
+
+
+def at_rest(socket):
+    """The state and the whole picture that follow."""
+    state, _ = told(socket, "state")
+    while (picture := told(socket, "picture")[0])["coarse"]:
+        pass
+    return state, picture
+
+
+def broken_off(socket):
+    """The connection breaks without a word."""
+    socket.socket.shutdown(SHUTDOWN)
+
+
+@pytest.mark.parametrize("seen_to", [True, False])
+def test_a_client_whose_connection_broke_comes_back_to_its_steps_and_its_pinned_picture(bench, seen_to):
+    with coming(bench) as first:
+        key = told(first, "key")[0]["key"]
+        assert len(key) >= 32
+        first.send(packed({"do": "hello", "turn": 1}))
+        at_rest(first)
+        first.send(packed({"do": "pin", "on": True}))
+        pinned = told(first, "pinned")
+        assert pinned[0]["on"]
+        first.send(packed({"do": "set", "where": ["sensor", "z"], "value": "54 mm", "turn": 2}))
+        compared = at_rest(first)[1]["psnr"]
+        if seen_to:  # else the server does not know yet: a laptop that slept
+            broken_off(first)
+        moved = {"camera": CAMERA | {"sensor": CAMERA["sensor"] | {"z": "55 mm"}}, "light_field": "noise"}
+        with coming(bench, key) as again:
+            assert told(again, "key")[0]["key"] == key
+            again.send(packed({"do": "hello", "turn": 3, "document": moved}))  # changed while nobody was there
+            assert told(again, "state")[0]["undo"]
+            assert told(again, "pinned") == pinned
+            again.send(packed({"do": "undo", "turn": 4}))
+            state, picture = at_rest(again)
+            assert (state["document"]["camera"]["sensor"]["z"], picture["psnr"]) == ("54 mm", compared)
+            again.send(packed({"do": "undo", "turn": 5}))
+            state, picture = at_rest(again)
+            assert (state["document"]["camera"]["sensor"]["z"], picture["same"]) == ("52 mm", True)
+        if not seen_to:
+            assert closed(first) == 1013  # it was let go
+
+
+def test_nobody_comes_back_without_the_key(bench):
+    with coming(bench) as one:
+        key = told(one, "key")[0]["key"]
+        one.send(packed({"do": "set", "where": ["sensor", "z"], "value": "54 mm"}))
+        told(one, "picture")
+        for other in ("", key[:-1], key.lower(), "x" * 32, "../" + key):
+            with coming(bench, other) as socket:
+                assert told(socket, "key")[0]["key"] not in (key, other)
+                socket.send(packed({"do": "hello"}))
+                state, _ = told(socket, "state")
+                assert state["document"]["camera"]["sensor"]["z"] == "52 mm"
+        one.send(packed({"do": "hello"}))
+        assert told(one, "state")[0]["document"]["camera"]["sensor"]["z"] == "54 mm"
+
+
+@contextmanager
+def let_in(bench, key=""):
+    """A client that comes as soon as there is room, and its key; that one has gone is seen a little later."""
+    for _ in range(200):
+        with coming(bench, key) as socket:
             try:
-                told(again, "state")
-                return
+                given = told(socket, "key")[0]["key"]
             except ConnectionClosed:
-                time.sleep(0.05)
-    raise AssertionError("nobody is let in again")
+                time.sleep(0.02)
+                continue
+            yield socket, given
+            return
+    raise AssertionError("nobody is let in")
+
+
+def test_those_who_went_make_room_and_are_forgotten(monkeypatch):
+    with served(Door()) as bench, ExitStack() as there:
+        sockets, keys = zip(*(there.enter_context(let_in(bench)) for _ in range(MOST_CLIENTS)), strict=True)
+        broken_off(sockets[-1])
+        with let_in(bench) as (new, key):  # in place of the one that is gone
+            assert key not in keys
+            with coming(bench, keys[-1]) as late:
+                assert closed(late) == 1013  # nothing is kept of it, and there is no room
+            monkeypatch.setattr(server, "KEPT", 0.0)
+            broken_off(new)
+            with let_in(bench, "x") as (_, another):
+                assert another != key
+            with let_in(bench, key) as (_, another):
+                assert another != key
 
 
 def test_of_pictures_that_were_not_taken_the_newest_is_sent():

@@ -51,11 +51,15 @@ export class SocketHost implements Host {
   private wait = FIRST_WAIT;
   private timer = 0;
   private ended = false;
+  /** By which the server knows this client again, with its steps and what it has pinned. */
+  private key = "";
 
   constructor(private readonly address: string) {}
 
   start(): void {
-    const socket = new WebSocket(this.address);
+    const address = new URL(this.address);
+    if (this.key) address.searchParams.set("key", this.key);
+    const socket = new WebSocket(address);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     socket.onopen = () => {
@@ -64,7 +68,8 @@ export class SocketHost implements Host {
     };
     socket.onmessage = (event) => {
       const { message, buffers } = unpacked(event.data as ArrayBuffer);
-      this.onmessage(message, buffers);
+      if (message.is === "key") this.key = message.key;
+      else this.onmessage(message, buffers);
     };
     socket.onclose = () => {
       this.socket = null;

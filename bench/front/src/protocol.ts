@@ -168,6 +168,7 @@ export type AnswerMessage =
   | { is: "answer"; what: "phase space"; planes: Plane[] };
 
 export type FromHost =
+  | { is: "key"; key: string }
   | PartsMessage
   | StateMessage
   | PictureMessage

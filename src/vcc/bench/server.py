@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 LOOPBACK = "127.0.0.1"
 OF_THIS_MACHINE = (LOOPBACK, "localhost", "::1")
 MOST_CLIENTS = 10
-"""At once."""
+"""At once; those who are gone and may come back are among them."""
+KEPT = 600.0
+"""Seconds for which a client that is out of reach may come back to what it had."""
 LARGEST_MESSAGE = 2**20
 """Bytes of a message that a client may send."""
 MOST_UNSENT = 2**26
@@ -132,7 +134,10 @@ class Outbox:
 
 
 class Clients:
-    """Those who look at a bench.
+    """Those who look at a bench, and those who did a moment ago.
+
+    A client is told a key when it comes. With it, and in no other way, it comes back to what it had (its steps,
+    the pinned picture) after its connection broke: a laptop that slept, a network that was gone.
 
     Args:
         offered: what there is.
@@ -141,16 +146,18 @@ class Clients:
 
     def __init__(self, offered: Offered, door: Door) -> None:
         self.offered, self.door = offered, door
-        self.sessions: set[Session] = set()
+        self._sessions: dict[str, Session] = {}
+        self._sockets: dict[str, WebSocket] = {}
+        self._gone: dict[str, asyncio.TimerHandle] = {}
 
     async def serve(self, socket: WebSocket) -> None:
         """One client, from its coming to its going."""
-        headers = socket.headers
-        if not self.door.opens(socket.query_params.get("token"), headers.get("origin"), headers.get("host")):
+        headers, asked = socket.headers, socket.query_params
+        if not self.door.opens(asked.get("token"), headers.get("origin"), headers.get("host")):
             await socket.close(FORBIDDEN)
             return
         await socket.accept()
-        if len(self.sessions) >= MOST_CLIENTS:
+        if not self._has_room(asked.get("key")):
             await socket.close(TOO_MANY, f"{MOST_CLIENTS} look at this bench already")
             return
         loop, there = asyncio.get_running_loop(), asyncio.Event()
@@ -160,22 +167,59 @@ class Clients:
                 loop.call_soon_threadsafe(there.set)
 
         outbox = Outbox(wake)
-        session = Session(self.offered, outbox.put)
-        self.sessions.add(session)
-        sending = asyncio.create_task(_sent(socket, outbox, there))
+        key, session = self._session(asked.get("key"), socket, outbox)
+        outbox.put({"is": "key", "key": key}, ())
+        sending, keep = asyncio.create_task(_sent(socket, outbox, there)), True
         try:
-            await _received(socket, session)
+            keep = await _received(socket, session)
         finally:
-            self.sessions.discard(session)
-            session.close()
+            if self._sockets.get(key) is socket:  # else the client came back by another one
+                self._leave(key, keep)
             sending.cancel()
             with contextlib.suppress(asyncio.CancelledError, Exception):
                 await sending
 
+    def _has_room(self, key: str | None) -> bool:
+        return key in self._sessions or bool(self._gone) or len(self._sessions) < MOST_CLIENTS
+
+    def _session(self, key: str | None, socket: WebSocket, outbox: Outbox) -> tuple[str, Session]:
+        """That of the key, or a new one with a key of its own, for which the one longest gone makes room."""
+        if key is not None and key in self._sessions:
+            if key in self._gone:
+                self._gone.pop(key).cancel()
+            else:  # a connection that broke and was not seen to
+                self._closing = asyncio.create_task(_closed(self._sockets[key]))
+            self._sessions[key].go_on(outbox.put)
+        else:
+            if len(self._sessions) >= MOST_CLIENTS:
+                self._forget(next(iter(self._gone)))
+            key = secrets.token_urlsafe(24)
+            self._sessions[key] = Session(self.offered, outbox.put)
+        self._sockets[key] = socket
+        return key, self._sessions[key]
+
+    def _leave(self, key: str, keep: bool) -> None:
+        """A client is out of reach, and may come back if it is kept."""
+        del self._sockets[key]
+        if not keep:
+            self._sessions.pop(key).close()
+            return
+        self._sessions[key].pause()
+        self._gone[key] = asyncio.get_running_loop().call_later(KEPT, self._forget, key)
+
+    def _forget(self, key: str) -> None:
+        self._gone.pop(key).cancel()
+        self._sessions.pop(key).close()
+
     def close(self) -> None:
         """End all sessions."""
-        for session in list(self.sessions):
+        for session in self._sessions.values():
             session.close()
+
+
+async def _closed(socket: WebSocket) -> None:
+    with contextlib.suppress(RuntimeError):  # it is closed already
+        await socket.close(TOO_MANY, "this client came back by another connection")
 
 
 async def _sent(socket: WebSocket, outbox: Outbox, there: asyncio.Event) -> None:
@@ -189,20 +233,20 @@ async def _sent(socket: WebSocket, outbox: Outbox, there: asyncio.Event) -> None
             await socket.send_bytes(data)
 
 
-async def _received(socket: WebSocket, session: Session) -> None:
-    """Hand on what a client says until it goes, or says what no client of ours does."""
+async def _received(socket: WebSocket, session: Session) -> bool:
+    """Hand on what a client says until it goes, or says what no client of ours does; whether it may come back."""
     from starlette.websockets import WebSocketDisconnect
 
     while True:
         try:
             session.receive(*unpacked(await socket.receive_bytes()))
         except WebSocketDisconnect:
-            return
+            return True
         except (Damaged, Broken, KeyError) as error:  # KeyError: text where bytes are expected
             words = f"no message of a bench: {error}"
             with contextlib.suppress(RuntimeError):
                 await socket.close(BROKEN, words.encode()[:120].decode(errors="ignore"))
-            return
+            return False
 
 
 def application(offered: Offered, door: Door, files: Mapping[str, bytes]) -> Starlette:

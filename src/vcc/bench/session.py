@@ -86,7 +86,9 @@ class Session:
     """
 
     def __init__(self, offered: Offered, send: Send) -> None:
-        self.offered, self._send = offered, send
+        self.offered = offered
+        self._send: Send | None = send
+        self._greeted = False
         self._history = History(offered.start)
         self._described = offered.start.train(offered.beside)
         self._inbox: deque[tuple[Json, list[bytes]]] = deque()
@@ -126,6 +128,19 @@ class Session:
             self._inbox.append((checked, list(buffers)))
             self._changed.notify()
 
+    def pause(self) -> None:
+        """The client is out of reach: what is being made is broken off, and what is known of it stays."""
+        with self._changed:
+            self._send = None
+            self._inbox.clear()
+            self._changed.notify()
+
+    def go_on(self, send: Send) -> None:
+        """The client is there again, or by another way: it is told by this one from now on."""
+        with self._changed:
+            self._send = send
+            self._changed.notify()
+
     def close(self) -> None:
         """End: what is being made is broken off, and nothing is sent any longer."""
         with self._changed:
@@ -143,7 +158,7 @@ class Session:
     def _work(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._closed or self._inbox or self._wanted)
+                self._changed.wait_for(self._has_to_do)
                 if self._closed:
                     return
                 message, buffers = self._inbox.popleft() if self._inbox else (None, [])
@@ -154,19 +169,18 @@ class Session:
                     self._answer(message, buffers)
             except Superseded:
                 continue
-            except MemoryError:
-                self._wanted = None
-                self._tell(
-                    {"is": "failed", "words": "there is not enough memory for this camera: make it smaller"}
-                )
             except Exception as error:  # a fault of ours; the client is told, and the bench goes on
                 log.exception("a fault on the bench")
                 self._wanted = None
                 self._tell({"is": "failed", "words": f"a fault in the program: {type(error).__name__}: {error}"})
 
+    def _has_to_do(self) -> bool:
+        return self._closed or bool(self._inbox) or (self._wanted is not None and self._send is not None)
+
     def _tell(self, message: Json, buffers: Sequence[bytes] = ()) -> None:
-        if not self._closed:
-            self._send(message, buffers)
+        send = self._send
+        if send is not None and not self._closed:
+            send(message, buffers)
 
     def _answer(self, message: Json, buffers: list[bytes]) -> None:
         doing = message["do"]
@@ -175,8 +189,8 @@ class Session:
                 self._do_upload(message, buffers)
             else:
                 getattr(self, f"_do_{doing}")(message)
-        except InputError as error:
-            self._refuse(message, error)
+        except (InputError, MemoryError) as error:
+            self._refuse(message, _in_words(error))
         except Superseded:
             self._refuse(message, InputError(f"{doing} was broken off: something else was asked for meanwhile"))
 
@@ -185,8 +199,8 @@ class Session:
         self._tell({"is": "refused", "do": message["do"], "words": str(error), "where": where, "turn": turn})
 
     def _check_wanted(self, done: int = 0, total: int = 0) -> None:
-        """Break off what is being made where another picture is asked for."""
-        if self._closed or any(message["do"] in CHANGES for message, _ in list(self._inbox)):
+        """Break off what is being made where another picture is asked for, or nobody is there to see it."""
+        if self._closed or self._send is None or any(message["do"] in CHANGES for message, _ in list(self._inbox)):
             raise Superseded
 
     # --- what changes the picture ---
@@ -202,19 +216,26 @@ class Session:
                 "gallery": list(self.offered.gallery),
             }
         )
+        self._greet_with(message)
+        self._greeted = True
+        self._tell_state(_turn(message))
+        self._tell_pinned()
+        self._wanted = Wanted(_turn(message), moving=False)
+
+    def _greet_with(self, message: Json) -> None:
+        """Begin with the document that a client brings; or go on with it, where it was there before."""
         given = message.get("document")
         if given is None:
-            self._tell_state(_turn(message))
-            self._wanted = Wanted(_turn(message), moving=False)
             return
         try:
-            document, described = self._checked(Document.of_json(given))
+            document, self._described = self._checked(Document.of_json(given))
         except InputError as error:
             self._refuse(message, error)
-            document, described = self._history.present, self._described
-        self._history, self._described = History(document), described
-        self._tell_state(_turn(message))
-        self._wanted = Wanted(_turn(message), moving=False)
+            return
+        if self._greeted:
+            self._history.put(document)
+        else:
+            self._history = History(document)
 
     def _do_set(self, message: Json) -> None:
         self._put(message, message.get("value"), bool(message.get("moving", False)))
@@ -374,8 +395,8 @@ class Session:
             self._tell({"is": "progress", "done": 0, "total": 1, "words": "Opening the light field"})
             try:
                 field.whole(self._progress)
-            except InputError as error:
-                self._no_picture(wanted, error)
+            except (InputError, MemoryError) as error:
+                self._no_picture(wanted, _in_words(error))
                 return
             self._tell_state(wanted.turn)
         fineness = WHOLE
@@ -384,8 +405,8 @@ class Session:
             fineness = self._pace.fineness(kinds)
         try:
             taken = self._take(fineness)
-        except InputError as error:
-            self._no_picture(wanted, error)
+        except (InputError, MemoryError) as error:
+            self._no_picture(wanted, _in_words(error))
             return
         self._pace.noted(kinds, fineness, taken)
         self._taken = taken
@@ -468,14 +489,17 @@ class Session:
     def _do_pin(self, message: Json) -> None:
         if not message.get("on", True):
             self._pinned = None
+        else:
+            self._pinned = (self._whole_picture().values, self._shown_white)
+        self._tell_pinned()
+
+    def _tell_pinned(self) -> None:
+        if self._pinned is None:
             self._tell({"is": "pinned", "on": False})
             return
-        taken = self._whole_picture()
-        self._pinned = (taken.values, self._shown_white)
-        self._tell(
-            {"is": "pinned", "on": True, "white": self._shown_white, "shape": list(taken.values.shape[:2])},
-            [jpeg(taken.values, self._shown_white)],
-        )
+        values, white = self._pinned
+        message = {"is": "pinned", "on": True, "white": white, "shape": list(values.shape[:2])}
+        self._tell(message, [jpeg(values, white)])
 
     def _do_value(self, message: Json) -> None:
         taken = self._picture_there()
@@ -529,6 +553,16 @@ def _checked(message: object) -> Json:
     if type(message.get("turn", 0)) is not int or not -(2**53) < message.get("turn", 0) < 2**53:
         raise Broken("turn is a whole number")
     return message
+
+
+def _in_words(error: InputError | MemoryError) -> InputError:
+    """What is refused; memory that is not enough is no fault of the program's."""
+    if isinstance(error, InputError):
+        return error
+    return InputError(
+        "this machine has not enough memory for that: undo it, take fewer pixels, or elements that spread light "
+        "less"
+    )
 
 
 def _turn(message: Json) -> int:
