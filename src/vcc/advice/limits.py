@@ -214,8 +214,7 @@ def _slope(optics: Folded) -> Items:
     if optics.blocking is None:
         planes.append(optics.to_sensor)
     largest = min(
-        max(float(np.linalg.norm(plane(rays)[:, 2:], axis=1).max()) for plane in planes)
-        for rays in _outermost(optics)
+        max(float(np.hypot(*plane(rays)[:, 2:].T).max()) for plane in planes) for rays in _outermost(optics)
     )
     until = None if optics.blocking is None else optics.blocking.element.label
     return {"slope": words.largest_slope(largest, LARGEST_SLOPE, until)}

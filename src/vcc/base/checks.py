@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 
 LONGEST_SHOWN = 60
 """Characters of what was given instead of an array, to be shown in an error."""
+SHORTEST, LONGEST = 1e-12, 1e12
+"""Metres of what a camera can be made of: far below a wavelength and far beyond the Sun. Between them squares of
+lengths, and ratios of these, are numbers that float64 and float32 hold."""
 
 # --- words ---
 
@@ -168,6 +171,8 @@ def above_zero(
     """
     number = _number(name, value)
     if number > 0 and number <= most and (infinite or math.isfinite(number)):
+        if unit == "m":
+            _check_length(name, number, no_longer=not infinite)
         return number
     limit = "" if math.isinf(most) else f" and at most {_with(most, unit)}"
     verb = f"is {what}," if what else "must be"
@@ -183,6 +188,8 @@ def zero_or_more(name: str, value: object, *, unit: str = "", most: float = math
     """
     number = _number(name, value)
     if 0 <= number <= most and math.isfinite(number):
+        if unit == "m" and number > 0:
+            _check_length(name, number)
         return number
     wanted = f"{_with(0, unit)} or more" if math.isinf(most) else f"from 0 to {_with(most, unit)}"
     raise InputError(f"{name} must be {wanted}, not {_told(value)}{_and(instead(value), way_out)}")
@@ -203,6 +210,8 @@ def finite(name: str, value: object, of: str = "") -> float:
     if not math.isfinite(number):
         wanted = f"a finite number{f' of {of}' if of else ''}"
         raise InputError(f"{name} must be {wanted}, not {_told(value)}{_and(instead(value))}")
+    if of == "metres" and number != 0:
+        _check_length(name, number, no_shorter=False)
     return number
 
 
@@ -224,6 +233,8 @@ def not_zero(name: str, value: object, *, unit: str = "m", way_out: str = "") ->
         raise InputError(f"{name} is a number of {of}, not {_told(value)}{_and(instead(value), way_out)}")
     if number == 0 or math.isnan(number):
         raise InputError(f"{name} is {_told(value)} {unit}: it must not be 0{_and(way_out)}")
+    if unit == "m":
+        _check_length(name, number, no_longer=False)
     return number
 
 
@@ -246,6 +257,8 @@ def pair(name: str, value: Any, what: str) -> tuple[float, float]:
     if not (math.isfinite(one) and math.isfinite(other)):
         parts = value if isinstance(value, tuple | list) else [value]
         raise InputError(f"{name} is {what}, not {_told(value)}{_and(*map(instead, parts))}")
+    for number in (one, other) if "metres" in what else ():
+        _check_length(name, number, no_shorter=False)
     return one, other
 
 
@@ -458,6 +471,15 @@ def _number(name: str, value: Any) -> float:
         return float(value)
     except (TypeError, ValueError, OverflowError):
         return math.nan
+
+
+def _check_length(name: str, number: float, *, no_shorter: bool = True, no_longer: bool = True) -> None:
+    """Refuse lengths that only slips have, such as "1e300 m"; computing with them ends in overflows."""
+    if (no_shorter and abs(number) < SHORTEST) or (no_longer and abs(number) > LONGEST):
+        raise InputError(
+            f"{name} is {number:g} m, which no camera has: it is computed with lengths from {SHORTEST:g} m to "
+            f"{LONGEST:g} m"
+        )
 
 
 def _told(value: Any) -> str:

@@ -40,6 +40,8 @@ _WRITTEN: Final[dict[str, tuple[str, ...]]] = {
 }
 _CLEARLY: Final = 4
 """Letters by which a number must be shorter to be written in another unit than that in which it reads best."""
+_LONGEST_SHOWN: Final = 60
+"""Characters of what was given instead of a quantity, to be shown in an error."""
 SI_NAMES: Final = {"length": "metre", "angle": "radian", "time": "second"}
 _EXAMPLES: Final = {"length": "50 mm", "angle": "2 deg", "time": "10 ms"}
 _QUANTITY: Final = re.compile(r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*(.*)", re.DOTALL)
@@ -87,23 +89,30 @@ def parse(text: object, dimension: str, what: str) -> float:
     """
     kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
     if not isinstance(text, str):
-        given = json.dumps(text, ensure_ascii=False, default=str)  # as camera files write it
+        given = _cut(json.dumps(text, ensure_ascii=False, default=str))  # as camera files write it
         raise InputError(f'{what} is {given}: {kind} needs a unit, written as text, e.g. "{example}"')
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:
-        raise InputError(f'{what} is "{text}", which is not {kind}; write it like "{example}"')
+        raise InputError(f'{what} is "{_cut(text)}", which is not {kind}; write it like "{example}"')
     number, unit = float(match[1]), match[2]
+    text = _cut(text)
     if not unit:
         raise InputError(f'{what} is "{text}": {kind} needs a unit, e.g. "{example}"')
     factor = _UNITS[dimension].get(unit)
     if factor is None:
         factor = _factor_by_pint(unit, dimension, f'{what} is "{text}"')
-    return number * factor
+    return number * factor + 0.0  # -0 is 0
+
+
+def _cut(words: str) -> str:
+    return words if len(words) <= _LONGEST_SHOWN else f"{words[:_LONGEST_SHOWN]}…"
 
 
 def _factor_by_pint(unit: str, dimension: str, what: str) -> float:
     """The factor to SI of a unit that this module does not define itself."""
     kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
+    if len(unit) > _LONGEST_SHOWN:
+        raise InputError(f'{what}, which is not {kind}; write it like "{example}"')
     if not _UNIT_NAME.fullmatch(unit):  # pint would take it for arithmetic
         raise InputError(f'{what}, and "{unit}" is not a unit of {dimension}; write {kind} like "{example}"')
     import pint
@@ -126,7 +135,7 @@ def text(value: float, dimension: str = "length", *, exact: bool = False) -> str
             float back, bit by bit, as files need it; else 15 digits do, which hide rounding.
     """
     names = _WRITTEN[dimension]
-    value = float(value)
+    value = float(value) + 0.0  # -0 is 0
     if value == 0 or not math.isfinite(value):
         return f"{value:g} {names[0]}"
     best = _best_unit(value, names, dimension)

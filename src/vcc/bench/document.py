@@ -266,16 +266,15 @@ def _check_sizes(tree: Any, place: str) -> None:
         for key, each in tree.items():
             _check_sizes(each, f"{place}: {key}")
         shape = tree.get("shape")
-        if isinstance(shape, list) and all(type(each) is int and each > 0 for each in shape):
-            pixels = math.prod(shape)
-            if pixels > MOST_PIXELS:
-                raise InputError(
-                    f"{place}: shape is {shown(shape)}, {pixels} pixels, and a bench shows up to {MOST_PIXELS}: "
-                    "take fewer and larger ones here; a picture of all is what vcc capture makes"
-                )
+        counts = shape if isinstance(shape, list) and all(type(each) is int and each > 0 for each in shape) else []
+        if math.prod(counts) > MOST_PIXELS:
+            raise InputError(
+                f"{place}: shape is {shown(shape)}, and a bench shows up to {MOST_PIXELS} pixels: take fewer and "
+                "larger ones here; a picture of all is what vcc capture makes"
+            )
         prime = tree.get("prime")
         if type(prime) is int and prime * prime > MOST_CELLS:
-            raise InputError(f"{place}: prime is {prime}; on a bench it is up to {math.isqrt(MOST_CELLS)}")
+            raise InputError(f"{place}: prime is {shown(prime)}; on a bench it is up to {math.isqrt(MOST_CELLS)}")
     elif isinstance(tree, list):
         if len(tree) > MOST_QUANTITIES and isinstance(tree[0], str):
             raise InputError(f"{place} has {len(tree)} entries, and on a bench there are up to {MOST_QUANTITIES}")

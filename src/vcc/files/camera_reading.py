@@ -36,7 +36,7 @@ from vcc.files.camera_families import (
 )
 from vcc.files.npy import read_npy
 from vcc.files.pictures import read_grey
-from vcc.files.toml_words import as_toml, in_toml
+from vcc.files.toml_words import LONGEST_SHOWN, as_toml, in_toml
 from vcc.optics import Element
 from vcc.optics.focusing import focused_train
 from vcc.optics.sensor import Sensor
@@ -45,6 +45,11 @@ from vcc.shapes.patterns import Pattern
 
 LIKELY = 0.75
 """How alike a name must be to a known one to be a slip of it: "lense" for "lens", but not "stop" for "prism"."""
+
+DEEPEST = 30
+"""How deep tables and lists of a camera may stand in one another; NumPy has arrays of up to 32 axes."""
+LARGEST = float(np.finfo(np.float32).max)
+"""Of numbers in a camera file: light is computed with in float32."""
 
 _ARRAY_LIKE = set(get_args(ArrayLike))
 
@@ -145,9 +150,24 @@ def train_of_tables(
         InputError: as `vcc.camera_file.load_camera`; a file that may not be opened.
     """
     try:
+        _check_values(tables, called, DEEPEST)
         return _train_of(tables, called, beside, name)
     except InputError as error:
         raise InputError(as_toml(str(error))) from error.__cause__
+
+
+def _check_values(given: Mapping[str, Any] | list[Any], place: str, levels: int) -> None:
+    """Refuse what no camera has: numbers that overflow as soon as one computes with them, lists without an end."""
+    if not levels:
+        raise InputError(
+            f"{place[:LONGEST_SHOWN]}… is made of lists in lists: a camera's stand in up to {DEEPEST} others"
+        )
+    for key, each in enumerate(given, start=1) if isinstance(given, list) else given.items():
+        if isinstance(each, dict | list):
+            _check_values(each, f"{place}: {key}" if isinstance(key, str) else f"{place} {key}", levels - 1)
+        elif isinstance(each, int | float) and abs(each) > LARGEST and each not in (math.inf, -math.inf):
+            inside = f"{place}: {key}" if isinstance(key, str) else f"{place} {key}"
+            raise InputError(f"{inside} is {in_toml(each)}: a camera's numbers are up to {LARGEST:.3g}")
 
 
 def _train_of(tables: Mapping[str, Any], called: str, beside: Beside, name: str) -> TrainAsWritten:
@@ -206,7 +226,7 @@ def _read_element(entry: Mapping[str, Any], number: int, called: str, beside: Be
         raise InputError(f"{place} has no kind: add kind = … with one of {listed(ELEMENT_KINDS)}")
     kind = _known(entry["kind"], ELEMENT_KINDS, f"{place}: kind")
     name = entry.get("name")
-    named = f' "{name}"' if isinstance(name, str) and name else ""
+    named = f" {in_toml(name)}" if isinstance(name, str) and name else ""
     place = f"{place} ({entry['kind']}{named})"
     given = {key: value for key, value in entry.items() if key != "kind"}
     if kind not in FROM_FILES or not _comes_from_file(kind, given, place):
@@ -240,7 +260,7 @@ def _known(name: object, choices: Mapping[str, Any], what: str) -> Any:
     plain = {_plain(choice): choice for choice in choices}
     if _plain(name) in plain:
         return choices[plain[_plain(name)]]
-    raise InputError(f'{what} "{name}" is not known{_nearest(name, choices)}')
+    raise InputError(f"{what} {in_toml(name)} is not known{_nearest(name[:LONGEST_SHOWN], choices)}")
 
 
 def _plain(name: str) -> str:
@@ -262,7 +282,7 @@ def _check_keys(
     known = list(known)
     for key in given:
         if key not in known:
-            raise InputError(f'{place} has an unknown {noun} "{key}"{_nearest(key, known)}')
+            raise InputError(f"{place} has an unknown {noun} {in_toml(key)}{_nearest(key[:LONGEST_SHOWN], known)}")
     for key in required:
         if key not in given:
             raise InputError(f'{place} has no {noun} "{key}", which it needs')

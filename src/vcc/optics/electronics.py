@@ -24,6 +24,8 @@ PLANCK: Final = 6.62607015e-34
 """Planck's constant h, J·s; exact in the SI of 2019."""
 LIGHT_SPEED: Final = 299792458.0
 """The speed of light in vacuum c, m/s; exact in the SI."""
+SMALLEST_SHARE: Final = 1e-9
+"""Of the photons that free an electron: less is no number to divide by."""
 LARGEST_WELL: Final = 1e12
 """Electrons; no pixel holds a millionth of it, and random numbers stay within 64 bits."""
 _LETTERS: Final = "RGB"
@@ -76,6 +78,12 @@ class Electronics(Shown):
 
     def __post_init__(self) -> None:
         self._keep("quantum_efficiency", _per_channel("quantum_efficiency", self.quantum_efficiency, 1))
+        given = self.quantum_efficiency
+        least = min(given) if isinstance(given, tuple) else given
+        if least < SMALLEST_SHARE:
+            raise InputError(
+                f"quantum_efficiency is {least:g}: no sensor is that blind, take {SMALLEST_SHARE:g} or more"
+            )
         self._keep("wavelength", _per_channel("wavelength", self.wavelength, 1e-3, "m"))
         self._keep("full_well", checks.above_zero("full_well", self.full_well, unit="electrons"))
         if self.full_well > LARGEST_WELL:

@@ -26,6 +26,9 @@ from vcc.optics.scatter import Scatter
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern, as_pattern
 
+LONGEST_NAME = 200
+"""Letters of an element's name, which all that is said of it repeats."""
+
 Array = NDArray[np.float64]
 
 
@@ -115,7 +118,7 @@ class Element(Shown, abc.ABC):
         name: how to call it in messages and plots; made from its kind where empty.
 
     Raises:
-        InputError: a place that is not finite.
+        InputError: a place that is not finite, or a name of more than `LONGEST_NAME` letters.
     """
 
     z: float = field(default=0.0, metadata={"unit": "length"})
@@ -123,6 +126,11 @@ class Element(Shown, abc.ABC):
     name: str = ""
 
     def __post_init__(self) -> None:
+        if isinstance(self.name, str) and len(self.name) > LONGEST_NAME:
+            raise InputError(
+                f'the name of a {self.kind}, "{self.name[:20]}…", has {len(self.name)} letters: take up to '
+                f"{LONGEST_NAME}"
+            )
         named = f' "{self.name}"' if self.name else ""
         for parameter in fields(self):
             checks.plain(f"{parameter.name} of {self.kind}{named}", getattr(self, parameter.name))

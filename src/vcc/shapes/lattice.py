@@ -16,6 +16,8 @@ from vcc.shapes.patterns import RASTER_LIMIT, RASTER_PER_CELL, Pattern, Raster, 
 Array = NDArray[np.float64]
 
 LAYOUTS = ("square", "hexagonal")
+MOST_CELLS_A_SIDE = 2**20
+"""Of a block of cells."""
 ROW_HEIGHT = {"square": 1.0, "hexagonal": math.sqrt(3) / 2}
 """Distance between rows of cells, in pitches."""
 
@@ -299,16 +301,26 @@ class CellBlock(Pattern):
         lattice: the cells; cell (0, 0) is the block's upper left one.
         rows: of cells, 1 or more.
         columns: of cells, 1 or more.
+
+    Raises:
+        InputError: fewer than one row or column, or more than 2²⁰.
     """
 
     lattice: Lattice
     rows: int
     columns: int
 
+    def __post_init__(self) -> None:
+        for name in ("rows", "columns"):
+            checks.whole_number_between(f"{name} of a block of cells", getattr(self, name), 1, MOST_CELLS_A_SIDE)
+
     @property
     def size(self) -> tuple[float, float]:
         """(width, height) around the middle outside which nothing passes, metres."""
-        row, column = np.mgrid[: self.rows, : self.columns]
+        # The outermost lie in the corners, or a row from there where every other row is shifted.
+        row, column = np.meshgrid(
+            [0, min(1, self.rows - 1), max(self.rows - 2, 0), self.rows - 1], [0, self.columns - 1]
+        )
         furthest = (np.abs(centre).max() for centre in self.lattice.centre_of(row, column))
         width, height = (2 * (far + reach) for far, reach in zip(furthest, self.lattice.reach, strict=True))
         return float(width), float(height)

@@ -253,6 +253,9 @@ def _after(
 ) -> tuple[int, list[After]]:
     """Pixels around the sensor that the filters look at, and the filters: gaps filled, diffusers, sharpness."""
     after: list[After] = []
+    _check_raster(
+        train.sensor.shape, math.ceil(max(between.gap_filled) / divide)
+    )  # before so many weights are made
     guard, tents = _smear(between, divide, decisions)
     _check_raster(train.sensor.shape, guard)
     if tents is not None:

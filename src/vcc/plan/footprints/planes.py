@@ -236,11 +236,13 @@ def detail_lost(plane: Plane, known: Array, added: Array) -> float:
         return 0.0
     means = Cells(np.clip(values, 0.0, 1.0), float(size[0]), float(size[1]))
     # A pattern without bounds goes on beyond what is looked at: only what lies within is compared.
-    reach = np.where(bounded, 0, np.ceil(np.hypot(known, added) / 2 / cell).astype(int))
+    reach = np.ceil(np.where(bounded, 0.0, np.hypot(known, added) / 2 / cell)).astype(int)
     across, down = (slice(n, max(count - n, n + 1)) for n, count in zip(reach, counts, strict=True))
 
     def variance(box: Array) -> float:
-        wide, high = np.maximum(box, cell)
-        return float(means.mean(x[None, across], y[down, None], float(wide), float(high)).var())
+        # What is twice as wide as the pattern holds all of it wherever it lies: what is wider has less on average.
+        wide, high = np.clip(box, cell, 2 * size)
+        share = float(np.prod(np.minimum(1.0, 2 * size / np.maximum(box, cell))))
+        return share**2 * float(means.mean(x[None, across], y[down, None], float(wide), float(high)).var())
 
     return (variance(known) - variance(np.hypot(known, added))) / float(whole)

@@ -221,11 +221,13 @@ def settled(path: Path, everything: bool) -> Aimed:
 
 def _refuse(path: Path) -> NoReturn:
     """Say which elements leave the rays without a bound."""
-    names = ", ".join(leg.stage.element.label for leg in path.legs if leg.stage.faces.bending is not None)
-    raise InputError(
-        f"no bound can be found for the rays through {names}: the further out, the more it bends. "
-        "Give it a diameter, or put a stop beside it"
-    )
+    bending = [leg.stage.element.label for leg in path.legs if leg.stage.faces.bending is not None]
+    scattering = [leg.stage.element.label for leg in path.legs if leg.stage.faces.spread is not None]
+    if bending:
+        why = "the further out, the more it bends. Give it a diameter, or put a stop beside it"
+    else:
+        why = "it scatters them too far. Give it a kernel of smaller slopes (1 is 45°)"
+    raise InputError(f"no bound can be found for the rays through {', '.join(bending or scattering)}: {why}")
 
 
 def smallest(path: Path, slack: Slack, everything: bool) -> Aim:
