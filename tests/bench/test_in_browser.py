@@ -312,3 +312,25 @@ def test_accessibility_has_no_serious_fault(browser, served, scheme, width):
     wider = page.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
     assert wider <= 0  # nothing has to be scrolled sideways
     page.close()
+
+
+def test_phase_space_is_shown_at_any_plane_and_follows_the_camera(page):
+    page.page.get_by_role("tab", name="Phase space").click()
+    figures = page.page.locator("#pane figure")
+    figures.nth(3).wait_for()
+    assert figures.count() == 4
+    field = page.page.get_by_label("plane at")
+    field.fill("30")
+    field.press("Enter")
+    page.page.get_by_text("z = 30 mm", exact=True).wait_for()
+    slider = page.page.get_by_role("slider", name="Plane along the axis")
+    slider.focus()
+    page.page.keyboard.press("End")
+    page.page.get_by_text("z = 52 mm", exact=True).wait_for()
+    assert figures.count() == 1
+    page.part("sensor").focus()
+    page.page.keyboard.press("Shift+ArrowLeft")
+    page.page.get_by_text("z = 51 mm", exact=True).wait_for()
+    assert field.input_value() == "51 mm"
+    page.button("Each plane").click()
+    figures.nth(3).wait_for()

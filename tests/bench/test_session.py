@@ -268,6 +268,17 @@ def test_answers(client):
     client.do("ask", what="phase space")
     planes, pictures = client.until("answer")
     assert len(planes["planes"]) == len(pictures) == 4
+    assert planes["frame"] is None
+    client.do("ask", what="phase space", z="30 mm")
+    chosen, (picture,) = client.until("answer")
+    (plane,) = chosen["planes"]
+    assert (plane["title"], plane["z"]) == ("z = 30 mm", 0.03)
+    for name, ends in chosen["frame"].items():  # it holds all planes, so that it stays while one is moved
+        wanted = [pick(each[name][n] for each in planes["planes"]) for n, pick in ((0, min), (1, max))]
+        assert ends == pytest.approx(wanted, abs=0.02 * (wanted[1] - wanted[0]))
+        assert ends[0] <= plane[name][0] < plane[name][1] <= ends[1]
+    client.do("ask", what="phase space", z="60 mm")
+    assert "behind the sensor" in client.until("refused")[0]["words"]
     client.do("ask", what="why")
     assert "a bench is asked for" in client.until("refused")[0]["words"]
 

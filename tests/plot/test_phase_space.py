@@ -8,6 +8,7 @@ from vcc import (
     Biprism,
     Camera,
     Diffuser,
+    FirstOrder,
     InputError,
     Lens,
     LensArray,
@@ -18,7 +19,7 @@ from vcc import (
     Sensor,
 )
 from vcc.base.units import mm
-from vcc.plot import phase_space_stages, plot_phase_space, plot_phase_space_stages, style
+from vcc.plot import phase_space_at, phase_space_stages, plot_phase_space, plot_phase_space_stages, style
 from vcc.plot.phase_space import cell_corners
 from vcc.plot.phase_space_rays import sheet_of_rays, slice_of
 from vcc.shapes.kernels import Gaussian
@@ -372,3 +373,43 @@ def test_refuses_a_diffuser_in_a_slice_that_it_leads_out_of():
         plot_phase_space_stages(camera, some_light_field(), across="uv")
     with pytest.raises(InputError, match="rays is a number from 1 on"):
         phase_space_stages(camera, some_light_field(), rays=0)
+
+
+def test_any_plane_of_the_axis_holds_the_light_that_flew_there():
+    field = some_light_field()
+    camera = Camera([Lens(50 * mm, z=10 * mm), Lens(70 * mm, z=30 * mm)], Sensor(60 * mm, (4, 4), 1 * mm))
+    places = (-0.2, 0.004, 0.02, 0.03, 0.06)
+    stages = phase_space_stages(camera, field, rays=40_000)
+    pictures = [phase_space_at(camera, field, z, rays=40_000) for z in places]
+    middle = field[1:2, :, 2:3, :]
+    ends = np.array(np.meshgrid([-0.5, 4.5], [0.0], [-0.5, 5.5], [0.0], indexing="ij")).reshape(4, -1).T
+    for z, picture in zip(places, pictures, strict=True):
+        flown = Affine.propagation(z) if z < 0 else camera.rays_at(z)
+        rays = flown(middle.frame(ends))
+        cell = picture.first[1] - picture.first[0], picture.second[1] - picture.second[0]
+        # the outermost rays stand half a cell of theirs inside of the samples' corners: 40 000 rays, 200 a side
+        for borders, wanted, step in zip(
+            (picture.first, picture.second), (rays[:, 0], rays[:, 2]), cell, strict=True
+        ):
+            reach = np.ptp(wanted) / 100 + step
+            assert borders[[0, -1]] == pytest.approx([wanted.min(), wanted.max()], abs=reach)
+        assert picture.z == z
+        assert picture.light == pytest.approx(stages[0].light, rel=2e-3)
+    assert [picture.title for picture in pictures] == [
+        "before the camera, z = -200 mm",
+        "z = 4 mm",
+        "z = 20 mm",
+        "behind lens, z = 30 mm",
+        "z = 60 mm",
+    ]
+    np.testing.assert_array_equal(pictures[-2].radiance, stages[2].radiance)
+    np.testing.assert_array_equal(pictures[-1].radiance, stages[3].radiance)
+    with pytest.raises(InputError, match="behind the sensor"):
+        phase_space_at(camera, field, 61 * mm)
+
+
+def test_a_plane_within_something_thick_is_refused():
+    block = FirstOrder([[1, 0.01], [0, 1]], z=10 * mm, length=20 * mm)
+    camera = Camera([block], Sensor(60 * mm, (4, 4), 1 * mm))
+    with pytest.raises(InputError, match="lies inside"):
+        phase_space_at(camera, some_light_field(), 20 * mm)

@@ -13,7 +13,8 @@ export const QUESTIONS: [string, string][] = [
   ["point spread", "Point spread"],
   ["mtf", "MTF"],
 ];
-/** Of these, what is answered for a point at some distance. */
+/** Of these, what is answered at planes of the axis, and what for a point at some distance. */
+export const OF_PLANES = "phase space";
 export const OF_A_POINT = ["point spread", "mtf"];
 
 const WIDE = 460;
@@ -29,6 +30,7 @@ export function drawnAnswer({ message, pictures }: Answer) {
     case "mtf":
       return drawnCurves(message.across, message.down, away(message.distance));
     case "phase space":
+      if (message.frame) return drawnInFrame(message.planes[0]!, message.frame, pictures[0] ?? "");
       return html`<div class="planes">${message.planes.map((plane, number) => drawnPlane(plane, pictures[number] ?? ""))}</div>
         <p class="quiet">Each plane: places across it from left to right, slopes of the rays there upwards.</p>`;
   }
@@ -42,6 +44,34 @@ function drawnPlane(plane: Plane, picture: string) {
   const words = plane.title;
   return html`<figure><img src=${picture} alt="Phase space: ${words}"><figcaption>${words}<br>
     <span class="quiet">${plain(plane.place[0] * 1e3, 3)} to ${plain(plane.place[1] * 1e3, 3)} mm · slopes ${plain(plane.slope[0], 2)} to ${plain(plane.slope[1], 2)}</span></figcaption></figure>`;
+}
+
+/** One plane in the frame that holds all planes of the camera: moving it along the axis shears what is seen. */
+function drawnInFrame(plane: Plane, frame: { place: [number, number]; slope: [number, number] }, picture: string) {
+  const high = 1.2 * HIGH;
+  const [left, right, top, bottom] = [MARGIN.left + 14, WIDE - MARGIN.right, MARGIN.top, high - MARGIN.bottom];
+  const x = (place: number) => left + ((place - frame.place[0]) / (frame.place[1] - frame.place[0])) * (right - left);
+  const y = (slope: number) => bottom - ((slope - frame.slope[0]) / (frame.slope[1] - frame.slope[0])) * (bottom - top);
+  const scale = frame.place[1] - frame.place[0] < 1e-3 ? { of: 1e6, unit: "µm" } : { of: 1e3, unit: "mm" };
+  return html`<figure><svg viewBox="0 0 ${WIDE} ${high}" class="curves" role="img" aria-label="Phase space ${plane.title}">
+    <rect class="ground" x=${left} y=${top} width=${right - left} height=${bottom - top}></rect>
+    <image href=${picture} preserveAspectRatio="none" x=${x(plane.place[0])} y=${y(plane.slope[1])}
+      width=${x(plane.place[1]) - x(plane.place[0])} height=${y(plane.slope[0]) - y(plane.slope[1])}></image>
+    ${round(frame.place[0] * scale.of, frame.place[1] * scale.of).map((each) => svg`<path class="grid" d="M${x(each / scale.of)} ${bottom}v4"></path>
+      <text x=${x(each / scale.of)} y=${bottom + 16} text-anchor="middle">${plain(each, 3)}</text>`)}
+    ${round(...frame.slope).map((each) => svg`<path class="grid" d="M${left} ${y(each)}h-4"></path>
+      <text x=${left - 6} y=${y(each) + 4} text-anchor="end">${plain(each, 3)}</text>`)}
+    <text x=${(left + right) / 2} y=${high - 5} text-anchor="middle">place across the plane, ${scale.unit}</text>
+    <text transform="translate(11 ${(top + bottom) / 2}) rotate(-90)" text-anchor="middle">slope</text></svg>
+    <figcaption>${plane.title}</figcaption></figure>`;
+}
+
+/** Some round numbers between two. */
+function round(least: number, greatest: number): number[] {
+  const power = 10 ** Math.floor(Math.log10(greatest - least));
+  const step = [0.2, 0.5, 1, 2].map((each) => each * power).find((each) => (greatest - least) / each <= 6)!;
+  const first = Math.ceil(least / step - 1e-9);
+  return Array.from({ length: Math.floor(greatest / step + 1e-9) - first + 1 }, (_, number) => (first + number) * step);
 }
 
 /** Contrast over frequency; both curves end where the longer one does. */
@@ -74,6 +104,7 @@ export const answerStyles = css`
   figure { margin: 0; }
   figcaption { margin-top: 4px; font-size: 12px; line-height: 1.35; }
   .curves { width: 100%; max-width: 620px; display: block; }
+  .curves .ground { fill: #000; }
   .curves text { font-size: 11px; fill: var(--quiet); }
   .curves path { fill: none; stroke-width: 1.8; }
   .curves path.grid { stroke: var(--line); stroke-width: 1; }

@@ -165,7 +165,7 @@ export type AnswerMessage =
   | { is: "answer"; what: "explain"; words: string }
   | { is: "answer"; what: "point spread"; words: string; shape: [number, number]; distance: number | null }
   | { is: "answer"; what: "mtf"; across: Curve; down: Curve; distance: number | null }
-  | { is: "answer"; what: "phase space"; planes: Plane[] };
+  | { is: "answer"; what: "phase space"; planes: Plane[]; frame: { place: [number, number]; slope: [number, number] } | null };
 
 export type FromHost =
   | { is: "key"; key: string }

@@ -6,9 +6,10 @@ import { Part, controls, named } from "./part";
 import { EditorView } from "./editor";
 import { PictureView } from "./picture";
 import { SideView } from "./side";
-import { OF_A_POINT, QUESTIONS, answerStyles, drawnAnswer } from "./answers";
+import { OF_A_POINT, OF_PLANES, QUESTIONS, answerStyles, drawnAnswer } from "./answers";
 import { sign } from "./signs";
-import { metres, plain, split, withUnit } from "./numbers";
+import { inMillimetres, metres, plain, split, withUnit } from "./numbers";
+import type { Answer } from "./bench";
 import type { Where } from "./protocol";
 
 type Beside = "parts" | "notes" | string;
@@ -28,6 +29,11 @@ export class BenchView extends Part {
   declare film: string | null;
   /** Of the point whose picture is asked for; empty for the one in focus. */
   private distance = "";
+  /** Of phase space; empty for each plane of the camera. */
+  private plane = "";
+  /** While an answer is under way nothing else is asked; the newest question is asked when it has come. */
+  private underway: Answer | null | undefined = undefined;
+  private askNext = false;
   private askedFor = "";
   private askTimer = 0;
 
@@ -88,10 +94,17 @@ export class BenchView extends Part {
 
   /** An answer that is open follows the camera, when it rests. */
   private readonly keepAnswer = () => {
+    if (this.underway !== undefined && (this.bench.answer !== this.underway || this.bench.refused || !this.bench.open)) {
+      this.underway = undefined;
+      if (this.askNext) this.askAgain();
+    }
     if (this.beside === "parts" || this.beside === "notes" || !this.bench.document) return;
     const about = this.beside + JSON.stringify(this.bench.document);
     if (about === this.askedFor) return;
     const first = this.askedFor === "";
+    const end = metres(this.bench.document.camera.sensor["z"]);
+    // A sensor that comes nearer takes the plane with it.
+    if (!first && metres(withUnit(this.plane, null, "mm")) > end) this.plane = inMillimetres(end);
     this.askedFor = about;
     window.clearTimeout(this.askTimer);
     this.askTimer = window.setTimeout(() => this.askAgain(), first ? 0 : 300);
@@ -99,8 +112,32 @@ export class BenchView extends Part {
 
   private askAgain(): void {
     if (this.beside === "parts" || this.beside === "notes") return;
+    this.askNext = this.underway !== undefined;
+    if (this.askNext) return;
+    this.underway = this.bench.answer;
     const distance = this.distance.trim();
-    this.bench.question(this.beside, OF_A_POINT.includes(this.beside) && distance ? { distance: withUnit(distance, null, "m") } : {});
+    const plane = this.plane.trim();
+    if (OF_A_POINT.includes(this.beside) && distance) this.bench.question(this.beside, { distance: withUnit(distance, null, "m") });
+    else if (this.beside === OF_PLANES && plane) this.bench.question(this.beside, { z: withUnit(plane, null, "mm") });
+    else this.bench.question(this.beside);
+  }
+
+  private showPlane(words: string): void {
+    this.plane = words.trim() && withUnit(words, this.plane, "mm");
+    this.bench.forgive();
+    this.askAgain();
+  }
+
+  /** Which plane of phase space is shown: typed, or taken along the axis. */
+  private planeField() {
+    const sensor = this.bench.side?.sensor.z ?? 0;
+    const typed = metres(withUnit(this.plane.trim(), null, "mm"));
+    return html`<div class="distance"><label>plane at <input type="text" placeholder="each plane" .value=${this.plane}
+        @change=${(event: Event) => this.showPlane((event.target as HTMLInputElement).value)}></label>
+      <input type="range" aria-label="Plane along the axis" min="0" max="1000" step="1" .value=${String(Number.isFinite(typed) && sensor > 0 ? (typed / sensor) * 1000 : 0)}
+        aria-valuetext=${this.plane.trim() || "each plane"}
+        @input=${(event: Event) => this.showPlane(inMillimetres(Number(((Number((event.target as HTMLInputElement).value) / 1000) * sensor).toPrecision(4))))}>
+      <button ?disabled=${!this.plane.trim()} @click=${() => this.showPlane("")}>Each plane</button></div>`;
   }
 
   // --- drawing ---
@@ -174,6 +211,7 @@ export class BenchView extends Part {
           this.distance = (event.target as HTMLInputElement).value;
           this.askAgain();
         }}></label>` : nothing}
+      ${this.beside === OF_PLANES ? this.planeField() : nothing}
       ${answer ? drawnAnswer(answer) : html`<p class="quiet">…</p>`}</div>`;
   }
 
@@ -339,7 +377,9 @@ export class BenchView extends Part {
       .pane p { margin: 0 0 8px; }
       .pane pre { margin: 0; font: 11.5px/1.5 ui-monospace, "SF Mono", "DejaVu Sans Mono", monospace; white-space: pre-wrap; }
       .distance { display: flex; align-items: center; gap: 8px; margin-bottom: 10px; }
-      .distance input { width: 110px; }
+      .distance label { display: flex; align-items: center; gap: 8px; white-space: nowrap; }
+      .distance input[type="text"] { width: 110px; }
+      .distance input[type="range"] { flex: 1 1 60px; min-width: 60px; max-width: 260px; accent-color: var(--accent); }
       .advice { padding: 7px 10px; border-radius: 6px; background: var(--warn-ground); white-space: pre-line; }
       .link { height: auto; padding: 0 6px 0 0; font-weight: 600; text-decoration: underline; text-underline-offset: 2px; }
       .banner { grid-area: banner; padding: 7px 14px; background: var(--warn-ground); border-bottom: 1px solid var(--line); }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,8 @@ from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
 from vcc.plan.how import How
 from vcc.plot.fans import focused_distance
-from vcc.plot.phase_space import phase_space_stages
+from vcc.plot.phase_space import phase_space_at, phase_space_stages
+from vcc.plot.phase_space_rays import PhaseSpacePicture
 
 Json = dict[str, Any]
 
@@ -28,6 +30,8 @@ LEAST_ACROSS = 33
 MOST_ACROSS = 257
 """Pixels a side of a point's picture that is shown."""
 PHASE_SPACE_RAYS = 60_000
+ONE_PLANE_RAYS, ONE_PLANE_RASTER, FRAME_RAYS = 150_000, (240, 192), 10_000
+"""For a picture that is larger: some for each of its cells; and for how far all planes reach."""
 FINER = 8
 """An MTF is made from a point's picture on pixels so many times as fine as the sensor's. What those take from
 contrast stays in it: 1 − sinc(1/8), 3 %, at twice the frequency that the sensor's pixels tell apart."""
@@ -44,7 +48,8 @@ def answer(what: Any, message: Json, train: Train, light_field: LightField) -> t
 
     Args:
         what: one of `QUESTIONS`.
-        message: with ``distance``, a length in words, of the point; without it the one in focus.
+        message: with ``distance``, a length in words, of the point; without it the one in focus. With ``z``, a
+            length in words, of the plane of phase space; without it all planes of the camera.
         train: the camera.
         light_field: before it.
 
@@ -59,7 +64,7 @@ def answer(what: Any, message: Json, train: Train, light_field: LightField) -> t
     if what == "mtf":
         return _mtf(message, train), []
     if what == "phase space":
-        return _phase_space(train, light_field)
+        return _phase_space(message, train, light_field)
     raise InputError(f"a bench is asked for {', '.join(QUESTIONS)}, not for {shown(what)}")
 
 
@@ -124,19 +129,29 @@ def _curve(frequencies: NDArray[Any], values: NDArray[Any], most: float) -> list
     ]
 
 
-def _phase_space(train: Train, light_field: LightField) -> tuple[Json, list[bytes]]:
-    stages = phase_space_stages(train, light_field, rays=PHASE_SPACE_RAYS)
-    brightest = max(float(stage.radiance.max()) for stage in stages) or 1.0
+def _phase_space(message: Json, train: Train, light_field: LightField) -> tuple[Json, list[bytes]]:
+    """At all planes of the camera, or at the one that is asked for: then with the frame that holds all of them."""
+    frame, given = None, message.get("z")
+    pictures = phase_space_stages(train, light_field, rays=PHASE_SPACE_RAYS if given is None else FRAME_RAYS)
+    brightest = max(float(each.radiance.max()) for each in pictures) or 1.0
+    if given is not None:
+        z = units.parse(given, "length", "z")
+        chosen = phase_space_at(train, light_field, z, rays=ONE_PLANE_RAYS, raster=ONE_PLANE_RASTER)
+        frame = _frame([*pictures, chosen])
+        pictures = [chosen]
     told = [
-        {
-            "title": stage.title,
-            "z": max(stage.z, 0.0),
-            "place": [float(stage.first[0]), float(stage.first[-1])],
-            "slope": [float(stage.second[0]), float(stage.second[-1])],
-            "shape": list(stage.radiance.shape[:2]),
-        }
-        for stage in stages
+        {"title": each.title, "z": each.z, "shape": list(each.radiance.shape[:2])} | _frame([each])
+        for each in pictures
     ]
     # Slopes grow upwards, as on paper, and places to the right: a picture is turned by what shows it upright.
-    pictures = [jpeg(stage.radiance[:, ::-1].astype(np.float32), brightest) for stage in stages]
-    return {"planes": told}, pictures
+    drawn = [jpeg(each.radiance[:, ::-1].astype(np.float32), brightest) for each in pictures]
+    return {"planes": told, "frame": frame}, drawn
+
+
+def _frame(pictures: Sequence[PhaseSpacePicture]) -> dict[str, list[float]]:
+    """From where to where the places and the slopes of phase space reach in pictures of it."""
+    borders = {"place": [each.first for each in pictures], "slope": [each.second for each in pictures]}
+    return {
+        name: [float(min(each[0] for each in ends)), float(max(each[-1] for each in ends))]
+        for name, ends in borders.items()
+    }

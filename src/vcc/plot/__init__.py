@@ -7,12 +7,13 @@ writes a file. New figures belong to nobody but the caller: pyplot and its globa
 from vcc.plot.camera_plot import plot_camera
 from vcc.plot.element_plot import plot_element
 from vcc.plot.fans import focused_distance
-from vcc.plot.phase_space import phase_space_stages, plot_phase_space, plot_phase_space_stages
+from vcc.plot.phase_space import phase_space_at, phase_space_stages, plot_phase_space, plot_phase_space_stages
 from vcc.plot.phase_space_rays import PhaseSpacePicture
 
 __all__ = [
     "PhaseSpacePicture",
     "focused_distance",
+    "phase_space_at",
     "phase_space_stages",
     "plot_camera",
     "plot_element",

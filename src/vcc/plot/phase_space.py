@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import checks
+from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.base.units import mm
+from vcc.base.units import mm, short
 from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import InMemory
 from vcc.files.transfer import from_linear
 from vcc.optics import Faces
 from vcc.optics.sensor import Sensor
-from vcc.optics.train import Train
+from vcc.optics.train import Train, touch
 from vcc.plot import style
 from vcc.plot.phase_space_rays import (
     FULL,
     IN_ONE_PLANE,
     NAMES,
+    RASTER,
     RAYS,
     PhaseSpacePicture,
+    Sheet,
     radiance_of,
     sheet_of_rays,
     sheet_of_samples,
@@ -201,14 +206,76 @@ def phase_space_stages(
     Raises:
         InputError: as there.
     """
+    sheet = _sheet(light_field, across, (row, pixel_row), fixed)
+    return list(traced(camera, sheet, {-1.0: ENTRANCE} | dict(_planes(camera)), rays=_some(rays)))
+
+
+def phase_space_at(
+    camera: Train,
+    light_field: InMemory,
+    z: float,
+    *,
+    row: int | None = None,
+    pixel_row: int | None = None,
+    across: str = "u",
+    fixed: tuple[float, float] | None = None,
+    rays: int = RAYS,
+    raster: tuple[int, int] = RASTER,
+) -> PhaseSpacePicture:
+    """A raster of radiance as `phase_space_stages` gives it, at any plane of the axis.
+
+    Args:
+        camera: through which the light field goes.
+        light_field: at the entrance plane.
+        z: of the plane, metres, up to the sensor's; below 0 before the camera. Where an element stands, the plane
+            is just behind it.
+        row: as in `plot_phase_space_stages`, likewise the next three.
+        pixel_row: which row of pixels.
+        across: two coordinates.
+        fixed: the other two, at the entrance plane.
+        rays: about how many are traced, 1 or more.
+        raster: (columns, rows) of the picture.
+
+    Raises:
+        InputError: as there; a plane behind the sensor or within a thick element.
+    """
+    sheet, z = _sheet(light_field, across, (row, pixel_row), fixed), checks.finite("z of a plane", z, "metres")
+    place = short(z, digits=6)
+    if z < 0:
+        before = {-1.0: f"before the camera, z = {place}"}
+        (picture,) = traced(NO_OPTICS, sheet.moved(Affine.propagation(z)), before, rays=_some(rays), raster=raster)
+        return replace(picture, z=z)
+    if z > camera.sensor.z and not touch(z, camera.sensor.z):
+        raise InputError(f"z = {place} lies behind the sensor, which stands at z = {short(camera.sensor.z)}")
+    camera.rays_at(z)  # which refuses what lies inside of a thick element
+    met = [one for one in camera.elements if one.z < z or touch(one.z, z)]
+    behind = [one.called for one in met if touch(one.z + one.length, z)]
+    title = f"behind {' and '.join(behind)}, z = {place}" if behind else f"z = {place}"
+    z = max([z, *(one.z + one.length for one in met)])  # but for rounding the same
+    return list(
+        traced(
+            Train(met, Sensor(z, (1, 1), 1.0)), sheet, {-1.0: ENTRANCE, z: title}, rays=_some(rays), raster=raster
+        )
+    )[-1]
+
+
+def _sheet(
+    light_field: InMemory,
+    across: str,
+    rows: tuple[int | None, int | None],
+    fixed: tuple[float, float] | None,
+) -> Sheet:
+    """The slice that is followed."""
     chosen = slice_of(across)
+    if _held_by_samples(chosen, *rows, fixed):
+        return sheet_of_samples(_slice(light_field, *rows, NAMES[chosen[0]]), chosen)
+    return sheet_of_rays(light_field, chosen, fixed)
+
+
+def _some(rays: int) -> int:
     if not rays >= 1:
         raise InputError(f"rays is a number from 1 on, not {rays}")
-    if _held_by_samples(chosen, row, pixel_row, fixed):
-        sheet = sheet_of_samples(_slice(light_field, row, pixel_row, NAMES[chosen[0]]), chosen)
-    else:
-        sheet = sheet_of_rays(light_field, chosen, fixed)
-    return list(traced(camera, sheet, {-1.0: ENTRANCE} | dict(_planes(camera)), rays=rays))
+    return rays
 
 
 def _held_by_samples(

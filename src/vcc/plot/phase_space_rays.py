@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -95,6 +95,11 @@ class Sheet(Brief):
     first: Array
     second: Array
     across: tuple[int, int]
+
+    def moved(self, affine: Affine) -> Sheet:
+        """The same cells after a map of rays."""
+        turned = affine.linear
+        return replace(self, origin=affine(self.origin), first=turned @ self.first, second=turned @ self.second)
 
 
 def slice_of(across: str) -> tuple[int, int]:
@@ -329,8 +334,8 @@ def traced(
     Args:
         camera: any.
         sheet: at the entrance plane.
-        titles: of the planes, by z in metres: where elements end, and the sensor's; −1 for the entrance, before
-            all elements.
+        titles: of the planes that are wanted, by z in metres: where elements end, and the sensor's; −1 for the
+            entrance, before all elements.
         rays: about how many are traced.
         raster: (columns, rows) of the pictures.
 
@@ -355,7 +360,7 @@ def traced(
             else:
                 bundle.meet(Stage(element, element.z, Affine.identity(), part), rays)
         last = n + 1 == len(elements) or elements[n + 1].z + elements[n + 1].length != here
-        if last:
+        if last and here in titles:
             yield picture(titles[here], here)
     if camera.sensor.z in titles and (not elements or here != camera.sensor.z):
         bundle.move(Affine.propagation(camera.sensor.z - here))
