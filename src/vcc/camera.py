@@ -157,6 +157,7 @@ class Camera(Train):
         how: How | None = None,
         *,
         plan: Plan | None = None,
+        executor: Any = None,
         progress: Progress | None = None,
         **options: Unpack[Options],
     ) -> Image:
@@ -168,6 +169,10 @@ class Camera(Train):
             how: all that may be chosen, in one record; None takes the defaults.
             plan: made before by `compile` for this light field, or for another of the same shape and frame; None
                 makes one. What decides how it is made is then not to be given one by one.
+            executor: who runs the blocks of a stored light field: any `concurrent.futures.Executor`, or a
+                ``dask.distributed.Client``, which stay open. Each task is one block, with one thread unless
+                ``threads`` says how many and within a ``memory_limit`` of its own. The picture is the same to
+                rounding, and byte for byte from run to run. None runs all here, one block after the other.
             progress: called with (done, total) as the work advances.
             options: what is to be chosen otherwise than in ``how``, by name: ``method``, ``interpolation``,
                 ``between_views``, ``scene_distance``, ``refine``, ``samples``, ``tolerance``, ``seed``,
@@ -186,7 +191,9 @@ class Camera(Train):
         Raises:
             InputError: an option that does not exist or does not go with the method, an element that returns
                 what it must not; of a light field on disk, views that are missing or damaged, or a memory limit
-                that is too small; a plan for another camera, or for another shape or frame of light field.
+                that is too small; a plan for another camera, or for another shape or frame of light field; an
+                executor that dies, that cannot reach the store or runs another version, or a light field in memory
+                that is too large to be sent to it.
         """
         check_is_light_field(light_field)
         chosen, absurd = How.of(how, options), metres_meant(self, light_field.grid)
@@ -194,7 +201,7 @@ class Camera(Train):
             warn_of_result(f"hardly any light will reach the sensor. {absurd}")
             absurd = ""
         plan = self._planned(light_field, chosen, plan, options, progress)
-        found = drive(plan, light_field, chosen, progress)
+        found = drive(plan, light_field, chosen, progress, executor)
         if caution := _caution(plan, light_field, found, absurd):
             warn_of_result(caution)
         return Image(
@@ -259,6 +266,7 @@ class Camera(Train):
         ray_seed: int = 0,
         how: How | None = None,
         plan: Plan | None = None,
+        executor: Any = None,
         progress: Progress | None = None,
         **options: Any,
     ) -> Recording:
@@ -274,6 +282,7 @@ class Camera(Train):
             ray_seed: of the choice of rays, where rays are traced: the seed of `capture`.
             how: as in `capture`.
             plan: as in `capture`.
+            executor: as in `capture`.
             progress: as in `capture`.
             options: as in `capture`.
 
@@ -288,7 +297,8 @@ class Camera(Train):
         chosen = How.of(how, {**options, "seed": ray_seed})
         asked = Exposure(self.sensor, exposure, seed, radiance, chosen.threads)
         asked.check_channels(light_field.grid.channels)  # before the work begins
-        return recorded(self.capture(light_field, chosen, plan=plan, progress=progress), asked)
+        captured = self.capture(light_field, chosen, plan=plan, executor=executor, progress=progress)
+        return recorded(captured, asked)
 
     def explain(
         self,

@@ -118,3 +118,31 @@ def test_a_disk_that_fills_up_while_code_is_kept_is_no_failure(
     with warnings.catch_warnings():  # what the index says is there, and is not, is compiled
         warnings.simplefilter("error")
         assert loaded()(21) == 42
+
+
+def test_processes_take_turns_to_keep_code(loaded: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another has the turn, and lets go of it when it has been waited for."""
+    fcntl = pytest.importorskip("fcntl")
+    folder, waited = tmp_path / "__pycache__", []
+    folder.mkdir()
+    with (folder / compiled.TURN).open("w") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+
+        def wait(seconds: float) -> None:
+            assert not list(folder.glob("*.nbi"))
+            waited.append(seconds)
+            fcntl.flock(other, fcntl.LOCK_UN)
+
+        monkeypatch.setattr(compiled.time, "sleep", wait)
+        assert loaded()(21) == 42
+        assert len(waited) == 1
+        assert list(folder.glob("kernel.doubled*.nbc"))
+
+
+def test_nobody_waits_for_ever_for_a_turn(loaded: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fcntl = pytest.importorskip("fcntl")
+    monkeypatch.setattr(compiled, "PATIENCE", 0.0)
+    (tmp_path / "__pycache__").mkdir()
+    with (tmp_path / "__pycache__" / compiled.TURN).open("w") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        assert loaded()(21) == 42

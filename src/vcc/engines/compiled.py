@@ -3,13 +3,19 @@
 Numba keeps code beside the source, or under the home folder, or where ``NUMBA_CACHE_DIR`` says, and fails where it
 can write to none of them, or where what it finds there is damaged. Here code is then read from the same places
 without being kept (a container's image may bring it along), and else compiled by each process.
+
+An index of what there is and the code itself are two files, and many processes that begin at once would write both
+in each other's way, which has crashed programs (numba issues 4807 and 10128): they take turns.
 """
 
 from __future__ import annotations
 
 import os
+import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from numba import njit
@@ -17,6 +23,17 @@ from numba.core.caching import FunctionCache
 from numba.core.sigutils import normalize_signature
 
 from vcc.base.errors import CacheWarning
+
+fcntl: Any
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
+
+TURN = ".vcc.lock"
+"""The file in a folder of code that says whose turn it is."""
+PATIENCE = 5.0
+"""Seconds after which nobody waits for a turn any more: some network disks have no locks that work."""
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -52,26 +69,62 @@ class _Kept(FunctionCache):  # type: ignore[misc]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The code for arguments of these types, or None."""
         try:
-            found = super().load_overload(sig, target_context)
+            with _in_turn(self.cache_path):
+                found = super().load_overload(sig, target_context)
         except Exception:  # cut off or damaged: compiled again
             self._start_anew()
             return None
-        # Two processes that keep code at once may give two files one name.
+        # Where there are no locks, two processes that keep code at once may give two files one name.
         fits = found is not None and tuple(found.signature.args) == tuple(normalize_signature(sig)[0])
         return found if fits else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the code for arguments of these types, or say that it is not kept."""
         try:
-            super().save_overload(sig, data)
+            with _in_turn(self.cache_path):
+                super().save_overload(sig, data)
         except OSError as error:
             _say_once(self.cache_path, error)
 
     def _start_anew(self) -> None:
         try:
-            self.flush()
+            with _in_turn(self.cache_path):
+                self.flush()
         except OSError as error:
             _say_once(self.cache_path, error)
+
+
+@contextmanager
+def _in_turn(folder: str) -> Iterator[None]:
+    """While no other process reads or keeps code in a folder, as far as the system can tell."""
+    stream = _turn(Path(folder) / TURN)
+    try:
+        yield
+    finally:
+        if stream is not None:
+            os.close(stream)  # which lets go of the lock
+
+
+def _turn(file: Path) -> int | None:
+    """The open file that says that it is this process's turn; None where there is no telling."""
+    if fcntl is None:
+        return None
+    try:
+        stream = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:  # no such folder yet, or one that nobody writes to
+        return None
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(0.005)
+        except OSError:
+            break
+        else:
+            return stream
+    os.close(stream)
+    return None
 
 
 _said: list[str] = []

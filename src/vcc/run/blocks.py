@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -13,6 +13,14 @@ import numpy as np
 from vcc.base.errors import InputError
 from vcc.fields.grid import Block, Grid
 from vcc.plan.model import Plan
+from vcc.run.executors import TOGETHER
+
+SUMS = 3
+"""Sums of rasters that are there at a time: one for each eightfold number of blocks, 512 of them."""
+SHARES = 64
+"""Blocks by footprints that there are for many to work on at once, at least where each is still worth it."""
+WORTH = 2**24
+"""Bytes of samples from which on a block of its own is worth what it costs to ask for."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +89,14 @@ class Need:
         view: bytes of a view as it is kept.
         times: how many times a block's samples are in memory.
         border: dark views along each axis of a block, those on both of its sides.
+        raster: bytes of a block's raster, in double precision.
     """
 
     fixed: int
     view: float
     times: float
     border: int
+    raster: int
 
     @classmethod
     def of(cls, plan: Plan, grid: Grid, engine_memory: int, copies: bool) -> Need:
@@ -102,7 +112,13 @@ class Need:
         pixels = math.prod(plan.core.raster_shape) * (grid.channels or 1)
         grown = math.prod(plan.shape(grid.shape)[2:]) * kept
         times = 1 + 16 / kept if copies else 1.0
-        return cls((36 if plan.by_rays else 16) * pixels + engine_memory, grown, times, 2 * plan.core.border)
+        raster = (16 if plan.by_rays else 8) * pixels
+        single = 4 * pixels if plan.by_rays else 0
+        return cls((1 + SUMS) * raster + single + engine_memory, grown, times, 2 * plan.core.border, raster)
+
+    def with_sums(self) -> Need:
+        """With what whoever runs blocks for others keeps beside: the results of blocks that are to be summed."""
+        return replace(self, fixed=self.fixed + TOGETHER * self.raster)
 
     @property
     def least_for_views(self) -> int:
@@ -147,6 +163,29 @@ def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
         f"memory_limit={math.ceil(limit)} bytes is too little: this picture takes {math.ceil(least / 1e6)} MB "
         f"however small the blocks are, and about {math.ceil(need.least_for_views / 1e6)} MB to go well"
     )
+
+
+def cut_for_many(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
+    """Blocks for many to work on at once: those of `cut`, or by footprints smaller ones, so that all have work.
+
+    How many work does not count: the same blocks are the same picture, byte for byte. By rays blocks are as large
+    as may be, since all rays are traced for each.
+
+    Args:
+        plan: as for `cut`.
+        grid: as for `cut`.
+        need: as for `cut`.
+        limit: bytes for each of them.
+
+    Raises:
+        InputError: as `cut`.
+    """
+    if plan.by_rays:
+        return cut(plan, grid, need, limit)
+    views = int(plan.core.used_views(grid.shape).sum())
+    # What comes back of a block, its raster, is to be little beside it.
+    each = max(views * need.view / SHARES, WORTH, 8.0 * need.raster, need.view)
+    return cut(plan, grid, need, min(limit, need.fixed + 3 * need.view + need.times * each))
 
 
 def _span(used: Any) -> tuple[int, int]:

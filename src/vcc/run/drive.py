@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import late
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.progress import Progress
@@ -30,12 +31,16 @@ from vcc.plan.depth_rule import ViewsBetween
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
-from vcc.run.blocks import Blocks, Need, cut
+from vcc.run.blocks import Blocks, Need, cut, cut_for_many
+from vcc.run.executors import Tree, crew
+from vcc.run.sent import Carried, Sent
 
 HELD = 0.25
 """Share of the memory that views and maps, kept to be used again, may take where views in between are made."""
 IN_MEMORY = 2**28
 """Bytes of denser views that are there at a time, of a light field in memory."""
+LEAST_ROOM = 2**26
+"""Bytes for a task without which nobody need begin."""
 MUCH_UNSEEN = 0.01
 """Share of the samples between views that no view shows, from which on a warning says it."""
 
@@ -62,7 +67,13 @@ class Recorded:
     samples: int = 0
 
 
-def drive(plan: Plan, samples: Samples, how: How | None = None, progress: Progress | None = None) -> Recorded:
+def drive(
+    plan: Plan,
+    samples: Samples,
+    how: How | None = None,
+    progress: Progress | None = None,
+    executor: Any = None,
+) -> Recorded:
     """The picture that a plan makes of a light field.
 
     Args:
@@ -70,12 +81,13 @@ def drive(plan: Plan, samples: Samples, how: How | None = None, progress: Progre
         samples: in memory, or read block by block (by rays once for each doubling that a tolerance asks for).
         how: engine, threads, tolerance and memory; the rest is the plan's.
         progress: called with (done, total).
+        executor: who runs the blocks (`vcc.run.executors.crew`); None runs them here, one after the other.
 
     Raises:
         InputError: an engine that does not take these arrays; of samples that are read, views that are missing or
-            damaged, or a memory limit that is too small.
+            damaged, or a memory limit that is too small; what an executor does not take, or one that dies.
     """
-    return Drive(plan, samples, how or How()).recorded(progress)
+    return Drive(plan, samples, how or How(), executor).recorded(progress)
 
 
 def rounds_of(drives: Sequence[Drive]) -> list[Partial]:
@@ -105,8 +117,10 @@ class Drive:
         plan: what is computed.
         samples: of what.
         how: by what, and within what.
+        executor: who runs the blocks, each with one thread unless ``how`` says how many; None runs them here.
 
     Attributes:
+        crew: who runs the blocks, or None.
         plan: as given.
         how: as given.
         given: the samples that were given.
@@ -125,15 +139,18 @@ class Drive:
         InputError: see `drive`.
     """
 
-    def __init__(self, plan: Plan, samples: Samples, how: How) -> None:
+    def __init__(self, plan: Plan, samples: Samples, how: How, executor: Any = None) -> None:
         samples.check_complete()
+        self.crew = None if executor is None else crew(executor)
+        if self.crew is not None:
+            samples = Carried.of(samples)
         if how.tolerance is not None and not plan.by_rays:
             raise InputError("tolerance is for pictures made by rays; footprints have no sampling error")
         self.plan, self.how = plan, how
         self.given, self.samples = samples, samples
         self.name = chosen(how.engine, samples.whole())
         self.engine, self.threads = engine(self.name), how.workers
-        self.limit: float = MEMORY_LIMIT // 4 if how.memory_limit is None else how.memory_limit
+        self.limit: float = self._memory_limit()
         if plan.views_between is not None:
             self._look_between(plan.views_between)
         kind = to_dtype(samples.whole()) if self.in_memory else self.samples.grid.kind
@@ -145,7 +162,7 @@ class Drive:
         self.runner = plan.core.by(self.engine)
 
     @classmethod
-    def of_linear(cls, plan: Plan, samples: Samples, how: How) -> Drive:
+    def of_linear(cls, plan: Plan, samples: Samples, how: How, executor: Any = None) -> Drive:
         """The same for a plan that is to be gone through backwards, too.
 
         Raises:
@@ -167,7 +184,25 @@ class Drive:
                 "engine 'array_api' goes backwards by the gradients of its arrays' own library: take those of "
                 "camera.capture, or pass NumPy arrays and engine='numba' or 'reference'"
             )
-        return cls(plan, samples, how)
+        return cls(plan, samples, how, executor)
+
+    def _memory_limit(self) -> float:
+        """Bytes that a block, the picture and the engine may take; with an executor, of each task.
+
+        Raises:
+            InputError: more than the executor's workers have.
+        """
+        asked, room = self.how.memory_limit, None if self.crew is None else self.crew.room
+        if room is None:
+            return MEMORY_LIMIT // 4 if asked is None else asked
+        if room < LEAST_ROOM or (asked is not None and asked > room):
+            needed = LEAST_ROOM if asked is None else asked
+            raise InputError(
+                f"the least of the executor's workers has {max(room, 0) / 1e6:.0f} MB for each task, beside "
+                f"Python and its libraries, and {needed / 1e6:.0f} MB are asked for: give workers more memory, or "
+                "fewer threads each" + ("" if asked is None else ", or pass a smaller limit")
+            )
+        return min(MEMORY_LIMIT // 4, room) if asked is None else asked
 
     @property
     def in_memory(self) -> bool:
@@ -182,8 +217,17 @@ class Drive:
     @cached_property
     def need(self) -> Need:
         """What blocks take of memory."""
-        taken = self.engine.memory(self.plan.core, self.channels, self.threads)
-        return Need.of(self.plan, self.samples.grid, taken, self.engine.copies)
+        threads = self.threads if self.crew is None else self.sent.how.workers
+        taken = self.engine.memory(self.plan.core, self.channels, threads)
+        need = Need.of(self.plan, self.samples.grid, taken, self.engine.copies)
+        return need if self.crew is None else need.with_sums()
+
+    @cached_property
+    def sent(self) -> Sent:
+        """What goes to those that run the blocks elsewhere."""
+        assert isinstance(self.given, Carried)
+        how = replace(self.how, threads=self.how.threads or 1, memory_limit=math.ceil(self._memory_limit()))
+        return Sent.of(self.plan, self.given, how)
 
     @cached_property
     def blocks(self) -> Blocks:
@@ -194,7 +238,8 @@ class Drive:
         """
         grid = self.samples.grid
         if not self.in_memory:
-            return cut(self.plan, grid, self.need, self.limit)
+            cut_up = cut if self.crew is None else cut_for_many
+            return cut_up(self.plan, grid, self.need, self.limit)
         copied = self.plan.core.border == 0 and any(operator.copies for operator in self.plan.before)
         return Blocks.by_column(grid) if copied else Blocks.one(grid)
 
@@ -251,17 +296,21 @@ class Drive:
             beside: 0, or rays a pixel that there are already: then as many others.
             progress: called with (done, total).
         """
-        core = self.core.more(beside) if beside else self.core
-        run = partial(self.runner, beside=int(beside > 0), threads=self.threads)
+        core, run = self._core_and_run(beside)
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
             return run(core, self.prepared, progress=progress)
-        total = self._over_blocks(core, run, listed, progress)
+        total = self._over_blocks(listed, beside, progress)
         if not self.plan.by_rays or self.in_memory:
             return total
         # Each block knows of its own rays only: a light field of one sample tells which of all are missing.
         whole = run(core.alone(), np.zeros((1, 1, 1, 1), self.kind))
         return replace(total, asked=whole.asked, lacking=whole.lacking, rays=whole.rays)
+
+    def _core_and_run(self, beside: int) -> tuple[Core, Callable[..., Partial]]:
+        """The core with so many rays beside those taken, and what runs it."""
+        core = self.core.more(beside) if beside else self.core
+        return core, partial(self.runner, beside=int(beside > 0), threads=self.threads)
 
     @cached_property
     def prepared(self) -> Any:
@@ -283,19 +332,32 @@ class Drive:
         """How many views of a block are looked at."""
         return int(self.used[slice(*block.rows), slice(*block.columns)].sum())
 
-    def _over_blocks(
-        self, core: Core, run: Callable[..., Partial], blocks: list[Block], progress: Progress | None
-    ) -> Partial:
+    def _over_blocks(self, blocks: list[Block], beside: int, progress: Progress | None) -> Partial:
         """The sum of what blocks give, in double precision; those of which no view is looked at are not read."""
-        counted = Counted(progress, sum(map(self.used_in, blocks)))
-        total: Partial | None = None
-        for block in filter(self.used_in, blocks):
-            values = self.values(block, counted)
-            part = _in_double(run(core.part(self.plan.block(self.around(block))), values))
-            del values  # before the next block is read
-            total = part if total is None else total + part
-        assert total is not None
-        return total
+        used = list(filter(self.used_in, blocks))
+        counted = Counted(progress, sum(map(self.used_in, used)))
+        if self.crew is None:
+            tree = Tree(len(used), _sum)
+            for number, block in enumerate(used):
+                tree.put(number, self.part(block, beside, counted))
+            return _in_double(tree.total)
+        asked, views = [(block, beside) for block in used], [self.used_in(block) for block in used]
+        total = self.crew.summed(_share_of, self.sent, asked, _sum_of_shares, lambda n: counted.add(views[n]))
+        if self.plan.views_between is not None:
+            self.samples.made, self.samples.unseen = total.made, total.unseen  # type: ignore[attr-defined]
+        return _in_double(total.part)
+
+    def part(self, block: Block, beside: int, counted: Counted) -> Partial:
+        """The raster of a block: the task of which the picture of what is not in memory is the sum.
+
+        Args:
+            block: of the light field.
+            beside: see `summed`.
+            counted: told of each view that is read.
+        """
+        core, run = self._core_and_run(beside)
+        values = self.values(block, counted)
+        return run(core.part(self.plan.block(self.around(block))), values)
 
     def around(self, block: Block) -> Block:
         """What runs with a block: of those that are read, a border of views where it has neighbours, too."""
@@ -346,6 +408,37 @@ class Drive:
         self.limit = math.ceil(self.limit * (1 - HELD))
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Share(Brief):
+    """What some blocks that others ran give.
+
+    Args:
+        part: of the raster.
+        made: samples of views in between that were made for it.
+        unseen: of these, those that no view shows.
+    """
+
+    part: Partial
+    made: int
+    unseen: int
+
+
+def _share_of(sent: Sent, asked: tuple[Block, int]) -> Share:
+    """What a block gives, in another thread or process, or on another machine."""
+    drive = Drive(sent.plan, sent.samples, sent.how)
+    part = drive.part(*asked, Counted(None, 0))
+    return Share(part, getattr(drive.samples, "made", 0), getattr(drive.samples, "unseen", 0))
+
+
+def _sum_of_shares(one: Share, other: Share) -> Share:
+    return Share(_sum(one.part, other.part), one.made + other.made, one.unseen + other.unseen)
+
+
+def _sum(one: Partial, other: Partial) -> Partial:
+    """What two blocks give together, in double precision."""
+    return _in_double(one) + other
+
+
 def _with_border(block: Block, border: int, shape: tuple[int, ...]) -> Block:
     """A block with so many views around it where it has neighbours in a light field of this shape."""
     (a, b), (c, d) = block.rows, block.columns
@@ -360,8 +453,8 @@ def _in_double(part: Partial) -> Partial:
     """Sums of many parts are kept in double precision."""
     if not isinstance(part.values, np.ndarray):
         return part
-    difference = None if part.difference is None else part.difference.astype(np.float64)
-    return replace(part, values=part.values.astype(np.float64), difference=difference)
+    difference = None if part.difference is None else part.difference.astype(np.float64, copy=False)
+    return replace(part, values=part.values.astype(np.float64, copy=False), difference=difference)
 
 
 class Counted:

@@ -63,27 +63,31 @@ class Operator:
     def __post_init__(self) -> None:
         self._drive(self.light_field)
 
-    def __call__(self, samples: Any = None, *, progress: Progress | None = None) -> NDArray[Any]:
+    def __call__(
+        self, samples: Any = None, *, executor: Any = None, progress: Progress | None = None
+    ) -> NDArray[Any]:
         """The picture that the camera makes of samples.
 
         Args:
             samples: floating-point numbers of `samples_shape`, or several light fields, (n, …); None takes those
                 of the light field.
+            executor: who runs blocks of them, as in `vcc.Camera.capture`.
             progress: called with (done, total), for each light field anew.
 
         Returns:
             (rows, columns[, channels]), or (n, …): irradiance, as `vcc.Camera.capture` gives it, of type `dtype`.
 
         Raises:
-            InputError: samples of another shape, of another type than floating point, or not finite.
+            InputError: samples of another shape, of another type than floating point, or not finite; what an
+                executor does not take, or one that dies.
         """
         if samples is None:
-            return self._picture(self.light_field, progress)
+            return self._picture(self.light_field, executor, progress)
         grid = replace(self.light_field.grid, kind=self.dtype)
         return _each(
             self._checked("samples", samples, self.samples_shape),
             self.samples_shape,
-            lambda one: self._picture(InMemory.of(one, grid), progress),
+            lambda one: self._picture(InMemory.of(one, grid), executor, progress),
         )
 
     @property
@@ -158,11 +162,11 @@ class Operator:
         name = self._drive(self.light_field).name
         return f"Operator({samples} samples to {picture} pixels by {self.plan.core.method}, {name}, {self.dtype})"
 
-    def _drive(self, samples: Samples) -> Drive:
-        return Drive.of_linear(self.plan, samples, self.how)
+    def _drive(self, samples: Samples, executor: Any = None) -> Drive:
+        return Drive.of_linear(self.plan, samples, self.how, executor)
 
-    def _picture(self, samples: Samples, progress: Progress | None) -> NDArray[Any]:
-        drive = self._drive(samples)
+    def _picture(self, samples: Samples, executor: Any, progress: Progress | None) -> NDArray[Any]:
+        drive = self._drive(samples, executor)
         picture: NDArray[Any] = drive.picture(drive.rounds(progress))
         return picture
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import platform
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -38,7 +39,7 @@ from vcc.files.parts import put_back
 from vcc.files.transfer import decode
 from vcc.image import Image
 from vcc.light_field import LightField
-from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
+from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer, same
 from vcc.store.compression import know_pictures
 from vcc.store.disparity_maps import keep_maps, read_maps
 
@@ -80,6 +81,10 @@ class StoredLightField(OnGrid):
             self.disparity_range,
             Disparities(find=self._kept_or_found, measure=self._measured),
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Its address: whoever gets it opens the store for himself."""
+        return _opened_elsewhere, (self.path.absolute(), self.attributes, self.shape, self.dtype)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -384,6 +389,29 @@ def open_store(path: str | PathLike[str]) -> StoredLightField:
         array, attributes = read_metadata(folder)
         _check_array(folder, array, attributes)
         return StoredLightField(folder, attributes, array)
+
+
+def _opened_elsewhere(
+    path: Path, attributes: Attributes, shape: tuple[int, ...], kind: np.dtype[Any]
+) -> StoredLightField:
+    """A store that another process has open, opened in this one.
+
+    Raises:
+        InputError: it is not there for this process, or another light field is.
+    """
+    try:
+        found = open_store(path)
+    except InputError as error:
+        raise InputError(
+            f"the store is not found on {platform.node()}: {error}. All that work on it read it under one path"
+        ) from error
+    stated = replace(found.attributes, frame=attributes.frame)
+    if (found.shape, found.dtype) != (shape, kind) or not same(stated.as_json(), attributes.as_json()):
+        raise InputError(
+            f"on {platform.node()}, {path} holds another light field, or was written to: open it anew, and see "
+            "that all that work on it read the same files"
+        )
+    return replace(found, attributes=attributes)
 
 
 def _check_array(folder: Path, array: Any, attributes: Attributes) -> None:

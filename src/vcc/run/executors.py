@@ -1,0 +1,440 @@
+"""Work done by others: threads, processes, other machines.
+
+A task is a function of ours, what all tasks share (packed once) and an item of its own. `crew` takes any
+`concurrent.futures.Executor`, or a client of Dask as it is, and gives two verbs: `Crew.each`, results as they
+come, and `Crew.summed`, their sum. Sums are taken by one fixed tree (`Tree`), whoever finishes first: the same
+numbers added in the same order give the same bytes from run to run, on one machine or on many.
+"""
+
+from __future__ import annotations
+
+import pickle
+import platform
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor
+from dataclasses import dataclass
+from functools import partial, reduce
+from queue import Empty, SimpleQueue
+from typing import Any, Protocol
+
+from vcc.base.errors import InputError, warn_of_result
+from vcc.base.version import VERSION
+
+Function = Callable[[Any, Any], Any]
+"""A function of a module, which other processes find by its name: of what is shared, and of an item."""
+Add = Callable[[Any, Any], Any]
+"""A function of a module that adds two results."""
+
+TOGETHER = 8
+"""How many are added by one sum of a `Tree`."""
+RETRIES = 3
+"""How often a cluster does a task again that failed."""
+LOOK = 1.0
+"""Seconds after which somebody looks whether a crew that says nothing is still there."""
+TAKEN, LIBRARIES = 0.7, 4e8
+"""Of a Dask worker's memory, the share that it may take before it spills to disk; and bytes that Python, its
+libraries and compiled code take of that."""
+
+
+class Crew(Protocol):
+    """Who does the work. An executor that `crew` was given stays the caller's: nobody here shuts it down."""
+
+    @property
+    def places(self) -> int:
+        """How many tasks run at once, as far as is known."""
+        ...
+
+    @property
+    def room(self) -> float | None:
+        """Bytes of memory that each of these may take; None where nobody says."""
+        ...
+
+    def each(self, function: Function, shared: Any, items: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """What a function gives for each item.
+
+        Args:
+            function: of a module; called with ``shared`` and an item.
+            shared: what can be pickled; sent once to each process of a cluster, with each task to those of a pool.
+            items: what can be pickled.
+
+        Yields:
+            (number of the item, result), as they come. Whoever ends this early, by an error or Ctrl-C, ends the
+            work: what has not begun does not begin.
+
+        Raises:
+            InputError: the executor is shut down, or dies with its work not done; what tasks raise is raised here.
+        """
+        ...
+
+    def summed(
+        self, function: Function, shared: Any, items: Sequence[Any], add: Add, told: Callable[[int], None]
+    ) -> Any:
+        """The sum of what a function gives for each item, by the tree of `Tree`.
+
+        Args:
+            function: as in `each`.
+            shared: as in `each`.
+            items: as in `each`; one at least.
+            add: of a module; adds two results.
+            told: called with the number of each item that is done.
+
+        Raises:
+            InputError: as in `each`.
+        """
+        ...
+
+
+def crew(executor: Any) -> Crew:
+    """Who does the work, by what a user gives.
+
+    Args:
+        executor: a `concurrent.futures.Executor`, or a ``dask.distributed.Client``.
+
+    Raises:
+        InputError: neither of them, or a client that is closed or asynchronous.
+    """
+    if isinstance(executor, Executor):
+        return Pool(executor)
+    if all(hasattr(executor, name) for name in ("submit", "map", "scheduler_info", "nthreads")):
+        return Cluster(executor)
+    raise InputError(
+        f"executor is a concurrent.futures.Executor or a dask.distributed.Client, not {executor!r}: on one "
+        "machine concurrent.futures.ProcessPoolExecutor(), for a cluster distributed.Client('tcp://host:8786')"
+    )
+
+
+# --- tasks ---
+
+
+@dataclass(frozen=True, repr=False)
+class Parcel:
+    """What all tasks share, packed once.
+
+    Args:
+        version: of the package that packed it.
+        packed: by `pickle`.
+    """
+
+    version: str
+    packed: bytes
+
+    @classmethod
+    def of(cls, shared: Any) -> Parcel:
+        """Something packed.
+
+        Raises:
+            InputError: it cannot be.
+        """
+        try:
+            return cls(VERSION, pickle.dumps(shared, protocol=5))
+        except (pickle.PicklingError, TypeError, AttributeError) as error:
+            raise InputError(f"this cannot be sent to other processes: {error}") from error
+
+    def opened(self) -> Any:
+        """What was packed, unpacked anew: two threads never share it.
+
+        Raises:
+            InputError: another version of the package packed it.
+        """
+        if self.version != VERSION:
+            raise InputError(
+                f"{platform.node()} runs version {VERSION} of the package, and what sends the work runs "
+                f"{self.version}: install the same on both"
+            )
+        return pickle.loads(self.packed)
+
+
+def perform(item: Any, function: Function, parcel: Parcel) -> Any:
+    """One task."""
+    return function(parcel.opened(), item)
+
+
+def _kept(parcel: Parcel) -> Parcel:
+    """A parcel as the result of a task: where a cluster loses it with a worker, it is there again."""
+    return parcel
+
+
+def _added(add: Add, parts: Sequence[Any]) -> Any:
+    """A sum of a `Tree`."""
+    return reduce(add, parts)
+
+
+class Tree:
+    """The sum of things that come in any order, always taken in the same: eight neighbours, eight of their sums, …
+
+    Each sum is taken from the left as far as its things are there, so that of those that come in order one is kept
+    for each level, ⌈log₈ n⌉ in all.
+
+    Args:
+        leaves: how many things there are.
+        add: adds two.
+    """
+
+    def __init__(self, leaves: int, add: Add) -> None:
+        self._add, self._counts = add, [leaves]
+        while self._counts[-1] > 1:
+            self._counts.append(-(-self._counts[-1] // TOGETHER))
+        self._open: dict[tuple[int, int], _Sum] = {}
+        self.total: Any = None
+        """The sum, once all are there."""
+
+    def put(self, number: int, thing: Any, level: int = 0) -> None:
+        """One of the things.
+
+        Args:
+            number: which, from 0 on.
+            thing: as `add` takes it.
+            level: 0; of sums, how many sums deep they are.
+        """
+        if self._counts[level] == 1:
+            self.total = thing
+            return
+        group, place = divmod(number, TOGETHER)
+        count = min(TOGETHER, self._counts[level] - group * TOGETHER)
+        made = self._open.setdefault((level, group), _Sum({}))
+        made.there[place] = thing
+        while made.next in made.there:
+            following = made.there.pop(made.next)
+            made.value = following if made.next == 0 else self._add(made.value, following)
+            made.next += 1
+        if made.next == count:
+            del self._open[level, group]
+            self.put(group, made.value, level + 1)
+
+
+@dataclass
+class _Sum:
+    """A sum that is being taken: of those before ``next``; later ones wait."""
+
+    there: dict[int, Any]
+    next: int = 0
+    value: Any = None
+
+
+def _finished(futures: Sequence[Any], alive: Callable[[], None]) -> Iterator[int]:
+    """The numbers of futures as they finish; somebody looks now and then whether there is any hope."""
+    done: SimpleQueue[int] = SimpleQueue()
+    for number, future in enumerate(futures):
+        future.add_done_callback(partial(_noted, done, number))
+    for _ in range(len(futures)):
+        while True:
+            try:
+                yield done.get(timeout=LOOK)
+                break
+            except Empty:
+                alive()
+
+
+def _noted(done: SimpleQueue[int], number: int, _: Any) -> None:
+    done.put(number)
+
+
+# --- an executor of Python ---
+
+
+class Pool:
+    """Any `concurrent.futures.Executor`: threads, processes, and what speaks like them.
+
+    Args:
+        executor: its ``submit`` is called.
+    """
+
+    room = None
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+
+    @property
+    def places(self) -> int:
+        """As Python's own pools say it; 1 of others."""
+        return int(getattr(self._executor, "_max_workers", 1))
+
+    def each(self, function: Function, shared: Any, items: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """See `Crew.each`."""
+        parcel, futures = Parcel.of(shared), []
+        try:
+            futures += [self._submit(function, parcel, item) for item in items]
+            for number in _finished(futures, lambda: None):
+                result = self._result(futures[number])
+                futures[number] = None  # so that nobody keeps it
+                yield number, result
+        finally:
+            for future in futures:
+                if future is not None:
+                    future.cancel()
+
+    def summed(
+        self, function: Function, shared: Any, items: Sequence[Any], add: Add, told: Callable[[int], None]
+    ) -> Any:
+        """See `Crew.summed`; what comes is added here."""
+        tree = Tree(len(items), add)
+        for number, result in self.each(function, shared, items):
+            tree.put(number, result)
+            told(number)
+        return tree.total
+
+    def _submit(self, function: Function, parcel: Parcel, item: Any) -> Any:
+        try:
+            return self._executor.submit(perform, item, function, parcel)
+        except BrokenExecutor as error:
+            raise self._broken() from error
+        except RuntimeError as error:
+            raise InputError(f"executor takes no work ({error}): pass one that is not shut down") from error
+
+    def _result(self, future: Any) -> Any:
+        try:
+            return future.result()
+        except BrokenExecutor as error:
+            raise self._broken() from error
+        except CancelledError as error:
+            raise InputError("executor cancelled work that was not done: was it shut down?") from error
+
+    def _broken(self) -> InputError:
+        return InputError(
+            f"a process of the executor, {type(self._executor).__name__}, ended before its work was done: killed, "
+            "or out of memory (memory_limit= is what one task may take). Python's pools do not recover: pass a "
+            "new one, or a Dask client, which does what is lost again"
+        )
+
+
+# --- Dask ---
+
+
+class Cluster:
+    """A client of Dask, taken as it is.
+
+    What all tasks share is a task's result itself, so that each worker fetches it once and none depends on the
+    worker that had it first. Sums are tasks that go before new items. A task of a worker that dies is done again
+    elsewhere.
+
+    Args:
+        client: a ``dask.distributed.Client``.
+
+    Raises:
+        InputError: a client that is closed or asynchronous.
+    """
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        if client.asynchronous:
+            raise InputError(
+                "executor is a Dask client made with asynchronous=True: pass distributed.Client(address)"
+            )
+        if client.status != "running":
+            raise self._lost()
+
+    @property
+    def places(self) -> int:
+        """Threads of all workers that are there now."""
+        return sum(self._client.nthreads().values())
+
+    @property
+    def room(self) -> float | None:
+        """What the least of the workers has for each of its threads, without spilling to disk."""
+        workers = self._client.scheduler_info()["workers"].values()
+        rooms = [
+            (TAKEN * worker["memory_limit"] - LIBRARIES) / worker["nthreads"]
+            for worker in workers
+            if worker["memory_limit"]
+        ]
+        return min(rooms, default=None)
+
+    def each(self, function: Function, shared: Any, items: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """See `Crew.each`."""
+        futures = self._mapped(function, shared, items)
+        try:
+            for number in _finished(futures, self._look):
+                result = self._result(futures[number])
+                futures[number] = None  # so that the cluster lets go of it
+                yield number, result
+        finally:
+            self._cancel(futures)
+
+    def summed(
+        self, function: Function, shared: Any, items: Sequence[Any], add: Add, told: Callable[[int], None]
+    ) -> Any:
+        """See `Crew.summed`; what comes is added where it is, and one sum comes here."""
+        futures = self._mapped(function, shared, items)
+        total = self._tree(futures, add)
+        try:
+            for number in _finished(futures, self._look):
+                self._check(futures[number])
+                futures[number] = None
+                told(number)
+            for _ in _finished([total], self._look):
+                pass
+            return self._result(total)
+        finally:
+            self._cancel([*futures, total])
+
+    def _mapped(self, function: Function, shared: Any, items: Sequence[Any]) -> list[Any]:
+        parcel = self._client.submit(_kept, Parcel.of(shared), pure=False)
+        if not self.places:
+            warn_of_result(f"the Dask scheduler {self._address} has no workers yet: work begins when one comes")
+        tasks = {"pure": False, "retries": RETRIES}
+        return list(self._client.map(perform, items, function=function, parcel=parcel, **tasks))
+
+    def _tree(self, futures: Sequence[Any], add: Add) -> Any:
+        level = 0
+        while len(futures) > 1:
+            level += 1
+            futures = [
+                self._client.submit(
+                    _added, add, list(futures[n : n + TOGETHER]), pure=False, retries=RETRIES, priority=level
+                )
+                for n in range(0, len(futures), TOGETHER)
+            ]
+        return futures[0]
+
+    def _check(self, future: Any) -> None:
+        """Raise what ended a task that was to be done."""
+        if future.status == "error":
+            self._result(future)
+        if future.status == "cancelled":
+            raise self._lost()
+
+    def _result(self, future: Any) -> Any:
+        try:
+            return future.result()
+        except InputError:
+            raise
+        except CancelledError as error:
+            raise self._lost() from error
+        except Exception as error:
+            if type(error).__name__ == "KilledWorker":
+                raise InputError(
+                    "a task ended each of the workers that took it, one after the other: most likely it takes "
+                    "more memory than they have. Pass memory_limit=, the bytes of one task"
+                ) from error
+            if isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == "vcc":
+                raise InputError(
+                    f"the workers of {self._address} have no {error.name}: install version {VERSION} of the "
+                    "package there, with all that it needs"
+                ) from error
+            raise
+
+    def _look(self) -> None:
+        """See whether the scheduler is still there.
+
+        Raises:
+            InputError: it is not.
+        """
+        if self._client.status != "running":
+            raise self._lost()
+
+    def _lost(self) -> InputError:
+        return InputError(
+            f"the connection to the Dask scheduler {self._address} was lost, or the work cancelled, before it was "
+            "done: connect anew with distributed.Client(address), and start again"
+        )
+
+    @property
+    def _address(self) -> str:
+        scheduler = getattr(self._client, "scheduler", None)
+        return str(getattr(scheduler, "address", "")) or "that was given"
+
+    def _cancel(self, futures: Sequence[Any]) -> None:
+        """End what is not done, where there is anybody to be told."""
+        waiting = [future for future in futures if future is not None and not future.done()]
+        if waiting and self._client.status == "running":
+            self._client.cancel(waiting)
