@@ -10,6 +10,7 @@ import numpy as np
 
 from vcc.base.affine import Affine
 from vcc.camera import Camera
+from vcc.engines import on_gpu
 from vcc.fields.grid import Sample, camera_array_frame
 from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import InMemory, shape_of
@@ -106,6 +107,19 @@ class LightField(InMemory):
         looks_at = Affine.from_parts(-at_view.linear[2:, 2:], -at_view.offset[2:])
         values = to_numpy(self.values[j, i]) / np.float32(self.full_scale)
         return Image(values.astype(np.float32), looks_at, inverted=False)
+
+    def on_gpu(self) -> LightField:
+        """The light field with its samples on the GPU, copied there once, for many pictures by ``engine="cuda"``.
+
+        That engine is then the default, and pictures are NumPy arrays. Samples in arrays of PyTorch or CuPy that
+        are
+        on a GPU need none of this: they are taken where they are.
+
+        Raises:
+            InputError: numba-cuda is not installed (extra ``gpu``), there is no GPU, or samples in arrays of
+                another library than NumPy in main memory.
+        """
+        return self.of(on_gpu(self.values), self.grid)
 
     def scaled(self, factor: float) -> LightField:
         """The light field of the same scene in a world ``factor`` times as large (slopes stay).

@@ -248,5 +248,5 @@ def test_engines_for_numpy_refuse_other_arrays_and_say_what_to_do(engine):
 
 
 def test_an_unknown_engine_is_refused_by_name():
-    with pytest.raises(vcc.InputError, match=r"engine is .*reference.*array_api.*numba.* not 'cuda'"):
-        CAMERAS["in focus"].capture(field(samples()), engine="cuda")
+    with pytest.raises(vcc.InputError, match=r"engine is .*reference.*array_api.*numba.*cuda.* not 'gpu'"):
+        CAMERAS["in focus"].capture(field(samples()), engine="gpu")

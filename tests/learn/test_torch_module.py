@@ -446,7 +446,7 @@ META = torch.empty(SHAPE, device="meta")
         (torch.ones(5, 4, 9, 9), None, r"samples have the shape \(5, 4, 9, 9\), .* has \(5, 4, 9, 10\)"),
         (torch.ones(0, *SHAPE), None, "are none"),
         (torch.ones(SHAPE, dtype=torch.bfloat16), None, r"not torch.bfloat16: convert them, samples.float\(\)"),
-        (META, None, r"samples are on meta, and there is no GPU engine: pass tensor.cpu\(\)"),
+        (META, None, r"samples are on meta, and what learns is computed on the CPU: pass tensor.cpu\(\)"),
         (
             torch.full(SHAPE, math.nan),
             None,
@@ -491,7 +491,7 @@ def test_a_loss_that_is_no_number_ends_on_its_way_back():
 
 def test_a_module_elsewhere_is_told_that_there_is_no_engine():
     with pytest.raises(
-        vcc.InputError, match=r"code.pattern is on meta, and there is no GPU engine.*model.cpu\(\)"
+        vcc.InputError, match=r"code.pattern is on meta, and what learns is computed on the CPU.*model.cpu\(\)"
     ):
         module().to("meta")()
 

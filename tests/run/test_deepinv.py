@@ -150,7 +150,7 @@ def test_what_is_no_tensor_for_it_is_refused():
     refused = {
         "samples are tensors of floating-point numbers here, not ndarray": np.ones((1, 3, *SHAPE)),
         "samples are tensors of floating-point numbers here, not torch.uint8": torch.ones((1, 3, *SHAPE)).byte(),
-        "samples are on meta, and there is no GPU engine": torch.ones((1, 3, *SHAPE), device="meta"),
+        "samples are on meta, and this physics is computed on the CPU": torch.ones((1, 3, *SHAPE), device="meta"),
         "(batch, channels, …), (B, 3, 2, 3, 7, 8) here, not (1, 2, 3, 7, 8, 3)": torch.ones((1, *SHAPE, 3)),
         "not (0, 3, 2, 3, 7, 8)": torch.ones((0, 3, *SHAPE)),
     }

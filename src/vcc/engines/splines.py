@@ -5,6 +5,8 @@ Inlined before compiling: an array that is handed on has its references counted,
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vcc.engines.compiled import compiled
@@ -15,7 +17,7 @@ _inlined = compiled(inline="always")
 @_inlined
 def three_around(place):  # type: ignore[no-untyped-def]
     """The point nearest to a place, and what the one before it, it and the one after it count, float32."""
-    middle = int(np.floor(place + 0.5))
+    middle = np.int64(math.floor(place + 0.5))
     off = np.float32(place - middle)
     half = np.float32(0.5)
     return (

@@ -139,12 +139,11 @@ def by_an_engine(how: How) -> How:
     """What was chosen, by an engine that goes backwards to parameters: ``"numba"`` where none was.
 
     Raises:
-        InputError: ``"array_api"`` was.
+        InputError: ``"array_api"`` or ``"cuda"`` was.
     """
-    if how.engine == "array_api":
-        raise InputError(
-            "engine='array_api' carries gradients to samples only: leave it out (numba), or pass 'reference', here"
-        )
+    if how.engine in ("array_api", "cuda"):
+        carried = "carries gradients to samples only" if how.engine == "array_api" else "does not learn cameras"
+        raise InputError(f"engine={how.engine!r} {carried}: leave it out (numba), or pass 'reference', here")
     return how if how.engine is not None else replace(how, engine="numba")
 
 

@@ -195,8 +195,8 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
             thing = getattr(thing, place)
         if thing.device.type != "cpu":
             raise InputError(
-                f"{learned.name} is on {thing.device}, and there is no GPU engine: keep the module in the CPU's "
-                "memory, model.cpu(), and move pictures, model().to(device)"
+                f"{learned.name} is on {thing.device}, and what learns is computed on the CPU: keep the module in "
+                "its memory, model.cpu(), and move pictures, model().to(device)"
             )
         return thing
 
@@ -365,7 +365,9 @@ KINDS = (torch.float32, torch.float64, torch.float16, torch.uint8, torch.uint16)
 
 def _check_device(what: str, tensor: torch.Tensor) -> None:
     if tensor.device.type != "cpu":
-        raise InputError(f"{what} are on {tensor.device}, and there is no GPU engine: pass tensor.cpu()")
+        raise InputError(
+            f"{what} are on {tensor.device}, and what learns is computed on the CPU: pass tensor.cpu()"
+        )
 
 
 def _array(tensor: torch.Tensor) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ from vcc.base.values import Value
 Method = Literal["auto", "footprints", "rays"]
 Interpolation = Literal["sharp", "nearest", "linear", "cubic"]
 BetweenViews = Literal["auto", "none", "depth"]
-EngineName = Literal["reference", "array_api", "numba"]
+EngineName = Literal["reference", "array_api", "numba", "cuda"]
 
 LARGEST_REFINEMENT = 8
 LARGEST_SAMPLES = 2**16
@@ -71,7 +71,8 @@ class How(Value, Shown):
             most this share of its mean; None does not.
         seed: of the rays' choice of points. The same seed gives the same picture, on any number of threads.
         engine: ``"numba"`` (default for NumPy arrays), ``"array_api"`` (default for PyTorch, JAX and other arrays:
-            carries gradients) or ``"reference"`` (slow; defines what is correct).
+            carries gradients), ``"cuda"`` (on an NVIDIA GPU; extra ``gpu``; default for samples that
+            `vcc.LightField.on_gpu` keeps there) or ``"reference"`` (slow; defines what is correct).
         threads: how many work at once; None takes as many as this process may use cores. The picture is the same.
         memory_limit: of a light field on disk, bytes that its pieces, the picture and the engine may take
             together; None takes a quarter of `vcc.base.memory.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time

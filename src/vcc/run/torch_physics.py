@@ -85,8 +85,8 @@ class _Times:
             raise InputError(f"{self.what} are tensors of floating-point numbers here, not {given}")
         if tensor.device.type != "cpu":
             raise InputError(
-                f"{self.what} are on {tensor.device}, and there is no GPU engine: pass tensor.cpu(), and keep the "
-                "physics in the CPU's memory"
+                f"{self.what} are on {tensor.device}, and this physics is computed on the CPU: pass tensor.cpu(), "
+                "and keep the physics in its memory"
             )
         if tuple(tensor.shape[1:]) != self.shape or not len(tensor):
             raise InputError(

@@ -1,0 +1,127 @@
+"""The engine of GPUs: footprints in kernels that Numba compiles for NVIDIA's, with samples where they are.
+
+Samples of NumPy are sent to the GPU piece by piece while others are summed there; samples that are on the GPU
+already (`vcc.LightField.on_gpu`, PyTorch's CUDA tensors, CuPy's arrays) are taken without a copy, and pictures of
+PyTorch's and CuPy's stay there. What stands before and after a plan's core is done by the processor's engine for
+NumPy, and by the arrays' own library else.
+
+Loading this module is refused where there is no GPU, with what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+from vcc.base.progress import Progress
+from vcc.engines import cuda_arrays, cuda_footprints, numba_cpu
+from vcc.plan import operators
+from vcc.plan.footprints.model import Footprints
+from vcc.plan.protocol import Gradient, Partial
+from vcc.plan.rays.model import Rays
+
+cuda_arrays.check_gpu()
+
+copies = False
+"""Samples are sent piece by piece; see `vcc.plan.protocol.Engine`."""
+double = False
+"""See there."""
+
+
+def resident(values: Any) -> Any:
+    """Samples on the GPU: NumPy's are copied there, those that are there stay as they are.
+
+    Raises:
+        InputError: arrays of another library in main memory.
+    """
+    if cuda_arrays.is_on_gpu(values):
+        return values
+    if not isinstance(values, np.ndarray):
+        cuda_arrays.taken(values)
+    return cuda_arrays.sent(values.astype(np.float32) if values.dtype == np.float16 else values)
+
+
+def footprints(
+    core: Footprints, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
+) -> Partial:
+    """The raster of samples (v, u, t, s[, channels]), float32; see `vcc.plan.protocol.Runner`."""
+    return Partial(cuda_footprints.raster_of(core, values, progress))
+
+
+def together(cores: Any, values: Any, **options: Any) -> None:
+    """None: several cores run one after the other; see `vcc.plan.protocol.Engine`."""
+
+
+def rays(core: Rays, values: Any, **options: Any) -> Partial:
+    """Nothing, as yet.
+
+    Raises:
+        InputError: always.
+    """
+    raise InputError("engine 'cuda' does footprints, and this picture is made by rays: use engine='numba'")
+
+
+def footprints_back(core: Footprints, values: Any, raster: Any, **options: Any) -> Gradient:
+    """Nothing, as yet.
+
+    Raises:
+        InputError: always.
+    """
+    raise InputError("engine 'cuda' does not go backwards: use engine='numba'")
+
+
+def rays_back(core: Rays, values: Any, raster: Any, **options: Any) -> Gradient:
+    """Nothing: rays are not traced back to samples on the GPU.
+
+    Raises:
+        InputError: always.
+    """
+    raise InputError("engine 'cuda' does not go backwards through rays: use engine='numba', with NumPy arrays")
+
+
+def prepared(before: Sequence[operators.Before], values: Any, threads: int) -> Any:
+    """Samples as a core takes them: of NumPy as `vcc.engines.numba_cpu` has them, else by their own library.
+
+    Raises:
+        InputError: what is done before the core to samples that no library but Numba knows.
+    """
+    if isinstance(values, np.ndarray):
+        return numba_cpu.prepared(before, values, threads)
+    for operator in before:
+        if not cuda_arrays.is_of_numba(values):
+            values = operator.apply(values)
+        elif isinstance(operator, operators.SwapPixelAxes):
+            values = cuda_arrays.swapped(values)
+        else:
+            raise InputError(
+                f"this picture begins with {type(operator).__name__}, which engine 'cuda' does not do with "
+                "samples kept by on_gpu(): give it samples of NumPy, a CUDA tensor of PyTorch, or engine='numba'"
+            )
+    return values
+
+
+def prepared_back(
+    before: Sequence[operators.Before],
+    values: NDArray[np.floating],
+    threads: int,
+    *,
+    written_over: bool = False,
+) -> NDArray[np.floating]:
+    """The transpose of `prepared`, float32; see `vcc.plan.protocol.Engine.prepared_back`."""
+    return numba_cpu.prepared_back(before, values, threads, written_over=written_over)
+
+
+def finished(after: Sequence[operators.After], raster: Any, threads: int) -> Any:
+    """The picture (rows, columns, channels), float32, of a raster, in its library."""
+    if isinstance(raster, np.ndarray):
+        return numba_cpu.finished(after, raster, threads)
+    return operators.finished(list(operators.merged(after)), raster)
+
+
+def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
+    """Bytes of main memory that a run takes beside the samples and the raster, estimated: two pinned pieces."""
+    return 2 * cuda_footprints.SENT_AT_ONCE

@@ -1,0 +1,181 @@
+"""Arrays on the GPU: how they get there and back, and how kernels are started on them.
+
+Samples come as NumPy arrays, which are copied, or as arrays that are on the GPU already (PyTorch's, CuPy's,
+Numba's: all that have the CUDA array interface), which are taken where they are. What is made of them goes back to
+the library that they came from.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import sys
+from typing import Any
+
+import numpy as np
+from numba import cuda
+from numba.core import config
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+
+THREADS = 128
+"""Of a block, side by side along memory: four warps, each of which reads one piece of memory. Small blocks leave
+few multiprocessors without work at a launch's end, and no kernel here shares anything between the threads of a
+block."""
+MOST_BLOCKS = 65535
+"""Along the second and the third axis of a launch; what is beyond is done by the same threads, later."""
+SIMULATED = bool(config.ENABLE_CUDASIM)
+"""Whether kernels run as Python on the processor, for tests (``NUMBA_ENABLE_CUDASIM=1``)."""
+
+
+def check_gpu() -> None:
+    """Refuse a machine on which kernels cannot run.
+
+    Raises:
+        InputError: numba-cuda is not installed, or there is no GPU that it can use.
+    """
+    if importlib.util.find_spec("numba_cuda") is None:
+        raise InputError(
+            "engine 'cuda' needs numba-cuda and NVIDIA's compiler: pip install "
+            "\"virtual-computational-camera[gpu]\", or use engine='numba', which runs on the processor"
+        )
+    if SIMULATED and not config.DISABLE_JIT:
+        raise InputError(
+            "numba-cuda's simulator (NUMBA_ENABLE_CUDASIM=1) runs kernels as plain Python, and what they share "
+            "with the processor's loops must be plain Python, too: set NUMBA_DISABLE_JIT=1 as well"
+        )
+    if not cuda.is_available():
+        raise InputError(
+            "engine 'cuda' needs an NVIDIA GPU with its driver, and finds none on this machine: use engine='numba'"
+        )
+
+
+def launch(kernel: Any, threads: tuple[int, ...], stream: Any, *arguments: Any) -> None:
+    """Start a kernel on so many places.
+
+    Args:
+        kernel: takes places by `cuda.grid` and goes on by `cuda.gridsize`, so that any launch does all of the
+            work.
+        threads: how many places there are along x (along memory), y and z.
+        stream: in which it is started.
+        arguments: of the kernel.
+    """
+    x, y, z = (*threads, 1, 1)[:3]
+    if min(x, y, z) < 1:
+        return
+    # In the simulator a thread of Python stands for each of the GPU's: a few do all places, in two blocks.
+    wide = 2 if SIMULATED else THREADS
+    blocks = (2, 1, min(z, 2)) if SIMULATED else (math.ceil(x / wide), min(y, MOST_BLOCKS), min(z, MOST_BLOCKS))
+    kernel[blocks, (wide, 1, 1), stream](*arguments)
+
+
+def sent(array: NDArray[Any], stream: Any = 0) -> Any:
+    """A copy on the GPU."""
+    return cuda.to_device(np.ascontiguousarray(array), stream=stream)
+
+
+def zeros(shape: tuple[int, ...], stream: Any = 0) -> Any:
+    """New numbers on the GPU, float32."""
+    made = cuda.device_array(math.prod(shape), np.float32, stream=stream)
+    launch(_set_to_zero, made.shape, stream, made)
+    return made.reshape(shape)
+
+
+def is_on_gpu(values: Any) -> bool:
+    """Whether an array is on the GPU already.
+
+    Raises:
+        InputError: a tensor that carries gradients, which this engine would leave behind.
+    """
+    if isinstance(values, np.ndarray):
+        return False
+    if getattr(values, "requires_grad", False):
+        raise InputError(
+            "samples carry gradients, which engine 'cuda' does not: pass tensor.detach(), or engine='array_api', "
+            "which carries them"
+        )
+    return hasattr(values, "__cuda_array_interface__")
+
+
+def taken(values: Any) -> Any:
+    """An array on the GPU as Numba's, where it lies.
+
+    Raises:
+        InputError: an array elsewhere, with what to do; samples in half precision.
+    """
+    if not is_on_gpu(values):
+        raise InputError(
+            f"engine 'cuda' takes NumPy arrays and arrays on the GPU, not {type(values).__module__}."
+            f"{type(values).__name__} in main memory: pass numpy.asarray(values), or tensor.cuda()"
+        )
+    array = values if is_of_numba(values) else cuda.as_cuda_array(values)
+    if array.dtype == np.float16:
+        raise InputError("samples on the GPU are not in half precision with engine 'cuda': pass tensor.float()")
+    return array
+
+
+def is_of_numba(values: Any) -> bool:
+    """Whether an array is one of Numba's own on the GPU, which no other library computes with."""
+    return type(values).__module__.startswith("numba")
+
+
+def arranged(values: Any, swapped: bool = False) -> Any:
+    """Samples on the GPU, (v, u, t, s, channels), in one piece of memory; where they are so, not copied.
+
+    Args:
+        values: Numba's, (v, u, t, s[, channels]).
+        swapped: whether rows and columns of pixels change places.
+    """
+    nv, nu, nt, ns = values.shape[:4]
+    shape = (nv, nu, *((ns, nt) if swapped else (nt, ns)), *values.shape[4:], *(1,) * (5 - len(values.shape)))
+    if values.is_c_contiguous() and not swapped:
+        return values.reshape(shape)
+    made = cuda.device_array(shape, values.dtype)
+    launch(_arrange, (shape[3] * shape[4], shape[2], nv * nu), 0, values, swapped, made)
+    return made
+
+
+def swapped(values: Any) -> Any:
+    """Samples on the GPU, (v, u, t, s[, channels]), with rows and columns of pixels in each other's place."""
+    made = arranged(values, swapped=True)
+    return made if len(values.shape) == 5 else made.reshape(made.shape[:4])
+
+
+def given_back(array: Any, like: Any) -> Any:
+    """What was made on the GPU, in the library that the samples came from: on the GPU where it computes there.
+
+    Args:
+        array: on the GPU.
+        like: the samples.
+    """
+    library = type(like).__module__.split(".")[0]
+    if library == "torch":
+        return sys.modules["torch"].as_tensor(array, device=like.device)
+    if library == "cupy":
+        return sys.modules["cupy"].asarray(array)
+    return array.copy_to_host()
+
+
+@cuda.jit
+def _set_to_zero(values):  # type: ignore[no-untyped-def]
+    for n in range(cuda.grid(1), values.size, cuda.gridsize(1)):
+        values[n] = 0
+
+
+@cuda.jit
+def _arrange(values, swapped, made):  # type: ignore[no-untyped-def]
+    """made[v, u, l, k, c] = values[v, u, l, k[, c]], or [v, u, k, l[, c]]."""
+    x, y, z = cuda.grid(3)
+    wide, high, deep = cuda.gridsize(3)
+    nv, nu, nt, ns, channels = made.shape
+    for view in range(z, nv * nu, deep):
+        v, u = view // nu, view % nu
+        for l in range(y, nt, high):
+            for n in range(x, ns * channels, wide):
+                k, c = n // channels, n % channels
+                row, column = (k, l) if swapped else (l, k)
+                if values.ndim == 5:
+                    made[v, u, l, k, c] = values[v, u, row, column, c]
+                else:
+                    made[v, u, l, k, c] = values[v, u, row, column]

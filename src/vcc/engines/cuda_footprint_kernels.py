@@ -1,0 +1,320 @@
+"""Kernels of footprints for the GPU, forward: every thread makes sums of its own, so that nobody waits or adds to
+what another adds to, and the same bytes come out of every run.
+
+Where rows and columns part, the way is that of `vcc.engines.numba_kernels`: all views of a column of view taps are
+summed row by row in the columns of the samples, four rows of the raster at a time (a sample is read, converted and
+weighed once for all four), and the sums are mixed across once for each column. Neighbouring threads read
+neighbouring values of a row of samples. Else each pixel gathers what falls on it.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import cuda, float32
+from numpy.typing import NDArray
+
+from vcc.engines.numba_kernels import farthest, share_at
+from vcc.engines.splines import dark_outside, three_around
+
+ROWS = 4
+"""Rows of the raster that a thread sums at once."""
+
+
+class Quads(NamedTuple):
+    """Which rows of samples four rows of the raster gather, one under another.
+
+    Args:
+        first: (rows of taps, raster rows / 4) int32, the first row of samples.
+        counts: likewise, how many.
+        shares: (rows of taps, raster rows / 4, most, 4) float32, what each of the four takes of each of them.
+    """
+
+    first: NDArray[np.int32]
+    counts: NDArray[np.int32]
+    shares: NDArray[np.float32]
+
+
+class Source(NamedTuple):
+    """Samples on the GPU: row l of view tap (b, a) begins at begin[b] + further[a] + l · pitch.
+
+    Args:
+        values: flat; of bytes taken by fours, words of 32 bits.
+        begin: (rows of taps,) int64.
+        further: (columns of taps,) int64.
+        pitch: values in a row.
+    """
+
+    values: Any
+    begin: NDArray[np.int64]
+    further: NDArray[np.int64]
+    pitch: int
+
+
+class MaskRows(NamedTuple):
+    """Masks where rows and columns part: rows of their textures at the columns of samples, and who takes which.
+
+    Args:
+        lines: (lines, columns of samples) float32.
+        begin: (masks, rows of taps, columns of taps) int32: the line of the mask's row 0.
+        rows: (masks,) int32, how many a mask has.
+        row: (masks, rows of taps, columns of taps) float64, mask row of sample row 0.
+        step: (masks,) float64, mask rows from one row of samples to the next.
+    """
+
+    lines: NDArray[np.float32]
+    begin: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    row: NDArray[np.float64]
+    step: NDArray[np.float64]
+
+
+class Sheared(NamedTuple):
+    """Where samples fall if rows and columns do not part.
+
+    Args:
+        x: (rows of taps, columns of taps), raster column of sample (0, 0) before division.
+        y: likewise, raster row.
+        masks: (masks, rows of taps, columns of taps, 2), mask column and row of that sample.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    masks: NDArray[np.float64]
+
+
+# --- where rows and columns part ---
+
+
+@cache
+def sum_rows(values_each: int, words: bool, masked: bool) -> Any:
+    """The kernel that sums views row by row, for rows of samples of one layout.
+
+    Args:
+        values_each: values of a row that a thread sums side by side: the channels of a sample, where it is weighed
+            by masks, or the bytes of a word.
+        words: whether samples are bytes that are read as words of 32 bits, four at once.
+        masked: whether there are masks.
+    """
+
+    @cuda.jit
+    def kernel(source, weights, quads, masks, start, sums):  # type: ignore[no-untyped-def]
+        """sums[a − start, y, n] = Σ over views b and rows l of weight · share · masks · samples.
+
+        source: `Source`. weights: (rows of taps, columns of taps). quads: `Quads`. masks: `MaskRows`. start: the
+            first
+        column of view taps. sums: (columns of taps, raster rows, values in a row); raster rows a multiple of four.
+        """
+        x, y, z = cuda.grid(3)
+        wide, high, deep = cuda.gridsize(3)
+        total = cuda.local.array((ROWS, values_each), float32)
+        part = cuda.local.array((ROWS, values_each), float32)
+        for column in range(z, sums.shape[0], deep):
+            a = start + column
+            for quad in range(y, quads.first.shape[1], high):
+                for k in range(x, source.pitch // values_each, wide):
+                    for r in range(ROWS):
+                        for n in range(values_each):
+                            total[r, n] = 0
+                    for b in range(weights.shape[0]):
+                        weight = weights[b, a]
+                        if weight == 0:
+                            continue
+                        for r in range(ROWS):
+                            for n in range(values_each):
+                                part[r, n] = 0
+                        begin, first = source.begin[b] + source.further[a], quads.first[b, quad]
+                        for t in range(quads.counts[b, quad]):
+                            l = first + t
+                            at = np.uint64(begin + l * source.pitch + k * values_each)
+                            through = float32(1)
+                            if masked:
+                                for m in range(masks.rows.size):
+                                    through *= mask_at(masks, m, b, a, l, k)
+                            if words:
+                                word = source.values[at >> np.uint64(2)]
+                            for n in range(values_each):
+                                if words:
+                                    value = float32(np.uint32((word >> np.uint32(8 * n)) & np.uint32(255)))
+                                else:
+                                    value = float32(source.values[at + np.uint64(n)])
+                                if masked:
+                                    value = value * through
+                                for r in range(ROWS):
+                                    part[r, n] += quads.shares[b, quad, t, r] * value
+                        for r in range(ROWS):
+                            for n in range(values_each):
+                                total[r, n] += weight * part[r, n]
+                    for r in range(ROWS):
+                        for n in range(values_each):
+                            sums[column, ROWS * quad + r, k * values_each + n] = total[r, n]
+
+    return kernel
+
+
+@cuda.jit(device=True)
+def mask_at(masks, m, b, a, l, k):  # type: ignore[no-untyped-def]
+    """What mask m lets pass at sample (k, l) of view tap (b, a)."""
+    through = float32(0)
+    begin, rows = masks.begin[m, b, a], masks.rows[m]
+    r, above, level, below = three_around(min(max(masks.row[m, b, a] + l * masks.step[m], -2.0), rows + 1.0))
+    if 0 < r <= rows:
+        through += above * masks.lines[begin + r - 1, k]
+    if 0 <= r < rows:
+        through += level * masks.lines[begin + r, k]
+    if -1 <= r < rows - 1:
+        through += below * masks.lines[begin + r + 1, k]
+    return through
+
+
+@cuda.jit
+def mask_lines(texture, column, step, lines):  # type: ignore[no-untyped-def]
+    """lines[r, k] = row r of a texture at column + step · k, by quadratic B-splines, dark outside."""
+    x, y = cuda.grid(2)
+    wide, high = cuda.gridsize(2)
+    rows, columns = texture.shape
+    for r in range(y, rows, high):
+        for k in range(x, lines.shape[1], wide):
+            c, before, at, after = three_around(min(max(column + step * k, -2.0), columns + 1.0))
+            found = float32(0)
+            if 0 < c <= columns:
+                found += before * texture[r, c - 1]
+            if 0 <= c < columns:
+                found += at * texture[r, c]
+            if -1 <= c < columns - 1:
+                found += after * texture[r, c + 1]
+            lines[r, k] = found
+
+
+@cuda.jit
+def mix_columns(sums, first, shares, channels, start, scale, raster):  # type: ignore[no-untyped-def]
+    """raster[y, x · channels + c] += scale · Σ share · sums[a − start, y, k · channels + c] over columns of taps
+    a.
+
+    first: (columns of taps, raster columns). shares: (columns of taps, raster columns, width).
+    """
+    n, y = cuda.grid(2)
+    wide, high = cuda.gridsize(2)
+    last = sums.shape[2] // channels - 1
+    for row in range(y, raster.shape[0], high):
+        for to in range(n, raster.shape[1], wide):
+            x, c = to // channels, to % channels
+            total = float32(0)
+            for column in range(sums.shape[0]):
+                k = first[start + column, x]
+                for t in range(shares.shape[2]):
+                    # Beyond the last sample shares are zero.
+                    total += shares[start + column, x, t] * sums[column, row, min(k + t, last) * channels + c]
+            raster[row, to] += scale * total
+
+
+# --- samples divided into finer ones ---
+
+
+@cuda.jit
+def divide(source, used, down, across, channels, start, fine):  # type: ignore[no-untyped-def]
+    """fine[a − start, b, l, k · channels + c] = the finer samples of the view that each tap reads.
+
+    source: `Source`. used: (rows of taps, columns of taps), 0 of those that are left out. down, across: (first,
+    shares), see `vcc.plan.footprints.shares.Division`.
+    """
+    x, y, z = cuda.grid(3)
+    wide, high, deep = cuda.gridsize(3)
+    (first_row, row_shares), (first_column, column_shares) = down, across
+    columns, taps, rows, n = fine.shape
+    for tap in range(z, columns * taps, deep):
+        column, b = tap // taps, tap % taps
+        if used[b, start + column] == 0:
+            continue
+        begin = source.begin[b] + source.further[start + column]
+        for l in range(y, rows, high):
+            for to in range(x, n, wide):
+                k, c = to // channels, to % channels
+                total = float32(0)
+                for t in range(row_shares.shape[1]):
+                    share = row_shares[l, t]
+                    if share != 0:
+                        line = begin + (first_row[l] + t) * source.pitch + c
+                        for s in range(column_shares.shape[1]):
+                            if column_shares[k, s] != 0:
+                                at = line + (first_column[k] + s) * channels
+                                total += share * column_shares[k, s] * float32(source.values[at])
+                fine[column, b, l, to] = total
+
+
+# --- where rows and columns do not part ---
+
+
+@cache
+def gather(channels: int) -> Any:
+    """The kernel by which each pixel of so many channels gathers what falls on it."""
+
+    @cuda.jit
+    def kernel(source, weights, places, grid, footprint, masks, size, start, stop, scale, raster):  # type: ignore[no-untyped-def]
+        """raster[y, x, c] += scale · Σ over view taps (b, a), a from ``start`` to before ``stop``, and their
+        samples.
+
+        source: `Source`. weights: (rows of taps, columns of taps). places: `Sheared`. grid, footprint, masks: see
+        `vcc.engines.footprint_tables`. size: (rows, columns) of the samples of a view, divided if need be.
+        """
+        x0, y0 = cuda.grid(2)
+        wide, high = cuda.gridsize(2)
+        total = cuda.local.array(channels, float32)
+        step_y, step_x = grid.row_step / grid.refine, grid.column_step / grid.refine
+        tall, broad = abs(step_y), abs(step_x)
+        reach_y, reach_x = farthest(footprint, tall) / tall, farthest(footprint, broad) / broad
+        for y in range(y0, raster.shape[0], high):
+            for x in range(x0, raster.shape[1], wide):
+                for c in range(channels):
+                    total[c] = 0
+                for a in range(start, stop):
+                    for b in range(weights.shape[0]):
+                        weight = weights[b, a]
+                        if weight == 0:
+                            continue
+                        x_start = (
+                            places.x[b, a] + grid.shear * (y - places.y[b, a]) + grid.column_step * grid.first_k
+                        )
+                        middle = (x - x_start) / step_x
+                        low, end = around(middle, reach_x, size[1])
+                        for n in range(low, end):
+                            k = grid.first_k + n / grid.refine
+                            across = weight * share_at(footprint, x - x_start - step_x * n, broad)
+                            if across == 0:
+                                continue
+                            y_start = places.y[b, a] + grid.step[1, 0] * k + grid.row_step * grid.first_l
+                            middle = (y - y_start) / step_y
+                            top, bottom = around(middle, reach_y, size[0])
+                            for m in range(top, bottom):
+                                share = float32(across * share_at(footprint, y - y_start - step_y * m, tall))
+                                if share != 0:
+                                    share *= passed(masks, places, b, a, k, grid.first_l + m / grid.refine, -1)
+                                    at = source.begin[b] + source.further[a] + m * source.pitch + n * channels
+                                    for c in range(channels):
+                                        total[c] += share * float32(source.values[at + c])
+                for c in range(channels):
+                    raster[y, x, c] += scale * total[c]
+
+    return kernel
+
+
+@cuda.jit(device=True)
+def around(middle, reach, count):  # type: ignore[no-untyped-def]
+    """(first, after the last) of so many, counted from 0, that lie no farther from a place than ``reach``."""
+    return max(np.int64(math.ceil(middle - reach)), 0), min(np.int64(math.floor(middle + reach)) + 1, count)
+
+
+@cuda.jit(device=True)
+def passed(masks, places, b, a, k, l, left_out):  # type: ignore[no-untyped-def]
+    """What all masks but one let pass at sample (k, l) of view tap (b, a); masks: `Textures`."""
+    textures, size, step = masks
+    through = float32(1)
+    for m in range(places.masks.shape[0]):
+        if m != left_out:
+            column = places.masks[m, b, a, 0] + step[m, 0, 0] * k + step[m, 0, 1] * l
+            row = places.masks[m, b, a, 1] + step[m, 1, 0] * k + step[m, 1, 1] * l
+            through *= dark_outside(textures[m, : size[m, 0], : size[m, 1]], row, column)
+    return through

@@ -1,0 +1,116 @@
+"""The engine of GPUs in numba-cuda's simulator, which runs its kernels as Python, thread by thread.
+
+Run by ``test_cuda.py`` in a process of its own: whether Numba simulates is decided when it is first imported.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import vcc
+from tests.engines.test_agreement import CAMERAS, field, samples, turned
+from vcc.base.units import mm
+from vcc.engines import cuda_footprints
+from vcc.plan.how import How
+from vcc.run.drive import Drive
+
+pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+
+SHAPE = (2, 2, 5, 8)
+
+
+def drawn(seed: int) -> vcc.Camera:
+    """A lens, a prism and up to two masks wherever they fall, before a sensor out of focus."""
+    rng = np.random.default_rng(seed)
+    lens = vcc.Lens(50 * mm, diameter=rng.uniform(4, 9) * mm, decentre=tuple(rng.uniform(-0.5, 0.5, 2) * mm))
+    masks = [
+        vcc.Mask(rng.random((4, 5)), width=rng.uniform(5, 8) * mm, z=rng.uniform(1, 40) * mm)
+        for _ in range(rng.integers(0, 3))
+    ]
+    others = [vcc.Prism(deflection=tuple(rng.uniform(-4e-3, 4e-3, 2)), z=rng.uniform(0, 40) * mm)]
+    z = rng.uniform(46, 58) * mm
+    shape = tuple(map(int, rng.integers(4, 8, 2)))
+    return vcc.Camera(
+        [lens, *masks, *others], vcc.Sensor(z, shape, z * 2e-3 * rng.uniform(0.6, 1.8), fill_factor=0.8)
+    )
+
+
+def assert_agree(camera: vcc.Camera, lf: vcc.LightField, **options) -> np.ndarray:
+    expected = camera.capture(lf, engine="reference", **options).values.astype(float)
+    picture = camera.capture(lf, engine="cuda", **options).values
+    assert isinstance(picture, np.ndarray)
+    assert expected.any()
+    error = np.abs(picture - expected).max() / expected.max()
+    assert error < 1e-5, f"off by {error:.1e}"
+    return picture
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_cameras(seed):
+    shape = SHAPE if seed % 2 else (*SHAPE, 3)
+    lf = field(samples(shape, ("float32", "uint8", "uint16")[seed % 3], seed))
+    assert_agree(drawn(seed), lf, refine=1)
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+def test_interpolations(interpolation):
+    lf = field(samples(SHAPE))
+    assert_agree(CAMERAS["small samples"], lf, interpolation=interpolation)
+    assert_agree(CAMERAS["in focus"], turned(lf, 0.3), interpolation=interpolation)
+
+
+@pytest.mark.parametrize("shape", [SHAPE, (*SHAPE, 2), (2, 2, 5, 7)])
+def test_bytes_are_read_by_fours_where_rows_allow_it(shape):
+    assert_agree(CAMERAS["in focus"], field(samples(shape, "uint8")))
+    assert_agree(CAMERAS["in focus"], field(samples(shape, "float16")))
+
+
+def test_rows_and_columns_that_shear_through_a_mask():
+    lf = turned(field(samples((1, 2, 5, 6, 3))), 0.3)
+    assert_agree(drawn(5), lf, interpolation="linear", refine=1)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.2])
+def test_divided_samples(angle):
+    lf = turned(field(samples((1, 2, 3, 4))), angle)
+    assert_agree(CAMERAS["mask half-way"], lf, refine=2)
+
+
+def test_rows_that_change_places_with_columns():
+    lf = turned(field(samples((*SHAPE, 3))), np.pi / 2)
+    picture = assert_agree(CAMERAS["prism"], lf)
+    np.testing.assert_array_equal(CAMERAS["prism"].capture(lf.on_gpu()).values, picture)
+
+
+def test_samples_in_main_memory_are_sent_in_pieces(monkeypatch):
+    lf = field(samples((*SHAPE, 3), "uint8"))
+    for camera in (CAMERAS["mask half-way"], CAMERAS["in focus"]):
+        whole = assert_agree(camera, lf)
+        monkeypatch.setattr(cuda_footprints, "SENT_AT_ONCE", 1)  # a column of views at a time
+        np.testing.assert_allclose(assert_agree(camera, lf), whole, rtol=1e-5, atol=1e-8)
+        monkeypatch.undo()
+
+
+def test_samples_stay_on_the_gpu():
+    lf = field(samples((*SHAPE, 3)))
+    resident = lf.on_gpu()
+    assert not isinstance(resident.values, np.ndarray)
+    camera = CAMERAS["in focus"]
+    picture = camera.capture(resident).values  # the engine follows from the samples
+    assert isinstance(picture, np.ndarray)
+    np.testing.assert_array_equal(picture, camera.capture(lf, engine="cuda").values)
+
+
+def test_tables_stay_while_a_plan_is_used():
+    camera, lf = CAMERAS["in focus"], field(samples(SHAPE, "uint8"))
+    plan = camera.compile(lf)
+    of = [cuda_footprints.tables_of(Drive(plan, lf, How(engine="cuda")).core) for _ in range(2)]
+    assert of[0] is of[1]
+    assert cuda_footprints.tables_of(camera.compile(lf[:, :, :5]).core) is not of[0]
+
+
+def test_what_is_not_done_is_refused_by_name():
+    lf = field(samples(SHAPE))
+    with pytest.raises(vcc.InputError, match=r"engine 'cuda' does footprints.*engine='numba'"):
+        CAMERAS["in focus"].capture(lf, engine="cuda", method="rays")
