@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from vcc.recording import expose_image as expose_image
     from vcc.recording import load_recording as load_recording
     from vcc.run.photon_transfer import photon_transfer as photon_transfer
+    from vcc.sweeps import sweep as sweep
 
 __version__ = VERSION
 
@@ -76,6 +77,7 @@ _HOMES = {
     "load_recording": "vcc.recording",
     "open_light_field": "vcc.formats",
     "photon_transfer": "vcc.run.photon_transfer",
+    "sweep": "vcc.sweeps",
 }
 _MODULES = {
     "analysis",
@@ -89,6 +91,7 @@ _MODULES = {
     "sources",
     "store",
     "surfaces",
+    "sweeps",
     "torch",
     "units",
 }

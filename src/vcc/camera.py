@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from typing import Any, Literal, Self, TypeVar, Unpack
 
@@ -27,7 +27,7 @@ from vcc.plan.how import OF_THE_RUN, How, Options
 from vcc.plan.model import Plan
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
-from vcc.run.drive import Recorded, drive
+from vcc.run.drive import Drive, Recorded, drive, rounds_of
 from vcc.run.expose import Exposure
 from vcc.run.operator import Operator
 from vcc.run.operators import carried_to
@@ -196,12 +196,20 @@ class Camera(Train):
                 that is too large to be sent to it.
         """
         check_is_light_field(light_field)
-        chosen, absurd = How.of(how, options), metres_meant(self, light_field.grid)
+        chosen, absurd = How.of(how, options), self._absurd(light_field)
+        plan = self._planned(light_field, chosen, plan, options, progress)
+        return self._image(plan, light_field, drive(plan, light_field, chosen, progress, executor), absurd)
+
+    def _absurd(self, light_field: Samples) -> str:
+        """What to ask where lengths are absurd; said now where hardly any light will come of it."""
+        absurd = metres_meant(self, light_field.grid)
         if absurd and light_share(self, light_field.grid) < FAINT:  # said before what may take minutes
             warn_of_result(f"hardly any light will reach the sensor. {absurd}")
-            absurd = ""
-        plan = self._planned(light_field, chosen, plan, options, progress)
-        found = drive(plan, light_field, chosen, progress, executor)
+            return ""
+        return absurd
+
+    def _image(self, plan: Plan, light_field: Samples, found: Recorded, absurd: str) -> Image:
+        """The picture that was recorded; what it is to be read with care for is said."""
         if caution := _caution(plan, light_field, found, absurd):
             warn_of_result(caution)
         return Image(
@@ -373,3 +381,32 @@ class Camera(Train):
     def save(self, path: str | PathLike[str]) -> None:
         """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.camera_file`."""
         write_train(self, path)
+
+
+def captured_together(
+    cameras: Sequence[Camera], light_field: Samples, how: How, progress: Progress | None = None
+) -> list[Image]:
+    """What `Camera.capture` gives of one light field for several cameras, which share what they can of the work.
+
+    Each is planned by itself; `vcc.run.drive.rounds_of` says what plans share.
+
+    Args:
+        cameras: as many as there is memory for their pictures.
+        light_field: as in `Camera.capture`.
+        how: likewise.
+        progress: likewise.
+
+    Warns:
+        ResultWarning: as `Camera.capture`, for each camera.
+
+    Raises:
+        InputError: as `Camera.capture`.
+    """
+    check_is_light_field(light_field)
+    absurd = [camera._absurd(light_field) for camera in cameras]
+    plans = [camera._planned(light_field, how, None, {}, progress) for camera in cameras]
+    drives = [Drive(plan, light_field, how) for plan in plans]
+    made = zip(cameras, plans, drives, rounds_of(drives), absurd, strict=True)
+    return [
+        camera._image(plan, light_field, drive.finished(found), said) for camera, plan, drive, found, said in made
+    ]

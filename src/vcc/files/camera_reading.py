@@ -170,6 +170,25 @@ def _check_values(given: Mapping[str, Any] | list[Any], place: str, levels: int)
             raise InputError(f"{inside} is {in_toml(each)}: a camera's numbers are up to {LARGEST:.3g}")
 
 
+def read_field(kind: type, name: str, given: Any, called: str, beside: Beside) -> Any:
+    """What a dataclass takes in a field, of what a camera file has there.
+
+    Args:
+        kind: the class: of an element, the sensor, a pattern.
+        name: of the field.
+        given: text, a number, a truth value, a list or a table of such.
+        called: what a message calls it.
+        beside: the files that it may name.
+
+    Raises:
+        InputError: what `read_train` refuses there.
+    """
+    try:
+        return _read_value(given, get_type_hints(kind)[name], unit_of(parameters_of(kind)[name]), called, beside)
+    except InputError as error:
+        raise InputError(as_toml(str(error))) from error.__cause__
+
+
 def _train_of(tables: Mapping[str, Any], called: str, beside: Beside, name: str) -> TrainAsWritten:
     _check_keys(tables, {"elements", "sensor"}, {"sensor"}, called, "table")
     elements = tables.get("elements", [])

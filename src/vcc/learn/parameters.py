@@ -5,14 +5,15 @@ A name is the element's and then what leads to the number within it: ``"main.foc
 without a name goes by its kind (``"lens"``, ``"lens_array"``) where it is the only one of that kind that has none.
 
 Parameters are numbers of floating point, alone or in tuples and arrays, in SI units. Whole numbers, words and
-seeds are none.
+seeds are none; `place` and `replaced` know these by name too, and the things that hold others, such as a mask's
+pattern: what a sweep goes through.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -117,16 +118,60 @@ def put(train: AnyTrain, values: Mapping[str, Any]) -> AnyTrain:
             named by parameter and element.
     """
     listed = _listed(train)
+    found = [_learned(train, listed, name) for name in values]
+    return _with_changes(train, [(one, _checked(one, values[one.name])) for one in found])
+
+
+def _with_changes(train: AnyTrain, values: Sequence[tuple[Parameter, Any]]) -> AnyTrain:
+    """A camera with other values in some places."""
     changes: dict[int, dict[Any, Any]] = {}
-    for name, value in values.items():
-        found = _learned(train, listed, name)
-        place = changes.setdefault(id(found.owner), {})
+    for found, value in values:
+        inside = changes.setdefault(id(found.owner), {})
         for step in found.steps[:-1]:
-            place = place.setdefault(step, {})
-        place[found.steps[-1]] = _checked(found, value)
-    with checks.within(", ".join(values) if len(values) <= FEW else f"{len(values)} parameters"):
+            inside = inside.setdefault(step, {})
+        inside[found.steps[-1]] = value
+    said = ", ".join(found.name for found, _ in values) if len(values) <= FEW else f"{len(values)} parameters"
+    with checks.within(said):
         owners = [_changed(owner, changes.get(id(owner), {})) for owner in (*train.elements, train.sensor)]
         return type(train)(owners[:-1], owners[-1], name=train.name)
+
+
+def place(train: Train, name: str, value: Any = None) -> Parameter:
+    """Where anything stands that a camera can be made with: numbers, words, choices, patterns, electronics.
+
+    Args:
+        train: the camera.
+        name: as of parameters; what holds others goes by its own: ``"code.pattern"``, ``"sensor.electronics"``.
+        value: what is to stand there. Where cells of a pattern go by the pattern's name, an array means these, and
+            anything else the pattern.
+
+    Raises:
+        InputError: there is nothing of that name; those that there are are listed.
+    """
+    listed = _listed(train)
+    things = {found.name: found for found in _found(train, things=True)}
+    if name not in things:
+        raise InputError(f"there is no parameter {name!r}{_instead(train, name, tuple(things))}")
+    cells = name in listed and (isinstance(value, list | tuple) or hasattr(value, "__array__"))
+    return listed[name] if cells else things[name]
+
+
+def replaced(train: AnyTrain, values: Mapping[str, Any]) -> AnyTrain:
+    """The same camera with something else in some places, all at once; it is made and checked as a user makes it.
+
+    Args:
+        train: the camera; what comes back is of its class.
+        values: by the names of `place`, as elements and sensor take them: SI units.
+
+    Raises:
+        InputError: as `place`; what an element does not take, named by parameter and element; one name within
+            another.
+    """
+    for name in values:
+        within = [other for other in values if other.startswith((f"{name}.", f"{name}["))]
+        if within:
+            raise InputError(f"{within[0]} is a part of {name}, and both are given: leave one of them out")
+    return _with_changes(train, [(place(train, name, value), value) for name, value in values.items()])
 
 
 def why_none(found: Parameter) -> str | None:
@@ -139,7 +184,7 @@ def why_none(found: Parameter) -> str | None:
     if isinstance(value, bool | np.bool_):
         return f"a choice, {value}"
     kind = np.asarray(value).dtype.kind if isinstance(value, int | float | tuple | list | np.ndarray) else "O"
-    if kind in "iu" and not _takes_fractions(found):
+    if kind in "iu" and not takes_fractions(found):
         return f"a whole number, {value}" if np.ndim(value) == 0 else f"whole numbers, {value}"
     if kind not in "iuf":
         return f"a {type(value).__name__}, and no number"
@@ -151,7 +196,7 @@ def why_none(found: Parameter) -> str | None:
     return None
 
 
-def _takes_fractions(found: Parameter) -> bool:
+def takes_fractions(found: Parameter) -> bool:
     """Whether a field in which whole numbers stand is there for others too, as far as its type says."""
     said = str(next(field.type for field in dataclasses.fields(found.holder) if field.name == found.field))
     return any(kind in said for kind in ("float", "Array"))  # ArrayLike, NDArray
@@ -183,15 +228,15 @@ def keys(train: Train) -> dict[str, Element | Sensor]:
 def _learned(train: Train, listed: Mapping[str, Parameter], name: str) -> Parameter:
     """One of what is listed; see `parameter` for what is refused."""
     if name not in listed:
-        raise InputError(f"there is no parameter {name!r}{_instead(train, name)}")
+        raise InputError(f"there is no parameter {name!r}{_instead(train, name, names(train))}")
     found = listed[name]
     if (why := why_none(found)) is not None:
         raise InputError(f"{name} ({found.field} of {found.owned_by}) cannot be learned: it is {why}")
     return found
 
 
-def _instead(train: Train, name: str) -> str:
-    """What to write where there is no parameter of a name."""
+def _instead(train: Train, name: str, there_are: Sequence[str]) -> str:
+    """What to write where there is no parameter of a name, and there are others."""
     element, _, rest = name.partition(".")
     alike = [each for each in train.elements if not each.name and each.kind.replace(" ", "_") == element]
     if len(alike) > 1:
@@ -199,7 +244,6 @@ def _instead(train: Train, name: str) -> str:
             f': {len(alike)} elements are a {alike[0].kind} without a name. Name them, name="first", and write '
             f'"first.{rest or "z"}"'
         )
-    there_are = names(train)
     near = difflib.get_close_matches(name, there_are, 3)
     meant = f"; did you mean {' or '.join(near)}?" if near else ":"
     owner = keys(train).get(element)
@@ -211,11 +255,22 @@ def _instead(train: Train, name: str) -> str:
 
 def _listed(train: Train) -> dict[str, Parameter]:
     """All that stands in the fields of elements and sensor, numbers or not, by name."""
-    return {found.name: found for key, owner in keys(train).items() for found in _within(owner, key, owner, ())}
+    return {found.name: found for found in _found(train)}
+
+
+def _found(train: Train, things: bool = False) -> Iterator[Parameter]:
+    """What stands in the fields of elements and sensor, and, if asked, the things that hold others first."""
+    for key, owner in keys(train).items():
+        held: set[str] = set()
+        for found in _within(owner, key, owner, ()):
+            if not things or found.name not in held:
+                held.add(found.name)
+                if things or not _holds_others(found.value):
+                    yield found
 
 
 def _within(owner: Element | Sensor, name: str, thing: Any, steps: tuple[str | int, ...]) -> Iterator[Parameter]:
-    """What stands in the fields of a dataclass, and in those of the things in them."""
+    """What stands in the fields of a dataclass, then in those of the things in them."""
     for field in dataclasses.fields(thing):
         value = getattr(thing, field.name)
         if not field.init or field.name in ("name", "source"):
@@ -225,13 +280,21 @@ def _within(owner: Element | Sensor, name: str, thing: Any, steps: tuple[str | i
         own = name if field.name == CONTENT and thing is not owner else f"{name}.{field.name}"
         here = (*steps, field.name)
         inside = dict(enumerate(value)) if isinstance(value, tuple) else {}
-        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        yield Parameter(own, owner, thing, field.name, here, value)
+        if _is_thing(value):
             yield from _within(owner, own, value, here)
-        elif any(dataclasses.is_dataclass(part) for part in inside.values()):
-            for place, part in inside.items():
-                yield from _within(owner, f"{own}[{place}]", part, (*here, place))
-        else:
-            yield Parameter(own, owner, thing, field.name, here, value)
+        elif _holds_others(value):
+            for number, part in inside.items():
+                yield from _within(owner, f"{own}[{number}]", part, (*here, number))
+
+
+def _is_thing(value: Any) -> bool:
+    return dataclasses.is_dataclass(value) and not isinstance(value, type)
+
+
+def _holds_others(value: Any) -> bool:
+    """Whether a value is a thing with fields, or a list of such."""
+    return _is_thing(value) or (isinstance(value, tuple) and any(dataclasses.is_dataclass(part) for part in value))
 
 
 def _is_plain_mask(thing: Any) -> bool:
@@ -276,6 +339,8 @@ def _changed(thing: Any, changes: Mapping[Any, Any]) -> Any:
     if isinstance(thing, tuple):
         return tuple(_changed(part, changes[n]) if n in changes else part for n, part in enumerate(thing))
     plain = {"pattern": thing.pattern.values} if _is_plain_mask(thing) else {}
+    if "pattern" in changes and hasattr(thing, "source"):
+        plain = {"source": ""}  # which is no longer where the pattern comes from
     made = {
         step: _changed(getattr(thing, step), change) if isinstance(change, dict) else change
         for step, change in changes.items()

@@ -254,6 +254,10 @@ class Drive:
                 f"memory ran out within memory_limit={math.ceil(self.limit)} bytes: there is less than that. Pass "
                 "a smaller one"
             ) from None
+        return self.finished(found)
+
+    def finished(self, found: Partial) -> Recorded:
+        """The picture of a raster, and what is known about it."""
         picture = self.picture(found)
         if self.plan.views_between is not None:
             _warn_of_unseen(self.samples)

@@ -1,0 +1,264 @@
+"""Which cameras a sweep goes through: all combinations, a list, or drawn at random or by Sobol's points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import checks
+from vcc.base.describe import Brief
+from vcc.base.errors import InputError
+from vcc.camera import Camera
+from vcc.files.camera_reading import Beside
+from vcc.learn.parameters import place, replaced, takes_fractions
+from vcc.sweeps.values import Varied, range_of, spread, varied
+
+Kind = Literal["grid", "list", "random", "sobol"]
+CAMERA = "camera"
+"""The axis along which cameras stand that are given one by one, or differ in several parameters at once."""
+MOST_CAMERAS = 10**6
+DRAWN = 64
+"""Cameras that are drawn where nobody says how many: a power of two, as Sobol's points like it."""
+KEPT = 4096
+"""Up to so many cameras are kept once they are made."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(Brief):
+    """Parameters and their values, and how they go together. `grid`, `listed`, `random` and `sobol` make it.
+
+    Args:
+        parameters: names (``"sensor.z"``, ``"code.pattern"``) and values: a list or an array as the camera takes
+            them (SI units), or words as a camera file has them: ``"50mm:54mm:40"``, ``"mura, circle"``. For
+            ``"random"`` and ``"sobol"`` also an interval, ``(50 * mm, 54 * mm)`` or ``"50mm:54mm"``.
+        kind: ``"grid"``: every combination, an axis for each parameter; ``"list"``: the first values of all,
+            then the second; ``"random"``: each drawn for itself, evenly; ``"sobol"``: scrambled points of Sobol',
+            which fill the space of all parameters more evenly.
+        count: of cameras that are drawn; None takes 64.
+        seed: of the draw. The same seed gives the same cameras.
+
+    Raises:
+        InputError: another kind; a count or a seed where nothing is drawn; no whole numbers of 1 or more.
+    """
+
+    parameters: Mapping[str, Any]
+    kind: Kind = "grid"
+    count: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        checks.one_of("a sweep's design", self.kind, get_args(Kind))
+        if not isinstance(self.parameters, Mapping):
+            raise InputError(
+                'the parameters of a sweep are names and values, {"sensor.z": [50 * mm, 52 * mm]}, not a '
+                f"{type(self.parameters).__name__}"
+            )
+        if not self.parameters and self.kind != "grid":
+            raise InputError(f"a {self.kind} of no parameters is none: give names and values")
+        if not self.drawn:
+            for name, default in (("count", None), ("seed", 0)):
+                if getattr(self, name) != default:
+                    raise InputError(f"{name} is for random and Sobol' designs; a {self.kind} has what it has")
+        if self.count is not None:
+            checks.whole_number_between("count", self.count, 1, MOST_CAMERAS, of="cameras")
+        checks.seed(self.seed)
+
+    @property
+    def drawn(self) -> bool:
+        """Whether values are drawn."""
+        return self.kind in ("random", "sobol")
+
+    def of(self, camera: Camera, beside: Beside | None = None) -> tuple[Varied, ...]:
+        """The parameters and the values that they take; of equally many each, unless it is a grid.
+
+        Args:
+            camera: whose parameters they are.
+            beside: the files that words may name.
+
+        Raises:
+            InputError: a parameter that there is not (those that there are are listed), values that are none,
+                lists of different lengths.
+        """
+        if self.drawn:
+            points = self._points(len(self.parameters))
+            pairs = zip(self.parameters.items(), points.T, strict=True)
+            return tuple(self._drawn(camera, name, given, shares, beside) for (name, given), shares in pairs)
+        found = tuple(varied(camera, name, given, beside) for name, given in self.parameters.items())
+        if self.kind == "list" and len({len(each) for each in found}) > 1:
+            counts = ", ".join(f"{each.name} {len(each)}" for each in found)
+            raise InputError(f"a list takes as many values of each parameter, and there are {counts}")
+        return found
+
+    def _points(self, dimensions: int) -> NDArray[np.float64]:
+        """Points in the unit cube, (count, dimensions), below 1."""
+        count = DRAWN if self.count is None else self.count
+        if self.kind == "random":
+            return np.random.default_rng(self.seed).random((count, dimensions))
+        from scipy.stats import qmc
+
+        points = qmc.Sobol(dimensions, rng=np.random.default_rng(self.seed))
+        return np.asarray(points.random_base2(math.ceil(math.log2(count))))[:count]
+
+    def _drawn(
+        self, camera: Camera, name: str, given: Any, shares: NDArray[np.float64], beside: Beside | None
+    ) -> Varied:
+        """A parameter's values of numbers from 0 to 1: within an interval, or one of a list."""
+        ends = range_of(camera, name, given)
+        if ends is None:
+            choices = varied(camera, name, given, beside)
+            return choices.taken((shares * len(choices)).astype(int))
+        low, high = ends
+        found = place(camera, name)
+        if isinstance(found.value, int) and not takes_fractions(found):
+            return spread(camera, name, [int(n) for n in np.floor(low + shares * (high - low + 1))])
+        return spread(camera, name, [float(n) for n in low + shares * (high - low)])
+
+
+def grid(parameters: Mapping[str, Any]) -> Design:
+    """Every combination of values: an axis for each parameter; see `Design`."""
+    return Design(parameters)
+
+
+def listed(parameters: Mapping[str, Any]) -> Design:
+    """The first values of all parameters, then the second, and so on; see `Design`."""
+    return Design(parameters, "list")
+
+
+def random(parameters: Mapping[str, Any], count: int = DRAWN, seed: int = 0) -> Design:
+    """Cameras whose parameters are drawn, each for itself; see `Design`."""
+    return Design(parameters, "random", count, seed)
+
+
+def sobol(parameters: Mapping[str, Any], count: int = DRAWN, seed: int = 0) -> Design:
+    """Cameras whose parameters are scrambled points of Sobol' (best a power of two of them); see `Design`."""
+    return Design(parameters, "sobol", count, seed)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Cameras(Brief, Sequence[Camera]):
+    """The cameras of a sweep, numbered through; of several axes the last one goes fastest.
+
+    Args:
+        base: the camera whose parameters change; of several cameras, the first.
+        varied: what changes; `CAMERA` for cameras that are given one by one.
+        together: whether all changes at once, along one axis.
+    """
+
+    base: Camera
+    varied: tuple[Varied, ...]
+    together: bool = False
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The names of the axes."""
+        return (CAMERA,) if self.together else tuple(each.name for each in self.varied)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """How many there are along each axis."""
+        return (len(self.varied[0]),) if self.together else tuple(len(each) for each in self.varied)
+
+    def __len__(self) -> int:
+        return math.prod(self.shape)
+
+    def places(self, number: int) -> tuple[int, ...]:
+        """Which value of each parameter a camera has."""
+        if self.together:
+            return (number,) * len(self.varied)
+        return tuple(int(n) for n in np.unravel_index(number, self.shape))
+
+    def said(self, number: int) -> str:
+        """The values of a camera in words: ``"sensor.z 50 mm, code.pattern mura"``."""
+        pairs = zip(self.varied, self.places(number), strict=True)
+        return ", ".join(f"{each.name} {each.labels[place]}" for each, place in pairs) or "as given"
+
+    def __getitem__(self, number: Any) -> Any:
+        if isinstance(number, slice):
+            return [self[n] for n in range(*number.indices(len(self)))]
+        if not -len(self) <= number < len(self):
+            raise IndexError(f"there are {len(self)} cameras, and no number {number}")
+        number = int(number) % len(self)
+        return self._kept(number) if len(self) <= KEPT else self._made(number)
+
+    def __iter__(self) -> Iterator[Camera]:
+        return (self[number] for number in range(len(self)))
+
+    def check(self) -> None:
+        """Make all of them once, before long work.
+
+        Raises:
+            InputError: what a camera refuses, with its values.
+        """
+        for number in range(len(self)):
+            with checks.within(self.said(number)):
+                self[number]
+
+    def alike(self) -> list[int]:
+        """The numbers of all cameras, those next to each other that differ only in what patterns let through."""
+        kept = [n for n, each in enumerate(self.varied) if not each.name.endswith(".pattern")]
+
+        def others(number: int) -> tuple[int, ...]:
+            places = self.places(number)
+            return tuple(places[n] for n in kept)
+
+        return sorted(range(len(self)), key=others)
+
+    @cached_property
+    def _cameras(self) -> dict[int, Camera]:
+        return {}
+
+    def _kept(self, number: int) -> Camera:
+        if number not in self._cameras:
+            self._cameras[number] = self._made(number)
+        return self._cameras[number]
+
+    def _made(self, number: int) -> Camera:
+        pairs = zip(self.varied, self.places(number), strict=True)
+        values = {each.name: each.values[place] for each, place in pairs}
+        base: Camera = values.pop(CAMERA, self.base)
+        return replaced(base, values) if values else base
+
+
+def cameras_of(
+    cameras: Camera | Sequence[Camera], parameters: Mapping[str, Any] | Design | None, beside: Beside | None = None
+) -> Cameras:
+    """The cameras that a sweep goes through.
+
+    Args:
+        cameras: one, or several.
+        parameters: what changes; of several cameras in each of them. None: nothing.
+        beside: the files that words may name.
+
+    Raises:
+        InputError: what is no camera, none at all, several of them and a design that is no grid, too many; and
+            what `Design.of` and the cameras themselves refuse.
+    """
+    design = parameters if isinstance(parameters, Design) else Design({} if parameters is None else parameters)
+    several = [cameras] if isinstance(cameras, Camera) else list(cameras)
+    for each in several:
+        if not isinstance(each, Camera):
+            raise InputError(f"a sweep goes through vcc.Camera objects, not a {type(each).__name__}")
+    if not several:
+        raise InputError("a sweep goes through one camera at least, and there is none")
+    found = design.of(several[0], beside)
+    together = design.kind != "grid"
+    if not isinstance(cameras, Camera):
+        if together:
+            raise InputError(f"several cameras go with a grid of parameters, not with a {design.kind}")
+        names = [each.name for each in several]
+        told_apart = all(names) and len(set(names)) == len(names)
+        labels = names if told_apart else [str(n) for n in range(len(several))]
+        found = (Varied(CAMERA, tuple(several), tuple(labels)), *found)
+    made = Cameras(several[0], found, together)
+    if not found:
+        made = Cameras(several[0], (Varied(CAMERA, tuple(several), (several[0].name or "0",)),))
+    if len(made) > MOST_CAMERAS:
+        sizes = " × ".join(map(str, made.shape))
+        raise InputError(f"{sizes} are {len(made)} cameras, and a sweep goes through up to {MOST_CAMERAS}")
+    return made

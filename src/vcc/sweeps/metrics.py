@@ -1,0 +1,184 @@
+"""What is told of each picture of a sweep in a number: functions of the picture, the camera with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcc.analysis.deblurring import expected_deblurring_error, natural_image_power
+from vcc.analysis.point_spread import psf
+from vcc.base import checks
+from vcc.base.describe import Brief
+from vcc.base.errors import InputError
+from vcc.base.measures import psnr
+from vcc.camera import Camera
+from vcc.image import Image
+
+Metric = Callable[[Image], float]
+"""Any function of a picture, whose ``camera`` is what made it; it gives one number."""
+
+PRIOR = 128
+"""Pixels a side of the natural pictures whose expected error R(K) is."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PSNR(Brief):
+    """The peak signal-to-noise ratio against a target, decibels.
+
+    Args:
+        target: a picture of the same shape, as light lands on the sensor; a `vcc.Image` lies as it says itself.
+        peak: in the picture's unit; None takes the target's brightest value.
+
+    Raises:
+        InputError: a target that is not finite.
+    """
+
+    target: ArrayLike | Image
+    peak: float | None = None
+
+    def __post_init__(self) -> None:
+        given = self.target
+        turned = isinstance(given, Image) and not given.inverted
+        values = np.asarray(given, dtype=np.float64)
+        checks.all_finite("the target", values)
+        object.__setattr__(self, "target", values[::-1, ::-1] if turned else values)
+
+    def __call__(self, image: Image) -> float:
+        """Decibels; 10·log₁₀(peak² / mean squared difference).
+
+        Raises:
+            InputError: a picture of another shape.
+        """
+        target: NDArray[np.float64] = self.target  # type: ignore[assignment]
+        if target.shape != image.shape:
+            raise InputError(
+                f"the target has the shape {target.shape}, and the picture {image.shape}: give one of the same "
+                "pixels and channels"
+            )
+        return psnr(image.to_numpy().astype(np.float64), target, self.peak)
+
+
+def sharpness(image: Image) -> float:
+    """The energy of a picture's gradient over that of its mean: larger is sharper, whatever the exposure.
+
+    The mean over pixels of (I(r + 1, c) − I(r, c))² + (I(r, c + 1) − I(r, c))², channels averaged before, over the
+    squared mean of I: the energy of the image gradient (Subbarao, Choi and Nikzad 1993), made relative.
+
+    Args:
+        image: two pixels or more each way.
+
+    Returns:
+        A number without a unit; 0 for an even picture, not a number for a dark one.
+    """
+    values = image.to_numpy().astype(np.float64)
+    grey = values.mean(axis=2) if values.ndim == 3 else values
+    down, across = np.diff(grey, axis=0)[:, :-1], np.diff(grey, axis=1)[:-1]
+    mean = float(grey.mean())
+    return float((down**2 + across**2).mean()) / mean**2 if mean else math.nan
+
+
+@dataclass(frozen=True)
+class DeblurringError:
+    """R(K) of what a camera makes of a point (Zhou and Nayar 2009), for each pixel: smaller is better.
+
+    The expected mean squared error of a natural picture that is deblurred as well as a linear filter can; see
+    `vcc.analysis.expected_deblurring_error`. The kernel is the camera's point spread, of a sum that is the light
+    its masks pass, so that apertures are compared at one exposure.
+
+    Args:
+        distance: of the point before the camera, metres, above 0.
+        noise: standard deviation, of pictures whose values go from 0 to 1.
+        aperture: (width, height) of the entrance plane through which light comes, metres; None finds it from the
+            camera's stops. What passes all of it has the sum 1; give it to compare apertures.
+
+    Raises:
+        InputError: a distance or noise of 0 or less.
+    """
+
+    distance: float
+    noise: float = 0.01
+    aperture: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        checks.above_zero("distance", self.distance, unit="m", infinite=True)
+        checks.above_zero("noise", self.noise, "a standard deviation")
+
+    def __call__(self, image: Image) -> float:
+        """R(K) over the number of frequencies, in squared units of the picture.
+
+        Raises:
+            InputError: a picture that does not know its camera, a kernel larger than 128 pixels, or what
+                `vcc.analysis.psf` refuses.
+        """
+        if not isinstance(image.camera, Camera):
+            raise InputError("R(K) is of a camera, and this picture does not know what made it")
+        found = psf(image.camera, self.distance, aperture=self.aperture)
+        share = 1.0 if self.aperture is None else found.collecting_area / math.prod(self.aperture)
+        power = natural_image_power((PRIOR, PRIOR))
+        return expected_deblurring_error(found.values * share, self.noise, power) / power.size
+
+
+NAMED: dict[str, Metric] = {"sharpness": sharpness}
+"""Metrics that go by their name alone."""
+
+
+def metrics_of(given: Mapping[str, Metric] | Iterable[str | Metric]) -> dict[str, Metric]:
+    """Functions of a picture by name.
+
+    Args:
+        given: by name; or a list of functions that have names, and of names of ours.
+
+    Raises:
+        InputError: a name that there is not, what cannot be called, a function without a name, or a name twice.
+    """
+    if isinstance(given, str) or callable(given):
+        raise InputError(f"metrics are a list or go by name: write [{given!r}]")
+    pairs: list[tuple[Any, Any]] = list(given.items()) if isinstance(given, Mapping) else []
+    for each in () if isinstance(given, Mapping) else given:
+        name = each if isinstance(each, str) else getattr(each, "__name__", type(each).__name__.lower())
+        if name == "<lambda>":
+            raise InputError('a lambda has no name: write {"brightest": lambda image: image.to_numpy().max()}')
+        pairs.append((name, each))
+    found: dict[str, Metric] = {}
+    for name, metric in pairs:
+        if isinstance(metric, str):
+            if metric not in NAMED:
+                raise InputError(f"there is no metric {metric!r}: there is {', '.join(NAMED)}, or give a function")
+            metric = NAMED[metric]
+        if not isinstance(name, str) or not callable(metric):
+            raise InputError(f"a metric is a function of a picture, not {metric!r}")
+        if name in found or name in KNOWN:
+            raise InputError(f"two columns of a table cannot both be {name!r}: name the metric otherwise")
+        found[name] = metric
+    return found
+
+
+KNOWN = ("mean", "missing_rays", "sampling_error")
+"""What is told of every picture."""
+
+
+def row_of(image: Image, metrics: Mapping[str, Metric]) -> dict[str, float]:
+    """All that is told of a picture, by name.
+
+    Raises:
+        InputError: a metric that gives no number.
+    """
+    row = {
+        "mean": float(image.to_numpy().mean(dtype=np.float64)),
+        "missing_rays": float(image.missing_rays),
+        "sampling_error": float(image.sampling_error),
+    }
+    for name, metric in metrics.items():
+        value = metric(image)
+        try:
+            row[name] = float(value)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"the metric {name} gives {value!r}, and a table holds one number for each picture"
+            ) from None
+    return row

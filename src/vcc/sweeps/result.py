@@ -1,0 +1,138 @@
+"""What a sweep gives: pictures along labelled axes, and a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.base.errors import InputError
+from vcc.base.showing import Shown
+from vcc.camera import Camera
+from vcc.image import Image
+from vcc.sweeps.design import Cameras
+from vcc.sweeps.table import Table
+from vcc.sweeps.values import Varied, first_few_labels
+
+PIXEL_AXES = ("row", "column", "channel")
+"""Axes of a picture, behind those of the sweep."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(Shown):
+    """The pictures that cameras record of one light field.
+
+    ``swept[3, 0]`` is the picture of a camera, a `vcc.Image`; ``swept.pictures`` holds the values of all.
+
+    Args:
+        axes: names of the axes: parameters, or ``"camera"``.
+        coordinates: the parameters and their values; along one axis each, or all along ``"camera"``.
+        numbers: what is told of each picture, by name, arrays of the sweep's shape; not a number where a picture
+            is not there yet.
+        pictures: irradiance, (…, rows, columns[, channels]), as light lands on the sensor; an array, or one of
+            Zarr's, of which parts are read when they are asked for. None where no pictures were kept.
+        frames: from (column, row, 1) to (x, y, 1) on the sensor, metres: (3, 3), or (…, 3, 3) where they differ.
+        done: which pictures are there, of the sweep's shape.
+        cameras: the cameras, numbered through; None where a sweep was opened from a file.
+    """
+
+    axes: tuple[str, ...]
+    coordinates: tuple[Varied, ...]
+    numbers: Mapping[str, NDArray[np.float64]]
+    pictures: Any
+    frames: NDArray[np.float64]
+    done: NDArray[np.bool_]
+    cameras: Cameras | None = None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """How many cameras there are along each axis."""
+        return self.done.shape
+
+    @property
+    def together(self) -> bool:
+        """Whether all parameters change along one axis."""
+        return self.axes != tuple(each.name for each in self.coordinates)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all pictures are there."""
+        return bool(self.done.all())
+
+    def __len__(self) -> int:
+        """How many cameras there are."""
+        return self.done.size
+
+    def __getitem__(self, index: int | tuple[int, ...]) -> Image:
+        """The picture of one camera: a number for each axis.
+
+        Raises:
+            InputError: other indices, a picture that is not there, or no pictures at all.
+            IndexError: a number beyond the axis.
+        """
+        place = index if isinstance(index, tuple) else (index,)
+        if len(place) != len(self.shape):
+            raise InputError(
+                f"this sweep has the axes {', '.join(self.axes)}: give {len(self.shape)} whole numbers for the "
+                "picture of one camera; swept.pictures has them all"
+            )
+        if self.pictures is None:
+            raise InputError("this sweep kept no pictures, only the table")
+        if not self.done[place]:
+            raise InputError(f"the picture at {place} is not there yet: go on with the sweep")
+        frame = self.frames if self.frames.ndim == 2 else self.frames[place]
+        missing, error = (float(self.numbers[name][place]) for name in ("missing_rays", "sampling_error"))
+        return Image(np.asarray(self.pictures[place]), Affine(frame), missing, error, camera=self._camera(place))
+
+    def _camera(self, place: tuple[int, ...]) -> Camera | None:
+        if self.cameras is None:
+            return None
+        within = tuple(n % size for n, size in zip(place, self.shape, strict=True))
+        made: Camera = self.cameras[int(np.ravel_multi_index(within, self.shape))]
+        return made
+
+    @cached_property
+    def table(self) -> Table:
+        """A row for each camera: its parameters, and what is told of its picture."""
+        count, columns = len(self), {}
+        for axis, each in enumerate(self.coordinates):
+            places = np.indices(self.shape).reshape(len(self.shape), count)[0 if self.together else axis]
+            columns[each.name] = each.coordinates[places]
+        columns |= {name: values.reshape(-1) for name, values in self.numbers.items()}
+        return Table(columns, {each.name: each.unit for each in self.coordinates})
+
+    def best(self, name: str, *, largest: bool = True) -> tuple[int, ...]:
+        """Where a number of the table is largest, or smallest: an index of ``swept[…]``.
+
+        Raises:
+            InputError: there is no such column, or it holds no number.
+        """
+        values = self.numbers.get(name)
+        if values is None or not np.isfinite(values).any():
+            raise InputError(f"there are no numbers {name!r}: there are {', '.join(self.numbers)}")
+        found = np.nanargmax(values) if largest else np.nanargmin(values)
+        return tuple(int(n) for n in np.unravel_index(found, self.shape))
+
+    def labels(self, index: Sequence[int]) -> str:
+        """The values of a camera in words."""
+        places = [index[0]] * len(self.coordinates) if self.together else index
+        return ", ".join(f"{each.name} {each.labels[n]}" for each, n in zip(self.coordinates, places, strict=True))
+
+    def __repr__(self) -> str:
+        lines = [
+            f"Sweep({'×'.join(map(str, self.shape))} {'camera' if len(self) == 1 else 'cameras'}{self._left})"
+        ]
+        lines += [f"  {each.words}" for each in self.coordinates]
+        if self.pictures is not None:
+            lines.append(f"  pictures of {'×'.join(map(str, self.pictures.shape[len(self.shape) :]))}")
+        return "\n".join([*lines, f"  told of each: {first_few_labels(tuple(self.numbers), 10)}"])
+
+    @property
+    def _left(self) -> str:
+        left = int(np.count_nonzero(~self.done))
+        return f", {left} to be done" if left else ""

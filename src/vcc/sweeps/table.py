@@ -1,0 +1,85 @@
+"""A table with one row for each camera of a sweep, and the files that it goes to."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from vcc.base import checks
+from vcc.base.describe import Brief
+from vcc.base.errors import InputError
+from vcc.files.atomic import atomic_path
+
+ENDINGS = (".csv", ".parquet")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Table(Brief):
+    """Columns of equal length by name: the parameters, SI units or words, then what is told of each picture.
+
+    ``table["sensor.z"]`` is a column, ``pandas.DataFrame(table.columns)`` the table for pandas.
+
+    Args:
+        columns: arrays of numbers or words.
+        units: of columns that have one, such as "m".
+    """
+
+    columns: Mapping[str, NDArray[Any]]
+    units: Mapping[str, str]
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A column.
+
+        Raises:
+            InputError: there is none of that name; those that there are are listed.
+        """
+        if name not in self.columns:
+            raise InputError(f"the table has no column {name!r}: it has {', '.join(self.columns)}")
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    @property
+    def headings(self) -> list[str]:
+        """Names of the columns with their units: ``"sensor.z [m]"``."""
+        return [f"{name} [{self.units[name]}]" if self.units.get(name) else name for name in self.columns]
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the table; the ending of ``path`` chooses the format.
+
+        - ``.csv``: a line of headings, then a line for each camera; numbers give the same float back
+        - ``.parquet``: the same columns with their types (extra ``parquet``)
+
+        Args:
+            path: where to; a file of that name is replaced.
+
+        Raises:
+            InputError: another ending, a folder that cannot be written to, no arro3 for Parquet.
+        """
+        file = Path(path).expanduser()
+        ending = checks.ending("a table", file, *ENDINGS)
+        with atomic_path(file) as temporary:
+            (self._write_csv if ending == ".csv" else self._write_parquet)(temporary)
+
+    def _write_csv(self, path: Path) -> None:
+        with path.open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream, lineterminator="\n")
+            writer.writerow(self.headings)
+            writer.writerows(zip(*(column.tolist() for column in self.columns.values()), strict=True))
+
+    def _write_parquet(self, path: Path) -> None:
+        with checks.package("writing Parquet", "arro3-io", "parquet", "or end the name in .csv"):
+            from arro3 import core, io
+        kinds = {"f": core.DataType.float64(), "i": core.DataType.int64(), "b": core.DataType.bool()}
+        arrays = [
+            core.Array(column.tolist(), kinds.get(column.dtype.kind, core.DataType.string()))
+            for column in self.columns.values()
+        ]
+        io.write_parquet(core.Table.from_arrays(arrays, names=self.headings), path)
