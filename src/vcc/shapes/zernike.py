@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -18,6 +18,10 @@ from vcc.shapes.surface import Array, Surface, places
 
 ROWS_AT_ONCE = 16
 """Of a grid of places: what is computed of some hundred columns stays in the cache."""
+PLACES_AT_ONCE = 4096
+"""Likewise."""
+
+Waves = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -78,24 +82,63 @@ class Zernike(Surface):
 
     def path(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The sum of the terms, metres."""
-        from scipy.special import eval_jacobi
+        sums = self._by_frequency
 
-        w, argument = self._within_disc(*places(x, y))
-        total = np.zeros(w.shape)
-        for j, coefficient in self._terms:
-            term = _Term.of(j)
-            total += coefficient * term.norm * term.part(w**term.m) * eval_jacobi(term.k, 0, term.m, argument)
-        return total
+        def path(w: Waves, argument: Array) -> tuple[Array]:
+            total, power = np.zeros(w.shape), np.ones_like(w)
+            for m, coefficients in enumerate(sums):
+                total += (_jacobi_sums(coefficients, m, argument)[0] * power).real
+                power = power * w
+            return (total,)
+
+        return self._in_pieces(path, 1, x, y)[0]
 
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """The sum of the terms' gradients, in closed form."""
-        w, argument = self._within_disc(*places(x, y))
-        s, t = np.zeros(w.shape), np.zeros(w.shape)
-        for j, coefficient in self._terms:
-            along_x, along_y = _Term.of(j).gradient(w, argument)
-            s += coefficient * along_x
-            t += coefficient * along_y
+        sums = self._by_frequency
+
+        def slopes(w: Waves, argument: Array) -> tuple[Array, Array]:
+            s, t = np.zeros(w.shape), np.zeros(w.shape)
+            before, power = np.zeros_like(w), np.ones_like(w)
+            for m, coefficients in enumerate(sums):
+                value, derivative = _jacobi_sums(coefficients, m, argument)
+                around = m * value * before  # d(wᵐ)/dx = m·wᵐ⁻¹ and d(wᵐ)/dy = i·m·wᵐ⁻¹
+                outwards = 4 * (derivative * power).real  # d(2ρ² − 1) = 4(x dx + y dy)/R²
+                s += around.real + outwards * w.real
+                t += outwards * w.imag - around.imag
+                before, power = power, power * w
+            return s, t
+
+        s, t = self._in_pieces(slopes, 2, x, y)
         return s / (self.diameter / 2), t / (self.diameter / 2)
+
+    @property
+    def _by_frequency(self) -> list[NDArray[np.complex128]]:
+        """Sums of terms of one angular frequency m = 0, 1, … are Re wᵐ·Σₖ cₖ·P_k^(0, m): their cₖ."""
+        found: dict[int, dict[int, complex]] = {}
+        for j, coefficient in self._terms:
+            term = _Term.of(j)
+            of_m = found.setdefault(term.m, {})
+            of_m[term.k] = of_m.get(term.k, 0) + term.norm * coefficient * (-1j if term.sine else 1)
+        most = max(found, default=-1)
+        return [
+            np.array([found.get(m, {}).get(k, 0) for k in range(max(found.get(m, {}), default=-1) + 1)], complex)
+            for m in range(most + 1)
+        ]
+
+    def _in_pieces(
+        self, of: Callable[[Waves, Array], tuple[Array, ...]], count: int, x: ArrayLike, y: ArrayLike
+    ) -> tuple[Array, ...]:
+        """What a function gives at places, so few at once that what is computed of them stays in the cache."""
+        across, down = places(x, y)
+        found = tuple(np.empty(across.shape) for _ in range(count))
+        flat = [each.reshape(-1) for each in found]
+        xs, ys = across.reshape(-1), down.reshape(-1)
+        for first in range(0, xs.size, PLACES_AT_ONCE):
+            some = slice(first, first + PLACES_AT_ONCE)
+            for kept, each in zip(flat, of(*self._within_disc(xs[some], ys[some])), strict=True):
+                kept[some] = each
+        return found
 
     def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
         """See `Surface`; here to the coefficients."""
@@ -183,6 +226,42 @@ class _Term:
             s += steepness * w.real
             t += steepness * w.imag
         return s, t
+
+
+def _jacobi_sums(coefficients: NDArray[np.complex128], m: int, argument: Array) -> tuple[Waves, Waves]:
+    """Σₖ cₖ·P_k^(0, m) of Jacobi's polynomials, and its derivative.
+
+    dP_k^(0, m)/dz = (k + m + 1)/2 · P_(k−1)^(1, m+1)(z).
+    """
+    count = coefficients.size
+    if not count:
+        return np.zeros(argument.shape, np.complex128), np.zeros(argument.shape, np.complex128)
+    value = _weighted(coefficients, _jacobi(count, 0, m, argument))
+    steepness = coefficients[1:] * (np.arange(1, count) + m + 1) / 2
+    return value, _weighted(steepness, _jacobi(count - 1, 1, m + 1, argument))
+
+
+def _weighted(coefficients: NDArray[np.complex128], polynomials: Array) -> Waves:
+    parts = np.stack([coefficients.real, coefficients.imag]) @ polynomials
+    return np.asarray(parts[0] + 1j * parts[1], dtype=np.complex128)
+
+
+def _jacobi(count: int, a: int, b: int, argument: Array) -> Array:
+    """The first so many of Jacobi's polynomials P_k^(a, b), shape (count, places).
+
+    By their recurrence over k (Abramowitz and Stegun, Handbook of Mathematical Functions, 22.7.1).
+    """
+    found = np.ones((count, argument.size))
+    if count > 1:
+        found[1] = (a + b + 2) / 2 * argument + (a - b) / 2
+    for k in range(1, count - 1):
+        twice = 2 * k + a + b
+        all_of = 2 * (k + 1) * (k + a + b + 1) * twice
+        np.multiply(argument, (twice + 1) * (twice + 2) * twice / all_of, out=found[k + 1])
+        found[k + 1] += (twice + 1) * (a * a - b * b) / all_of
+        found[k + 1] *= found[k]
+        found[k + 1] -= 2 * (k + a) * (k + b) * (twice + 2) / all_of * found[k - 1]
+    return found
 
 
 def noll(j: int) -> tuple[int, int]:

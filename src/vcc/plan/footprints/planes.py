@@ -15,7 +15,7 @@ from vcc.plan.footprints.means import Boxes, mean_over
 from vcc.plan.footprints.means_back import mean_back
 from vcc.shapes.mean_back import holds
 from vcc.shapes.patterns import Cells, Pattern
-from vcc.shapes.sheets import in_one_plane
+from vcc.shapes.sheets import Product, in_one_plane, product_of_means
 
 Array = NDArray[np.float64]
 
@@ -219,6 +219,13 @@ def _product(shares: list[Array]) -> Array:
     return reduce(np.multiply, shares, np.ones(1))
 
 
+def _fine_means(pattern: Pattern, x: Array, y: Array, width: float, height: float) -> Array:
+    """Means over cells so fine that two edges hardly share one: of a product, the product of means."""
+    if isinstance(pattern, Product) and len(pattern.factors) > 1:
+        return product_of_means(pattern.factors, x, y, width, height)
+    return pattern.mean(x, y, width, height)
+
+
 def detail_lost(plane: Plane, known: Array, added: Array) -> float:
     """The share of a pattern's variance that averaging over ``added`` takes away after ``known``, metres."""
     if (added <= 0).all():
@@ -230,7 +237,7 @@ def detail_lost(plane: Plane, known: Array, added: Array) -> float:
     cell = size / counts
     x, y = (((np.arange(count) + 0.5) / count - 0.5) * side for count, side in zip(counts, size, strict=True))
     # Averaged once as finely as it is looked at, and these means averaged further.
-    values = np.broadcast_to(plane.pattern.mean(x[None, :], y[:, None], *cell), counts[::-1])
+    values = np.broadcast_to(_fine_means(plane.pattern, x[None, :], y[:, None], *cell), counts[::-1])
     whole = values.var()
     if whole < 1e-12:
         return 0.0
