@@ -10,7 +10,7 @@ from vcc import InputError
 from vcc.plan.choice import compile_best
 
 
-@pytest.mark.parametrize(("given", "count", "seed"), [(documents, 60, 1), (messages, 150, 2)])
+@pytest.mark.parametrize(("given", "count", "seed"), [(documents, 50, 1), (messages, 80, 2)])
 def test_silly_values_are_taken_or_refused_in_words(given, count, seed):
     assert faults(given(random.Random(seed)), count) == []
 

@@ -4,6 +4,7 @@ import dataclasses
 import io
 import json
 import runpy
+import threading
 import time
 import warnings
 import zipfile
@@ -18,6 +19,8 @@ from hypothesis import strategies as some
 
 import vcc
 from tests.bench.on_bench import CAMERA, NOWHERE, PIXELS, START, Client, noise, offered
+from vcc.bench import offered as offered_there
+from vcc.bench import session as session_there
 from vcc.bench.document import Document
 from vcc.bench.offered import Field
 from vcc.bench.picture import COARSER, WHOLE, Pace, Taken, codes, take
@@ -190,7 +193,7 @@ def test_while_something_moves_few_pictures_are_made_and_the_last_comes_soon(cli
     client.do("hello")
     client.at_rest()
     turn = client.session.offered.turn
-    with turn:
+    with turn.held():
         for number in range(100):
             client.do(
                 "set", where=["sensor", "z"], value=f"{52 + number / 50:.2f} mm", moving=True, turn=number + 1
@@ -211,7 +214,7 @@ def test_who_sends_too_much_is_not_listened_to(client):
         for number in range(MOST_WAITING + 50):
             client.do("set", where=["sensor", "z"], value=f"{52 + number % 2} mm")
 
-    with client.session.offered.turn, pytest.raises(Broken, match="messages wait"):
+    with client.session.offered.turn.held(), pytest.raises(Broken, match="messages wait"):
         flood()
 
 
@@ -541,11 +544,64 @@ def test_what_takes_long_is_broken_off_by_a_change(client, asked):
     client.do("hello")
     client.at_rest()
     client.session._taken = dataclasses.replace(client.session._taken, coarse=True)  # a whole one is to be made
-    with client.session.offered.turn:
+    with client.session.offered.turn.held():
         client.do("export", **asked)
         client.do("set", where=["sensor", "z"], value="53 mm", turn=9)
     assert "broken off" in client.until("refused", "file")[0]["words"]
     assert client.at_rest()["turn"] == 9
+
+
+def test_those_who_wait_for_a_picture_pass_one_that_takes_long(monkeypatch):
+    """A film of a hundred frames is under way while another client's picture is made, and then goes on."""
+    monkeypatch.setattr(offered_there, "LONG", 0.0)
+    there = offered()
+    turn, passed = there.turn, []
+
+    def small(number):
+        with turn.held():
+            passed.append(number)
+
+    waiting = [threading.Thread(target=small, args=(number,)) for number in range(3)]
+    with turn.held() as let_pass:
+        assert let_pass() == 0.0  # nobody waits
+        for count, each in enumerate(waiting, start=2):
+            each.start()
+            while len(turn._order) < count:
+                time.sleep(0.001)
+        assert passed == []
+        assert let_pass() > 0
+        assert passed == [0, 1, 2]  # in the order of coming
+    with pytest.raises(ZeroDivisionError), turn.held(), turn.held(lambda: 1 / 0):
+        pass
+    with turn.held():  # who gave up waiting is forgotten
+        assert len(turn._order) == 1
+
+
+def test_a_small_picture_does_not_wait_for_all_of_a_large_one(monkeypatch):
+    monkeypatch.setattr(offered_there, "LONG", 0.0)
+    there = offered()
+    large, small = Client(there), Client(there)
+    for each in (large, small):
+        each.do("hello")
+        each.at_rest()
+    done, made = threading.Event(), session_there.take
+
+    def slow(train, field, document, fineness, progress):
+        if document.exposure == 0.5:  # the large one: as long as the small one is not there
+            while not done.wait(0.001):
+                progress(0, 1)
+        return made(train, field, document, fineness, progress)
+
+    monkeypatch.setattr(session_there, "take", slow)
+    large.do("set", where=["exposure"], value=0.5, turn=2)
+    while not there.turn._order:
+        time.sleep(0.001)
+    small.do("set", where=["sensor", "z"], value="53 mm", turn=2)
+    assert small.at_rest()["turn"] == 2
+    done.set()
+    assert large.at_rest()["turn"] == 2
+    large.close()
+    small.close()
 
 
 # --- whatever comes ---

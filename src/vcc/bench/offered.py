@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,6 +18,9 @@ from vcc.bench.document import Document, shown
 from vcc.fields.sampled import to_numpy
 from vcc.files.camera_reading import Beside
 from vcc.light_field import LightField
+
+LONG = 0.2
+"""Seconds after which those who wait for a picture are let pass."""
 
 Opened = Callable[[Progress | None], LightField]
 """What opens a light field when it is first asked for."""
@@ -70,6 +75,57 @@ class Field:
             return self._by_step[step]
 
 
+class Turn:
+    """Held by who makes a picture, which takes all cores: one at a time, in the order of coming.
+
+    Who has held it for long lets those pass who wait, and goes on when it is its turn again: a small picture does
+    not wait for all of a large one.
+    """
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._order: list[object] = []
+        self._since = 0.0
+
+    @contextmanager
+    def held(self, check: Callable[[], None] = lambda: None) -> Iterator[Callable[[], float]]:
+        """Hold it; gives what lets others pass, to be called now and then, which says how long that took, seconds.
+
+        Args:
+            check: called while waiting; what it raises ends that.
+        """
+        mine = object()
+        with self._changed:
+            self._order.append(mine)
+
+        def let_pass() -> float:
+            began = time.perf_counter()
+            if began - self._since < LONG or len(self._order) == 1:
+                return 0.0
+            with self._changed:
+                self._order.remove(mine)
+                self._order.append(mine)
+                self._changed.notify_all()
+            self._wait(mine, check)
+            return time.perf_counter() - began
+
+        try:
+            self._wait(mine, check)
+            yield let_pass
+        finally:
+            with self._changed:
+                self._order.remove(mine)
+                self._changed.notify_all()
+
+    def _wait(self, mine: object, check: Callable[[], None]) -> None:
+        while True:
+            with self._changed:
+                if self._changed.wait_for(lambda: self._order[0] is mine, 0.05):
+                    self._since = time.perf_counter()
+                    return
+            check()
+
+
 @dataclass(frozen=True)
 class Offered:
     """What a bench was started with, shared by all who look at it.
@@ -79,14 +135,14 @@ class Offered:
         start: what is shown first.
         beside: the files that cameras may name.
         gallery: cameras to begin with, by their titles.
-        turn: held by who makes a picture: one at a time, which takes all cores.
+        turn: held by who makes a picture.
     """
 
     fields: Mapping[str, Field]
     start: Document
     beside: Beside
     gallery: Mapping[str, Document] = field(default_factory=dict)
-    turn: threading.Lock = field(default_factory=threading.Lock, compare=False)
+    turn: Turn = field(default_factory=Turn, compare=False)
 
     def field(self, name: str) -> Field:
         """The light field of a name.

@@ -198,7 +198,7 @@ class Session:
         where, turn = message.get("where"), _turn(message)
         self._tell({"is": "refused", "do": message["do"], "words": str(error), "where": where, "turn": turn})
 
-    def _check_wanted(self, done: int = 0, total: int = 0) -> None:
+    def _check_wanted(self) -> None:
         """Break off what is being made where another picture is asked for, or nobody is there to see it."""
         if self._closed or self._send is None or any(message["do"] in CHANGES for message, _ in list(self._inbox)):
             raise Superseded
@@ -422,12 +422,16 @@ class Session:
         """The picture of a document; None takes the present one."""
         document, described = document or self._history.present, described or self._described
         field = self.offered.field(document.light_field)
-        while not self.offered.turn.acquire(timeout=0.05):
-            self._check_wanted()
-        try:
-            return take(described.train, field, document, fineness, self._check_wanted)
-        finally:
-            self.offered.turn.release()
+        waited = 0.0
+        with self.offered.turn.held(self._check_wanted) as let_pass:
+
+            def progress(done: int, total: int) -> None:
+                nonlocal waited
+                self._check_wanted()
+                waited += let_pass()
+
+            taken = take(described.train, field, document, fineness, progress)
+        return replace(taken, seconds=taken.seconds - waited)
 
     def _no_picture(self, wanted: Wanted, error: InputError) -> None:
         self._wanted, self._taken = None, None
