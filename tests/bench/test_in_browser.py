@@ -334,3 +334,34 @@ def test_phase_space_is_shown_at_any_plane_and_follows_the_camera(page):
     assert field.input_value() == "51 mm"
     page.button("Each plane").click()
     figures.nth(3).wait_for()
+
+
+def test_light_field_is_moved_by_its_handle_and_typed_and_stays_in_the_address(page, served):
+    place = page.place("light field")
+    assert place == "0 mm"
+    box = page.part("light field").locator(".handle").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    before = page.picture()
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x - 60, y, steps=4)
+    page.page.mouse.up()
+    page.settle()
+    dragged = page.place("light field")
+    assert -15 < float(dragged.removesuffix(" mm")) < -4
+    assert page.picture() != before
+    field = page.page.get_by_label("decentre", exact=True)  # the light field's: it is selected
+    field.fill("1 mm, 0 mm")
+    field.press("Enter")
+    page.settle()
+    page.page.wait_for_timeout(600)  # until the address is written
+    again = Page(page.context.browser, page.page.url)
+    assert again.place("light field") == dragged
+    again.close()
+    field.fill("1")
+    field.press("Enter")
+    page.page.get_by_text("decentre of the light field is two lengths").wait_for()
+    page.page.keyboard.press("Escape")
+    page.button("Undo").click()
+    page.button("Undo").click()
+    page.wait_for_place("light field", "0 mm")

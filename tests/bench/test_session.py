@@ -300,6 +300,9 @@ DOCUMENTS = {
     "views and exposure": Document.of_json(
         START.as_json() | {"views": {"rows": [0, 1], "columns": [1, 2]}, "exposure": 0.2}
     ),
+    "a light field elsewhere": Document.of_json(
+        START.as_json() | {"aperture": {"z": "-12.5 mm", "decentre": ["1 mm", "-0.3 mm"]}}
+    ),
     "an array": START.changed(["elements", 1, "pattern"], {"name": "mura", "prime": 13}).changed(
         ["elements", 1, "width"], "14.7 mm"
     ),

@@ -15,7 +15,7 @@ const DOCUMENT: BenchDocument = {
     ],
     sensor: { z: "52.17 mm", shape: [400, 500], pitch: "30 um" },
   },
-  light_field: "desk", views: null, exposure: null, noise: false,
+  light_field: "desk", views: null, aperture: { z: "0 mm", decentre: ["0 mm", "0 mm"] }, exposure: null, noise: false,
 };
 
 function parameter(name: string, unit: Parameter["unit"], takes: Parameter["takes"], more: Partial<Parameter> = {}): Parameter {
@@ -252,7 +252,7 @@ export class MockHost implements Host {
       return { colour, distance, words: `${["near", "middle", "far"][number]}: ${short(distance)}`, paths };
     });
     return {
-      from: start, to: z, half: 0.0125, words: ["Sharp: 1.2 m."], rays, snaps,
+      from: start, to: z, half: 0.0125, words: ["Sharp: 1.2 m."], rays, snaps, aperture: null,
       sensor: { z, half, decentre: 0, label: ["sensor", "500 × 400, 30 µm"] },
       elements: (this.document.camera.elements ?? []).map((each): SideElement => {
         const rim = each["diameter"] ?? each["width"];

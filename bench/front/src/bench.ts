@@ -3,7 +3,7 @@
 import { read, written } from "./address";
 import type { Host } from "./host";
 import type {
-  AnswerMessage, BenchDocument, FromHost, Note, Parts, PictureMessage, Side, SideElement, SideSensor, Table, Value, ValueMessage, Where,
+  AnswerMessage, BenchDocument, FromHost, Note, Parts, PictureMessage, Side, SideAperture, SideElement, SideSensor, Table, Value, ValueMessage, Where,
 } from "./protocol";
 
 /** What is selected: an element's number, or one of the two that always are there. */
@@ -163,12 +163,13 @@ export class Bench extends EventTarget {
     return this.document?.camera.elements ?? [];
   }
 
-  partOf(selected: Selected): SideElement | SideSensor | undefined {
-    if (selected === "light field") return undefined;
+  partOf(selected: Selected): SideElement | SideSensor | SideAperture | undefined {
+    if (selected === "light field") return this.side?.aperture ?? undefined;
     return selected === "sensor" ? this.side?.sensor : this.side?.elements[selected];
   }
 
-  whereOf(selected: number | "sensor"): Where {
+  whereOf(selected: Selected): Where {
+    if (selected === "light field") return ["aperture"];
     return selected === "sensor" ? ["sensor"] : ["elements", selected];
   }
 

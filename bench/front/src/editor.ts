@@ -6,8 +6,14 @@ import type { Selected } from "./bench";
 import { fields } from "./fields";
 import { inMillimetres } from "./numbers";
 import { Part, controls } from "./part";
-import type { Kind } from "./protocol";
+import type { Kind, Parameter } from "./protocol";
 import { sign } from "./signs";
+
+/** Of the light field's aperture, as elements have them. */
+export const APERTURE: Parameter[] = [
+  { name: "z", words: "place of the views' plane on the axis; below 0 before the entrance plane", unit: "length", needed: false, default: "0 mm", takes: ["number"], choices: [] },
+  { name: "decentre", words: "of the views: right, down", unit: "length", needed: false, default: ["0 mm", "0 mm"], takes: ["list"], choices: [] },
+];
 
 export class EditorView extends Part {
   /** Put the caret into the field of the place on the axis. */
@@ -91,7 +97,9 @@ export class EditorView extends Part {
         <select id="light-field" @change=${(event: Event) => bench.set(["light_field"], (event.target as HTMLSelectElement).value)}>
           ${bench.parts!.light_fields.map((name) => html`<option value=${name} ?selected=${name === document.light_field}>${name}</option>`)}</select></div>
       ${bench.views ? [0, 1].map((axis) => this.viewRange(axis as 0 | 1, bench.views!)) : nothing}
-      ${document.views ? html`<div class="field"><span></span><button @click=${() => bench.set(["views"], null)}>All views</button></div>` : nothing}`;
+      ${document.views ? html`<div class="field"><span></span><button @click=${() => bench.set(["views"], null)}>All views</button></div>` : nothing}
+      <p class="quiet">Where the views stand: before the entrance plane, z = 0, or behind it, right and down of the axis.</p>
+      ${fields(bench, APERTURE, document.aperture, ["aperture"])}`;
   }
 
   /** From which to which row or column of views. */
@@ -146,6 +154,7 @@ export class EditorView extends Part {
       .adds select { height: 26px; width: 92px; }
       .form { grid-column: 1 / -1; overflow-y: auto; padding: 0 12px 12px; min-height: 0; }
       .head { display: flex; align-items: center; justify-content: space-between; gap: 8px; min-height: 30px; margin-bottom: 4px; }
+      .form > p.quiet { margin: 8px 0 4px; }
       .verbs { display: flex; }
       .field { display: grid; grid-template-columns: minmax(86px, 132px) minmax(0, 1fr); align-items: center; gap: 4px 10px; min-height: 34px; }
       .field > label, .field > span:first-child { color: var(--quiet); overflow-wrap: anywhere; line-height: 1.2; }

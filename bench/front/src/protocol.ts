@@ -15,6 +15,8 @@ export interface BenchDocument {
   camera: Camera;
   light_field: string;
   views: null | { rows: [number, number]; columns: [number, number] };
+  /** Where the plane of its views stands. */
+  aperture: { z: string; decentre: Value };
   exposure: null | number;
   noise: boolean;
 }
@@ -88,6 +90,15 @@ export interface SideSensor {
   decentre: number;
 }
 
+/** The plane of the light field's views: where it stands, and the borders of the views' cells. */
+export interface SideAperture {
+  label: string[];
+  z: number;
+  decentre: number;
+  borders: number[];
+  snaps: Snap[];
+}
+
 export interface Rays {
   colour: string;
   distance: number | null;
@@ -102,6 +113,8 @@ export interface Side {
   half: number;
   elements: SideElement[];
   sensor: SideSensor;
+  /** Null until the light field has been opened. */
+  aperture: SideAperture | null;
   rays: Rays[];
   /** Where the sensor would have to stand for what matters in the scene to be sharp. */
   snaps: Snap[];

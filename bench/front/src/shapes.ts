@@ -2,7 +2,7 @@
 
 import { svg, nothing } from "lit";
 
-import type { SideElement, SideSensor } from "./protocol";
+import type { SideElement, SideAperture, SideSensor } from "./protocol";
 
 /** From metres to pixels. */
 export interface Scale {
@@ -107,6 +107,14 @@ function drawnRim(x: number, [, bottom, top]: [number, number, number], element:
   return svg`
     <path class="rim heavy" d="M${x} ${high}V${Math.max(high - heavy, outmost)}M${x} ${low}V${Math.min(low + heavy, lowest)}"></path>
     <path class="rim" d="M${x} ${high}V${outmost}M${x} ${low}V${lowest}"></path>`;
+}
+
+/** Views side by side: a line with a tick between each two, if these are not too close. */
+export function drawnAperture(aperture: SideAperture, x: number, scale: Scale) {
+  const places = aperture.borders.map((border) => Math.min(Math.max(scale.y(border), scale.top), scale.bottom));
+  const [low, high] = [Math.max(...places), Math.min(...places)];
+  const ticked = low - high > 3 * places.length ? places : [low, high];
+  return svg`<path class="borders" d="M${x} ${high}V${low}${ticked.map((y) => `M${x - 4} ${y}h8`).join("")}"></path>`;
 }
 
 export function drawnSensor(sensor: SideSensor, z: number, scale: Scale) {

@@ -6,7 +6,7 @@ import type { Selected } from "./bench";
 import { axisStep, inMillimetres, short } from "./numbers";
 import { Part, controls } from "./part";
 import type { Rays, Side, Snap } from "./protocol";
-import { drawn, drawnSensor, type Scale } from "./shapes";
+import { drawn, drawnAperture, drawnSensor, type Scale } from "./shapes";
 
 const MARGIN = { left: 14, right: 30, top: 46, bottom: 40 };
 /** Within so many pixels of a place that is sharp, what is dragged is pulled to it, and within so many the place is shown. */
@@ -22,7 +22,7 @@ const ALL_RAYS = 500;
 const KEY_PAUSE = 500;
 
 interface Drag {
-  which: number | "sensor";
+  which: Selected;
   /** Pointer's place minus the part's when it began, pixels. */
   grip: number;
   from: number;
@@ -57,7 +57,7 @@ export class SideView extends Part {
   declare width: number;
   declare height: number;
   declare drag: Drag | null;
-  declare hover: number | "sensor" | null;
+  declare hover: Selected | null;
   private frame: Frame | null = null;
   private keyTimer = 0;
   private readonly watch = new ResizeObserver(([entry]) => {
@@ -83,14 +83,18 @@ export class SideView extends Part {
 
   // --- where things are ---
 
-  private placeOf(which: number | "sensor"): number {
+  private placeOf(which: Selected): number {
     if (this.drag?.which === which) return this.drag.z;
-    return (which === "sensor" ? this.bench.side?.sensor.z : this.bench.side?.elements[which]?.z) ?? 0;
+    return this.bench.partOf(which)?.z ?? 0;
   }
 
   private parts(): (number | "sensor")[] {
     const all: (number | "sensor")[] = this.bench.side?.elements.map((_, number) => number) ?? [];
     return [...all, "sensor"];
+  }
+
+  private lengthOf(which: Selected): number {
+    return typeof which === "number" ? (this.bench.side?.elements[which]?.length ?? 0) : 0;
   }
 
   /** What is drawn, metres. It stays while something is dragged, and grows or shrinks only where it must. */
@@ -124,18 +128,20 @@ export class SideView extends Part {
 
   // --- moving things ---
 
-  private nearest(event: PointerEvent): { which: number | "sensor"; x: number } | null {
+  private nearest(event: PointerEvent): { which: Selected; x: number } | null {
     const side = this.bench.side;
     if (!side) return null;
     const scale = this.scale(side);
     const box = this.getBoundingClientRect();
     const x = event.clientX - box.left;
-    let found: number | "sensor" | null = null;
+    // The light field's aperture often stands where a lens does: it is taken by its handle below.
+    const below = event.clientY - box.top > scale.bottom - 4;
+    if (below && side.aperture && Math.abs(scale.x(this.placeOf("light field")) - x) < REACH) return { which: "light field", x };
+    let found: Selected | null = null;
     let least = event.pointerType === "mouse" ? REACH : 1.6 * REACH;
     for (const which of this.parts()) {
-      const length = which === "sensor" ? 0 : side.elements[which]!.length;
       const from = scale.x(this.placeOf(which));
-      const to = scale.x(this.placeOf(which) + length);
+      const to = scale.x(this.placeOf(which) + this.lengthOf(which));
       const away = x < from ? from - x : x > to ? x - to : 0;
       // Of two in one place, the one that is selected.
       if (away < least || (away === least && which === this.bench.selected)) [found, least] = [which, away];
@@ -187,8 +193,9 @@ export class SideView extends Part {
     else window.setTimeout(settled, 400);
   }
 
-  private snapsOf(which: number | "sensor"): Snap[] {
-    return (which === "sensor" ? this.bench.side?.snaps : this.bench.side?.elements[which]?.snaps) ?? [];
+  private snapsOf(which: Selected): Snap[] {
+    if (which === "sensor") return this.bench.side?.snaps ?? [];
+    return (which === "light field" ? this.bench.side?.aperture?.snaps : this.bench.side?.elements[which]?.snaps) ?? [];
   }
 
   private snapNear(snaps: Snap[], x: number, scale: Scale): Snap | null {
@@ -198,7 +205,7 @@ export class SideView extends Part {
     return found;
   }
 
-  private key(event: KeyboardEvent, which: number | "sensor"): void {
+  private key(event: KeyboardEvent, which: Selected): void {
     const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
     if (by && !event.ctrlKey && !event.metaKey) {
       event.preventDefault();
@@ -212,7 +219,7 @@ export class SideView extends Part {
     } else if (event.key === "Enter") {
       this.dispatchEvent(new CustomEvent("type-place", { bubbles: true, composed: true }));
       event.preventDefault();
-    } else if ((event.key === "Delete" || event.key === "Backspace") && which !== "sensor") {
+    } else if ((event.key === "Delete" || event.key === "Backspace") && typeof which === "number") {
       this.bench.act({ do: "remove", element: which });
       event.preventDefault();
     } else if (event.key === "Escape" && this.drag) {
@@ -240,7 +247,8 @@ export class SideView extends Part {
         @pointerdown=${this.down} @pointermove=${this.move} @pointerup=${this.up} @pointercancel=${this.up}
         @pointerleave=${() => (this.hover = null)}>
         <path class="axis" d="M0 ${scale.y(0)}H${this.width}"></path>
-        ${this.parts().map((which) => this.drawBack(which, side, scale))}
+        ${this.drawAperture(side, scale)}
+        ${this.parts().map((which) => this.drawBack(which, scale))}
         ${this.parts().map((which) => this.drawPart(which, side, scale))}
         <g class="rays">${side.rays.map((each) => this.drawRays(each, scale))}</g>
         ${this.drawSnap(scale)}
@@ -285,43 +293,59 @@ export class SideView extends Part {
   }
 
   /** The strip of the drawing by which a part is taken. */
-  private strip(which: number | "sensor", side: Side, scale: Scale) {
+  private strip(which: Selected, scale: Scale) {
     const z = this.placeOf(which);
-    const length = which === "sensor" ? 1.1 * scale.thick : scale.x(z + side.elements[which]!.length) - scale.x(z);
+    const length = which === "sensor" ? 1.1 * scale.thick : scale.x(z + this.lengthOf(which)) - scale.x(z);
     const spare = length > 0 ? 6 : 9;
     return { x: scale.x(z) - spare, y: scale.top - 4, width: length + 2 * spare, height: scale.bottom - scale.top + 8 };
   }
 
   /** What is selected or pointed at stands out, behind all parts: several may stand in one plane. */
-  private drawBack(which: number | "sensor", side: Side, scale: Scale) {
+  private drawBack(which: Selected, scale: Scale) {
     const state = this.bench.selected === which ? "selected" : this.hover === which ? "hover" : "";
     if (!state) return nothing;
-    const { x, y, width, height } = this.strip(which, side, scale);
+    const { x, y, width, height } = this.strip(which, scale);
     return svg`<rect class="back ${state}" x=${x} y=${y} width=${width} height=${height} rx="5"></rect>`;
   }
 
   private drawPart(which: number | "sensor", side: Side, scale: Scale) {
     const z = this.placeOf(which);
-    const part = which === "sensor" ? side.sensor : side.elements[which]!;
+    const { x, y, width, height } = this.strip(which, scale);
+    return this.slider(which, svg`<rect class="strip" x=${x} y=${y} width=${width} height=${height} rx="5"></rect>
+      ${which === "sensor" ? drawnSensor(side.sensor, z, scale) : drawn({ ...side.elements[which]!, z }, z, scale)}`);
+  }
+
+  /** Where the views of the light field stand, and a handle by which they are moved. */
+  private drawAperture(side: Side, scale: Scale) {
+    if (!side.aperture) return nothing;
+    const z = this.placeOf("light field");
+    if (z < this.frame!.start || z > this.frame!.end) return nothing;
+    const x = scale.x(z);
+    const state = this.bench.selected === "light field" ? "selected" : this.hover === "light field" ? "hover" : "";
+    return this.slider("light field", svg`<g class="aperture ${state}">${drawnAperture(side.aperture, x, scale)}
+      <path class="handle" d="M${x} ${scale.bottom + 1}l6 9h-12z"></path>
+      <rect class="strip" x=${x - 9} y=${scale.bottom - 2} width="18" height="14" rx="4"></rect></g>`);
+  }
+
+  /** What can be moved along the axis by keys. */
+  private slider(which: Selected, inside: unknown) {
+    const z = this.placeOf(which);
     const reach = (this.frame!.end - this.frame!.start) * 1e3;
-    const { x, y, width, height } = this.strip(which, side, scale);
     return svg`<g class="part" data-part=${which} tabindex="0" role="slider"
-        aria-label="${part.label.join(", ")}: place on the axis" aria-orientation="horizontal"
+        aria-label="${this.bench.partOf(which)!.label.join(", ")}: place on the axis" aria-orientation="horizontal"
         aria-valuemin=${(this.frame!.start * 1e3).toFixed(1)} aria-valuemax=${(this.frame!.start * 1e3 + 2 * reach).toFixed(1)}
         aria-valuenow=${(z * 1e3).toFixed(3)} aria-valuetext=${short(z, 6)}
         @keydown=${(event: KeyboardEvent) => this.key(event, which)}
-        @focus=${() => this.bench.select(which)} @blur=${() => this.keysDone()}>
-      <rect class="strip" x=${x} y=${y} width=${width} height=${height} rx="5"></rect>
-      ${which === "sensor" ? drawnSensor(side.sensor, z, scale) : drawn({ ...side.elements[which]!, z }, z, scale)}
-    </g>`;
+        @focus=${() => this.bench.select(which)} @blur=${() => this.keysDone()}>${inside}</g>`;
   }
 
   /** Names above, in two lines where they would meet; what is selected says its place. */
   private drawLabels(side: Side, scale: Scale) {
-    const labels = this.parts()
+    const named: Selected[] = this.bench.selected === "light field" && side.aperture ? ["light field", ...this.parts()] : this.parts();
+    const labels = named
       .map((which) => {
-        const part = which === "sensor" ? side.sensor : side.elements[which]!;
-        const length = which === "sensor" ? 0 : side.elements[which]!.length;
+        const part = this.bench.partOf(which)!;
+        const length = this.lengthOf(which);
         const z = this.placeOf(which);
         const chosen = this.bench.selected === which;
         const name = part.label[0] ?? "";
@@ -402,6 +426,10 @@ export class SideView extends Part {
       .rim { stroke: var(--ink); stroke-width: 1; stroke-opacity: 0.5; fill: none; }
       .rim.heavy { stroke-width: 3; stroke-opacity: 1; }
       .sensor { fill: var(--quiet); stroke: var(--ink); stroke-width: 0.8; }
+      .aperture .borders { stroke: var(--edge); stroke-width: 1.2; fill: none; }
+      .aperture .handle { fill: var(--edge); }
+      .aperture.hover .borders { stroke: var(--ink); } .aperture.hover .handle { fill: var(--ink); }
+      .aperture.selected .borders { stroke: var(--accent); } .aperture.selected .handle { fill: var(--accent); }
       .label.chosen text { fill: var(--accent); font-weight: 600; }
       .badge { cursor: pointer; }
       .badge circle { fill: var(--warn); }

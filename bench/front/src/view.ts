@@ -3,14 +3,14 @@
 import { html, css, nothing } from "lit";
 
 import { Part, controls, named } from "./part";
-import { EditorView } from "./editor";
+import { APERTURE, EditorView } from "./editor";
 import { PictureView } from "./picture";
 import { SideView } from "./side";
 import { OF_A_POINT, OF_PLANES, QUESTIONS, answerStyles, drawnAnswer } from "./answers";
 import { sign } from "./signs";
 import { inMillimetres, metres, plain, split, withUnit } from "./numbers";
 import type { Answer } from "./bench";
-import type { Where } from "./protocol";
+import type { Table, Where } from "./protocol";
 
 type Beside = "parts" | "notes" | string;
 
@@ -226,8 +226,9 @@ export class BenchView extends Part {
   /** Whether the field that was refused is shown, and says so itself. */
   private saidAtField(where: Where | null): boolean {
     const { selected } = this.bench;
-    if (!where || this.beside !== "parts" || selected === "light field") return false;
-    return this.bench.whereOf(selected).every((step, at) => where[at] === step) && where.length > (selected === "sensor" ? 1 : 2);
+    if (!where || this.beside !== "parts") return false;
+    const whole = this.bench.whereOf(selected);
+    return whole.every((step, at) => where[at] === step) && where.length > whole.length;
   }
 
   // --- menus ---
@@ -257,10 +258,10 @@ export class BenchView extends Part {
   /** A sweep of a number of what is selected, between two values about the present one. */
   private filming(name: string) {
     const { bench } = this;
-    const selected = bench.selected === "light field" ? "sensor" : bench.selected;
-    const table = selected === "sensor" ? bench.document!.camera.sensor : (bench.elements[selected] ?? {});
+    const { selected } = bench;
+    const table: Table = selected === "light field" ? bench.document!.aperture : selected === "sensor" ? bench.document!.camera.sensor : (bench.elements[selected] ?? {});
     const kind = bench.parts!.kinds.find((each) => each.kind === table["kind"]);
-    const all = (selected === "sensor" ? bench.parts!.sensor : (kind?.parameters ?? [])).filter(
+    const all = (selected === "light field" ? APERTURE : selected === "sensor" ? bench.parts!.sensor : (kind?.parameters ?? [])).filter(
       (each) => each.takes.includes("number") && split(String(table[each.name] ?? "")) !== null,
     );
     const chosen = all.find((each) => each.name === name) ?? all[0];

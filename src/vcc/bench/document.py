@@ -9,11 +9,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from vcc.base import checks, units
 from vcc.base.errors import InputError
+from vcc.bench.aperture import Aperture, aperture_of
 from vcc.files.camera_reading import Beside, TrainAsWritten, train_of_tables
 
 Step = str | int
@@ -32,7 +33,7 @@ MOST_HISTORY = 2**22
 """Characters of all documents that are kept to be undone."""
 
 _IN_CAMERA = ("elements", "sensor")
-_FIELDS = ("camera", "light_field", "views", "exposure", "noise")
+_FIELDS = ("camera", "light_field", "views", "aperture", "exposure", "noise")
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,7 @@ class Document:
         views: which of its views are looked at; None for all.
         exposure: the irradiance that is shown white, above 0; None finds it for each picture.
         noise: whether the sensor's electronics record the picture.
+        aperture: where the plane of its views stands.
     """
 
     camera: Mapping[str, Any]
@@ -79,6 +81,7 @@ class Document:
     views: Views | None = None
     exposure: float | None = None
     noise: bool = False
+    aperture: Aperture = field(default_factory=Aperture)
 
     def as_json(self) -> dict[str, Any]:
         """The document as messages and addresses hold it."""
@@ -87,6 +90,7 @@ class Document:
             "camera": self.camera,
             "light_field": self.light_field,
             "views": views,
+            "aperture": self.aperture.as_json(),
             "exposure": self.exposure,
             "noise": self.noise,
         }
@@ -99,19 +103,22 @@ class Document:
             InputError: it is none.
         """
         if not isinstance(given, dict):
-            raise InputError("a bench's document is a table of camera, light_field, views, exposure and noise")
+            raise InputError(
+                "a bench's document is a table of camera, light_field, views, aperture, exposure and noise"
+            )
         for key in given:
             if key not in _FIELDS:
                 raise InputError(f"a bench's document has no {shown(key)}: it has {', '.join(_FIELDS)}")
-        camera, field = given.get("camera"), given.get("light_field")
-        if not isinstance(camera, dict) or not isinstance(field, str):
+        camera, name = given.get("camera"), given.get("light_field")
+        if not isinstance(camera, dict) or not isinstance(name, str):
             raise InputError("a bench's document needs a camera, which is a table, and a light_field, by name")
         return cls(
             camera,
-            field,
+            name,
             _views(given.get("views")),
             _exposure(given.get("exposure")),
             _truth("noise", given.get("noise", False)),
+            aperture_of(given.get("aperture")),
         )
 
     def changed(self, where: Any, value: Any) -> Document:

@@ -62,7 +62,8 @@ def exported(what: Any, bench: OnBench, taken: Taken | None, white: float) -> tu
         InputError: anything else, or what cannot be written.
     """
     if what == "toml":
-        return _with_arrays("camera", "toml", "application/toml", *camera_file(bench.train))
+        text, arrays = camera_file(bench.train)
+        return _with_arrays("camera", "toml", "application/toml", _left_out(bench.document) + text, arrays)
     if what == "python":
         text, arrays = program(bench, white)
         return _with_arrays("picture", "py", "text/x-python", text, arrays)
@@ -88,6 +89,14 @@ def _with_arrays(
             np.save(stored, values)
             archive.writestr(zipfile.ZipInfo(name, _DATE), stored.getvalue())
     return f"{stem}.zip", "application/zip", packed.getvalue()
+
+
+def _left_out(document: Document) -> str:
+    """What a camera file cannot hold of what is shown, as a comment."""
+    if not document.aperture.is_moved:
+        return ""
+    said = f"This file leaves out where the light field stood: {document.aperture.in_words}. In Python:"
+    return "".join(f"# {line}\n" for line in [said, *document.aperture.in_python.split("\n")]) + "\n"
 
 
 def camera_file(train: Train) -> tuple[str, dict[str, NDArray[np.float64]]]:
@@ -118,6 +127,8 @@ def program(bench: OnBench, white: float) -> tuple[str, dict[str, NDArray[np.flo
     if views is not None:
         (a, b), (c, d) = views.rows, views.columns
         source += f"\nlight_field = light_field[{a} : {b + 1}, {c} : {d + 1}]"
+    if bench.document.aperture.is_moved:
+        source += f"\n{bench.document.aperture.in_python}"
     lines = [
         '"""The picture that the optical bench showed."""\n',
         *sorted({"import vcc", *(["import numpy as np"] if writer.uses_numpy else [])}),

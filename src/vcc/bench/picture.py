@@ -182,7 +182,7 @@ def take(
         InputError: what the camera refuses of this light field, or electronics that cannot record it.
     """
     began = time.perf_counter()
-    light_field = light_field_of(field, document.views, fineness, progress)
+    light_field = document.aperture.placed(light_field_of(field, document.views, fineness, progress))
     camera = train if fineness.pixels == 1 else coarser_sensor(train, fineness.pixels)
     plan = compile_best(camera, light_field.grid)
     if plan.by_rays and fineness.rays is not None:

@@ -22,11 +22,12 @@ from vcc.advice.limits import sampling_limits
 from vcc.base import units
 from vcc.base.errors import InputError
 from vcc.bench import additions, answers, export
+from vcc.bench.aperture import drawn_aperture
 from vcc.bench.document import Document, History, shown
 from vcc.bench.focusing import distance_at
 from vcc.bench.offered import Offered
 from vcc.bench.picture import WHOLE, Fineness, Pace, Picture, Taken, codes, jpeg, pixel_at, psnr, take, white_of
-from vcc.bench.side import side
+from vcc.bench.side import AXIS, side
 from vcc.bench.sweep import Sweep, sweep_of
 from vcc.files.camera_reading import TrainAsWritten, tables_of_text
 from vcc.light_field import LightField
@@ -343,6 +344,8 @@ class Session:
         field = self.offered.field(document.light_field)
         if document.views is not None and field.is_open:
             document.views.check(field.whole().shape)
+        if document.aperture.is_moved and field.is_open:
+            document.aperture.check(field.whole().grid)
         if document.noise and described.train.sensor.electronics is None:
             raise InputError("noise is that of a sensor's electronics, and this sensor has none: add them first")
         return document, described
@@ -360,16 +363,19 @@ class Session:
     def _light_field(self) -> LightField:
         document = self._history.present
         whole = self.offered.field(document.light_field).whole(self._progress)
-        return whole if document.views is None else whole[document.views.slices]
+        return document.aperture.placed(whole if document.views is None else whole[document.views.slices])
 
     # --- what is told ---
 
     def _tell_state(self, turn: int) -> None:
         document = self._history.present
         field = self.offered.field(document.light_field)
-        grid, seen = None, None
+        grid, seen, aperture, train = None, None, None, self._described.train
         if field.is_open:
-            grid, seen = field.whole().grid, self._light_field()
+            whole, rays = field.whole(), document.aperture.rays
+            views = whole if document.views is None else whole[document.views.slices]
+            grid, seen = whole.grid.moved(rays), views.transformed(rays)
+            aperture = drawn_aperture(document.aperture, views, train, AXIS)
         self._tell(
             {
                 "is": "state",
@@ -378,7 +384,7 @@ class Session:
                 "undo": self._history.can_undo,
                 "redo": self._history.can_redo,
                 "grid": None if grid is None else list(grid.shape),
-                "side": side(self._described.elements, self._described.train, seen, grid),
+                "side": side(self._described.elements, train, seen, grid, aperture),
             }
         )
 

@@ -52,6 +52,8 @@ AXIS = 0
 """x is drawn upwards."""
 DIGITS = 5
 """Of lengths that are drawn: a thousandth of a pixel."""
+FARTHEST_DRAWN = 4
+"""Lengths of the camera that the light field's aperture may stand before it to be in the drawing."""
 PROFILE_POINTS = 160
 MOST_PIECES = 400
 """Of a mask's pattern: of a finer one, pieces are the mean of several."""
@@ -59,7 +61,13 @@ AS_SHARP = 0.01
 """Of 1/Z: what is no farther from the distance in focus shows no other rays."""
 
 
-def side(elements: Sequence[Element], train: Train, light_field: InMemory | None, grid: Grid | None) -> Json:
+def side(
+    elements: Sequence[Element],
+    train: Train,
+    light_field: InMemory | None,
+    grid: Grid | None,
+    aperture: Json | None = None,
+) -> Json:
     """The side view of a camera.
 
     Args:
@@ -67,9 +75,12 @@ def side(elements: Sequence[Element], train: Train, light_field: InMemory | None
         train: of them.
         light_field: whose width the rays fill; None fills the first lens.
         grid: whose scene tells what distances matter; None for none.
+        aperture: of the light field, as `vcc.bench.aperture.drawn_aperture` has it.
     """
     points = _points(train, grid)
     start = -scene_length(train, points)
+    if aperture is not None and 0 < -aperture["z"] < FARTHEST_DRAWN * train.sensor.z:
+        start = min(start, 1.1 * aperture["z"])
     scattering = any(stage.faces.spread is not None for stage in train.stages)
     rays = RAYS_THAT_SPLIT if scattering else RAYS
     paths = [
@@ -97,6 +108,7 @@ def side(elements: Sequence[Element], train: Train, light_field: InMemory | None
             "label": _sensor_label(train),
         },
         "rays": [_rays(point, path) for point, path in zip(points, paths, strict=True)],
+        "aperture": aperture,
         "focus": _distance(focus),
         "snaps": snaps_of_sensor(train, scene),
         "words": _words(train, focus, grid),

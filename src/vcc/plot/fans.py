@@ -177,10 +177,7 @@ def trace_point(
 def _entrance(camera: Train, point: Point, light_field: InMemory | None, axis: int) -> tuple[float, float]:
     """From where to where on the entrance plane the rays of a point go, metres."""
     if light_field is not None:
-        ends = np.array(light_field.shape[1::-1]) - 0.5
-        corners = np.array([[-0.5, -0.5, 0, 0], [ends[0], ends[1], 0, 0]])
-        low, high = np.sort(light_field.frame(corners)[:, axis])
-        return float(low), float(high)
+        return _through_views(point, light_field, axis)
     found = list(openings(camera, axis))
     lenses = [one for one in found if isinstance(one[0], Lens | FirstOrder)]
     # A lens's rim says more about a camera than a mask's sheet; of a thick one all rims count.
@@ -199,6 +196,25 @@ def _entrance(camera: Train, point: Point, light_field: InMemory | None, axis: i
         return low, high
     half = camera.sensor.size[1 - axis] / 3
     return -half, half
+
+
+def _through_views(point: Point, light_field: InMemory, axis: int) -> tuple[float, float]:
+    """Where the rays of a point that pass the outer borders of the views meet the entrance plane, metres.
+
+    The border's pixel k that sees the point is the one whose place x and slope s have s = x/Z − offset, as its
+    rays do; where the views stand in the entrance plane, x does not depend on k.
+    """
+    counts, linear, offset = light_field.shape[1::-1], light_field.frame.linear, light_field.frame.offset
+    middle = np.array([(count - 1) / 2 for count in (*counts, light_field.shape[3], light_field.shape[2])])
+    aside = np.where(np.arange(4) % 2 == axis, 0.0, middle)  # of the other axis the middle
+    place, slope = (linear[n] @ aside + offset[n] for n in (axis, axis + 2))
+    by_view, by_pixel = linear[np.ix_([axis, axis + 2], [axis, axis + 2])].T
+    borders = np.array([-0.5, counts[axis] - 0.5])
+    unlike = by_pixel[1] - by_pixel[0] / point.distance
+    wanted = (place + by_view[0] * borders) / point.distance - point.offset - slope - by_view[1] * borders
+    pixels = wanted / unlike if unlike else np.full(2, middle[axis + 2])
+    low, high = np.sort(place + by_view[0] * borders + by_pixel[0] * pixels)
+    return float(low), float(high)
 
 
 def half_height(camera: Train, paths: Sequence[Paths], axis: int) -> float:
