@@ -28,6 +28,9 @@ PICTURES = "vcc.picture"
 """How Zarr calls the codec of `vcc.store.picture_codec`."""
 DTYPES = ("uint8", "uint16", "float16", "float32")
 
+SETTINGS = "settings"
+"""Under which the description of a store keeps how it was made, beside what the maker said."""
+
 Transfer = Literal["linear", "srgb"]
 
 
@@ -171,6 +174,17 @@ def plain(value: Any, name: str) -> Any:
 def same(one: Any, other: Any) -> bool:
     """Whether two plain values are the same, whatever the order of keys."""
     return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
+
+
+def difference(there: Any, wanted: Any, name: str = "") -> str:
+    """Where two descriptions differ first, in words."""
+    if isinstance(there, dict) and isinstance(wanted, dict):
+        for key in [*there, *(key for key in wanted if key not in there)]:
+            if not same(there.get(key), wanted.get(key)):
+                inner = name if not name and key in ("maker", SETTINGS) else f"{name}.{key}".lstrip(".")
+                return difference(there.get(key), wanted.get(key), inner)
+    one, other = (text if len(text) < 200 else f"{text[:197]}…" for text in (f"{there!r}", f"{wanted!r}"))
+    return f"{name} is {one} there and {other} now"
 
 
 def _tuple(value: Any) -> Any:

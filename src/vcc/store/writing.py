@@ -29,13 +29,10 @@ from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import refusal
 from vcc.files.parts import clear_leftovers, part_of, put_in_place
 from vcc.files.writer_lock import WriterLock
-from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, Attributes, Transfer, plain, same
+from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, SETTINGS, Attributes, Transfer, difference, plain, same
 from vcc.store.compression import Compression, Lossless, Lossy, layout
 from vcc.store.disparity_maps import keep_maps
 from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata, restored
-
-SETTINGS = "settings"
-"""Under which the description of a store keeps how it was made, beside what the maker said."""
 
 
 class Framed(Protocol):
@@ -443,20 +440,9 @@ def _continued(folder: Path, wanted: Attributes) -> Attributes:
     if not same(wanted.description, found.description):
         raise InputError(
             f"{folder} was made from another description, and views of two are never mixed. "
-            f"{_difference(found.description, wanted.description)}. Remove it, or choose another name"
+            f"{difference(found.description, wanted.description)}. Remove it, or choose another name"
         )
     return found
-
-
-def _difference(there: Any, wanted: Any, name: str = "") -> str:
-    """Where two descriptions differ first, in words."""
-    if isinstance(there, dict) and isinstance(wanted, dict):
-        for key in [*there, *(key for key in wanted if key not in there)]:
-            if not same(there.get(key), wanted.get(key)):
-                inner = name if not name and key in ("maker", SETTINGS) else f"{name}.{key}".lstrip(".")
-                return _difference(there.get(key), wanted.get(key), inner)
-    one, other = (text if len(text) < 200 else f"{text[:197]}…" for text in (f"{there!r}", f"{wanted!r}"))
-    return f"{name} is {one} there and {other} now"
 
 
 def _write_attributes(folder: Path, attributes: Attributes) -> None:

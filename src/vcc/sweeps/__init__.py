@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from vcc.sweeps.design import Design, grid, listed, random, sobol
+from vcc.sweeps.keeping import open_sweep, save_sweep
 from vcc.sweeps.metrics import PSNR, DeblurringError, sharpness
 from vcc.sweeps.result import Sweep
 from vcc.sweeps.sweeping import sweep
@@ -23,7 +24,9 @@ __all__ = [
     "Table",
     "grid",
     "listed",
+    "open_sweep",
     "random",
+    "save_sweep",
     "sharpness",
     "sobol",
     "sweep",

@@ -199,6 +199,13 @@ class Cameras(Brief, Sequence[Camera]):
             with checks.within(self.said(number)):
                 self[number]
 
+    def frames(self) -> NDArray[np.float64]:
+        """From (column, row, 1) to (x, y, 1) on the sensors: (3, 3), or (…, 3, 3) where they differ."""
+        frames = [camera.sensor.frame.matrix for camera in self]
+        if all(np.array_equal(frame, frames[0]) for frame in frames):
+            return np.array(frames[0])
+        return np.stack(frames).reshape(*self.shape, 3, 3)
+
     def alike(self) -> list[int]:
         """The numbers of all cameras, those next to each other that differ only in what patterns let through."""
         kept = [n for n, each in enumerate(self.varied) if not each.name.endswith(".pattern")]

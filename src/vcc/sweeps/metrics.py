@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -152,12 +153,18 @@ def metrics_of(given: Mapping[str, Metric] | Iterable[str | Metric]) -> dict[str
             metric = NAMED[metric]
         if not isinstance(name, str) or not callable(metric):
             raise InputError(f"a metric is a function of a picture, not {metric!r}")
+        if not re.fullmatch(r"[\w.()\- ]+", name) or name in TAKEN:
+            raise InputError(
+                f"a metric cannot be called {name!r}: letters, digits, dots and hyphens, and not {TAKEN}"
+            )
         if name in found or name in KNOWN:
             raise InputError(f"two columns of a table cannot both be {name!r}: name the metric otherwise")
         found[name] = metric
     return found
 
 
+TAKEN = ("pictures", "done", "sensor_frame", "x", "y", "row", "column", "channel", "camera", "to", "from")
+"""Names that stand for something else in a sweep's store."""
 KNOWN = ("mean", "missing_rays", "sampling_error")
 """What is told of every picture."""
 

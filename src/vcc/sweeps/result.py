@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,19 @@ class Sweep(Shown):
     frames: NDArray[np.float64]
     done: NDArray[np.bool_]
     cameras: Cameras | None = None
+
+    @classmethod
+    def empty(cls, cameras: Cameras, names: Sequence[str]) -> Sweep:
+        """A sweep of which nothing is done.
+
+        Args:
+            cameras: that it goes through.
+            names: of what will be told of each picture.
+        """
+        shape = cameras.shape
+        numbers = {name: np.full(shape, np.nan) for name in names}
+        done = np.zeros(shape, dtype=bool)
+        return cls(cameras.axes, cameras.varied, numbers, None, cameras.frames(), done, cameras)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -127,7 +141,7 @@ class Sweep(Shown):
         lines = [
             f"Sweep({'×'.join(map(str, self.shape))} {'camera' if len(self) == 1 else 'cameras'}{self._left})"
         ]
-        lines += [f"  {each.words}" for each in self.coordinates]
+        lines += [f"  {each.name} {each.values_in_words}" for each in self.coordinates]
         if self.pictures is not None:
             lines.append(f"  pictures of {'×'.join(map(str, self.pictures.shape[len(self.shape) :]))}")
         return "\n".join([*lines, f"  told of each: {first_few_labels(tuple(self.numbers), 10)}"])
@@ -136,3 +150,61 @@ class Sweep(Shown):
     def _left(self) -> str:
         left = int(np.count_nonzero(~self.done))
         return f", {left} to be done" if left else ""
+
+
+class Results:
+    """Where the results of a sweep go while it is at work; here, what is told of pictures, in memory.
+
+    Args:
+        swept: the sweep, whose numbers are filled in.
+    """
+
+    def __init__(self, swept: Sweep) -> None:
+        self.swept = swept
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pass
+
+    def left(self) -> list[int]:
+        """The numbers of the cameras whose pictures are not there."""
+        return [int(n) for n in np.flatnonzero(~self.swept.done)]
+
+    def put(self, number: int, image: Image, row: Mapping[str, float]) -> None:
+        """A picture, and what is told of it."""
+        place = tuple(int(n) for n in np.unravel_index(number, self.swept.shape))
+        self.keep(place, image)
+        for name, value in row.items():
+            self.swept.numbers[name][place] = value
+        self.swept.done[place] = True
+
+    def keep(self, place: tuple[int, ...], image: Image) -> None:
+        """Keep a picture."""
+
+    def commit(self) -> None:
+        """What was put is to be there, come what may."""
+
+    def finished(self) -> Sweep:
+        """The sweep with its results."""
+        return self.swept
+
+
+class InMemory(Results):
+    """Results in memory, pictures too.
+
+    Args:
+        swept: the sweep, whose numbers are filled in.
+        picture: the shape of all pictures.
+    """
+
+    def __init__(self, swept: Sweep, picture: tuple[int, ...]) -> None:
+        pictures = np.full((*swept.shape, *picture), np.nan, dtype=np.float32)
+        super().__init__(replace(swept, pictures=pictures))
+
+    def keep(self, place: tuple[int, ...], image: Image) -> None:
+        """See `Results`."""
+        self.swept.pictures[place] = image.to_numpy()

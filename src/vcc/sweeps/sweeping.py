@@ -7,11 +7,9 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from os import PathLike
 from typing import Any, Unpack
-
-import numpy as np
-from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.describe import Brief
@@ -23,13 +21,17 @@ from vcc.fields.samples import Samples, check_is_light_field
 from vcc.image import Image
 from vcc.plan.how import How, Options
 from vcc.sweeps.design import Cameras, Design, cameras_of
+from vcc.sweeps.identity import identity
+from vcc.sweeps.keeping import InStore
 from vcc.sweeps.metrics import KNOWN, Metric, metrics_of, row_of
-from vcc.sweeps.result import Sweep
+from vcc.sweeps.result import InMemory, Results, Sweep
 
 BATCH_BYTES = 2**28
 """Of the pictures that are made together, about; each of them takes some more while it is made."""
 MOST_TOGETHER = 256
 """Pictures that are made together, at most: progress is told, and results are kept, after each batch."""
+BATCH_SAMPLES = 2 * 10**9
+"""Samples that are gone through for pictures that are made together, about: some seconds' work."""
 MANY_KINDS = 5
 """Kinds of remarks on pictures that are still passed on."""
 
@@ -42,6 +44,7 @@ def sweep(
     *,
     metrics: Mapping[str, Metric] | Iterable[str | Metric] = (),
     pictures: bool = True,
+    output: str | PathLike[str] | None = None,
     progress: Progress | None = None,
     **options: Unpack[Options],
 ) -> Sweep:
@@ -60,6 +63,8 @@ def sweep(
             picture (a `vcc.Image`, whose ``camera`` made it) by name, or a list of them; ``"sharpness"``,
             `vcc.sweeps.PSNR`, `vcc.sweeps.DeblurringError`.
         pictures: whether pictures are kept; False keeps the table alone, and lets them differ in shape.
+        output: a folder to keep the results in, a Zarr group that xarray opens: picture by picture as they are
+            done. The same sweep goes on where it was stopped. None keeps them in memory.
         progress: called with (done, total) in pictures.
         options: as in `vcc.Camera.capture`.
 
@@ -72,17 +77,18 @@ def sweep(
     Raises:
         InputError: a parameter that there is not (those that there are are listed), values that a camera does not
             take (named), pictures of different shapes, more pictures than there is memory for, what a metric or
-            `vcc.Camera.capture` refuses, with the camera's values.
+            `vcc.Camera.capture` refuses, with the camera's values; an output that is something else or another
+            sweep (what differs is named), or a disk that refuses: what was done is kept.
     """
     check_is_light_field(light_field)
     listed = cameras_of(cameras, parameters)
     work = Work(listed, light_field, How.of(how, options), metrics_of(metrics))
-    if pictures:
+    if pictures and output is None:
         work.check_memory()
     listed.check()
-    kept = InMemory.of(listed, work.picture_shape() if pictures else None, tuple(work.metrics))
-    work.run(kept, progress)
-    return kept.swept(listed)
+    with work.results(pictures, output) as results:
+        work.run(results, progress)
+    return results.finished()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -128,27 +134,43 @@ class Work(Brief):
         way_out = "keep only the table (pictures=False), or fewer cameras"
         check_memory(4 * len(self.cameras) * math.prod(shape), None, what, way_out)
 
-    def batches(self, numbers: Iterable[int]) -> Iterator[list[int]]:
+    def batches(self, numbers: Sequence[int]) -> Iterator[list[int]]:
         """Cameras that are made together, in an order in which as many as can share their work."""
-        wanted, batch, room = set(numbers), list[int](), BATCH_BYTES
-        for number in filter(wanted.__contains__, self.cameras.alike()):
-            batch.append(number)
-            room -= 4 * math.prod(self.cameras[number].sensor.shape) * (self.light_field.grid.channels or 1)
-            if room <= 0 or len(batch) == MOST_TOGETHER:
-                yield batch
-                batch, room = [], BATCH_BYTES
-        if batch:
-            yield batch
+        wanted = set(numbers)
+        ordered = [number for number in self.cameras.alike() if number in wanted]
+        count = self.together() if ordered else 1
+        for first in range(0, len(ordered), count):
+            yield ordered[first : first + count]
 
-    def run(self, kept: Kept, progress: Progress | None) -> None:
+    def together(self) -> int:
+        """How many cameras are made together: as many as there is memory for, and a few seconds' work."""
+        camera, channels = self.cameras[0], self.light_field.grid.channels or 1
+        pixels = math.prod(camera.sensor.shape) * channels
+        samples = camera.compile(self.light_field, self.how).samples_touched * channels
+        return int(max(1, min(MOST_TOGETHER, BATCH_BYTES // (4 * pixels), BATCH_SAMPLES // max(samples, 1))))
+
+    def results(self, pictures: bool, output: str | PathLike[str] | None) -> Results:
+        """Where results go; what is there already of the same sweep is kept.
+
+        Raises:
+            InputError: pictures of different shapes; what `vcc.sweeps.keeping.InStore` refuses.
+        """
+        swept = Sweep.empty(self.cameras, (*KNOWN, *self.metrics))
+        picture = self.picture_shape() if pictures else None
+        if output is not None:
+            known = identity(self.cameras, self.light_field, self.how, self.metrics)
+            return InStore(output, swept, picture, known)
+        return Results(swept) if picture is None else InMemory(swept, picture)
+
+    def run(self, results: Results, progress: Progress | None) -> None:
         """Make the pictures that are not there yet."""
-        todo = [number for number in range(len(self.cameras)) if not kept.has(number)]
+        todo = results.left()
         done, total = len(self.cameras) - len(todo), len(self.cameras)
         remarks = Remarks(total)
         for batch in self.batches(todo):
             for number, image, row in self.made(batch, remarks):
-                kept.put(number, image, row)
-            kept.commit()
+                results.put(number, image, row)
+            results.commit()
             done += len(batch)
             tell(progress, done, total)
         remarks.say()
@@ -196,71 +218,3 @@ class Remarks:
             kind = "".join(letter for letter in said if not letter.isdigit() and letter not in ".e-")
             self._kinds[kind] += 1
             self._first.setdefault(kind, said)
-
-
-class Kept:
-    """Where the results of a sweep go."""
-
-    def has(self, number: int) -> bool:
-        """Whether a picture is there."""
-        raise NotImplementedError
-
-    def put(self, number: int, image: Image, row: Mapping[str, float]) -> None:
-        """Keep a picture, and what is told of it."""
-        raise NotImplementedError
-
-    def commit(self) -> None:
-        """What was put is there from now on."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class InMemory(Kept, Brief):
-    """Results in memory.
-
-    Args:
-        shape: of the sweep.
-        pictures: values, one after the other; None where none are kept.
-        numbers: by name, one after the other.
-        frames: of the sensors, likewise.
-    """
-
-    shape: tuple[int, ...]
-    pictures: NDArray[np.float32] | None
-    numbers: dict[str, NDArray[np.float64]]
-    frames: NDArray[np.float64]
-    done: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
-
-    @classmethod
-    def of(cls, cameras: Cameras, picture: tuple[int, ...] | None, names: tuple[str, ...]) -> InMemory:
-        """Room for the results of all cameras."""
-        count = len(cameras)
-        values = None if picture is None else np.full((count, *picture), np.nan, dtype=np.float32)
-        numbers = {name: np.full(count, np.nan) for name in (*KNOWN, *names)}
-        return cls(cameras.shape, values, numbers, np.full((count, 3, 3), np.nan), np.zeros(count, dtype=bool))
-
-    def has(self, number: int) -> bool:
-        """See `Kept`."""
-        return bool(self.done[number])
-
-    def put(self, number: int, image: Image, row: Mapping[str, float]) -> None:
-        """See `Kept`."""
-        if self.pictures is not None:
-            self.pictures[number] = image.to_numpy()
-        for name, value in row.items():
-            self.numbers[name][number] = value
-        self.frames[number] = image.frame.matrix
-        self.done[number] = True
-
-    def swept(self, cameras: Cameras) -> Sweep:
-        """What a sweep gives of it."""
-        frames = self.frames
-        one = np.array_equal(frames, np.broadcast_to(frames[0], frames.shape))
-        return Sweep(
-            cameras.axes,
-            cameras.varied,
-            {name: values.reshape(self.shape) for name, values in self.numbers.items()},
-            None if self.pictures is None else self.pictures.reshape(*self.shape, *self.pictures.shape[1:]),
-            frames[0] if one else frames.reshape(*self.shape, 3, 3),
-            self.done.reshape(self.shape),
-            cameras,
-        )

@@ -65,12 +65,11 @@ class Varied(Brief):
         return np.array(self.labels)
 
     @property
-    def words(self) -> str:
-        """The name, and from where to where it goes."""
-        count = f"{len(self)} value{'s' * (len(self) != 1)}"
+    def values_in_words(self) -> str:
+        """From where to where it goes."""
         if len(self) > 2 and self.coordinates.dtype.kind in "if":
-            return f"{self.name} {self.labels[0]} … {self.labels[-1]}, {count}"
-        return f"{self.name} {first_few_labels(self.labels)}"
+            return f"{self.labels[0]} … {self.labels[-1]}, {len(self)} values"
+        return first_few_labels(self.labels)
 
 
 def first_few_labels(labels: Sequence[str], most: int = 4) -> str:

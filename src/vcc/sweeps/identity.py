@@ -1,0 +1,70 @@
+"""What a sweep is: all that its results depend on, so that results of two are never mixed."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from vcc.base.fingerprint import Untold, fingerprint
+from vcc.base.version import VERSION
+from vcc.fields.sampled import to_numpy
+from vcc.fields.samples import Samples
+from vcc.plan.how import OF_THE_RUN, How
+from vcc.store import StoredLightField
+from vcc.sweeps.design import Cameras
+
+RESULTS_DIFFER = ("tolerance", "engine")
+"""What is chosen for a run and changes its results."""
+
+
+def identity(
+    cameras: Cameras, light_field: Samples, how: How, metrics: Mapping[str, Any]
+) -> dict[str, Any] | None:
+    """All that results depend on, as JSON holds it; None where that is, in part, a function of Python.
+
+    Args:
+        cameras: of the sweep.
+        light_field: of which they make pictures.
+        how: they do.
+        metrics: by name; what functions of a user's do is theirs to know.
+    """
+    try:
+        parameters = {
+            each.name: f"{each.values_in_words} ({fingerprint(list(each.values))})" for each in cameras.varied
+        }
+        camera = fingerprint(cameras.base)
+    except Untold:
+        return None
+    return {
+        "version": VERSION,
+        "camera": camera,
+        "axes": list(cameras.axes),
+        "parameters": parameters,
+        "light field": _of_light_field(light_field),
+        "how": {
+            field.name: getattr(how, field.name)
+            for field in fields(how)
+            if (field.name not in OF_THE_RUN or field.name in RESULTS_DIFFER)
+            and getattr(how, field.name) != field.default
+        },
+        "metrics": list(metrics),
+    }
+
+
+def _of_light_field(light_field: Samples) -> str:
+    """The content of a light field in a word: all samples, or what a store states and the sizes of its files."""
+    grid = light_field.grid
+    told = hashlib.sha256(repr((grid.shape, grid.kind.name, grid.sample)).encode())
+    told.update(np.round(grid.frame.matrix, 15).tobytes())
+    if isinstance(light_field, StoredLightField):
+        told.update(repr(light_field.attributes.as_json()).encode())
+        for view in np.ndindex(*grid.shape[:2]):
+            told.update(str(light_field.view_file(*view).stat().st_size).encode())
+    elif (whole := light_field.whole()) is not None:
+        for row in whole:
+            told.update(np.ascontiguousarray(to_numpy(row)).data)
+    return f"{'×'.join(map(str, grid.shape))} ({told.hexdigest()[:12]})"

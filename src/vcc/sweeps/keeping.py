@@ -1,0 +1,314 @@
+"""Sweeps on disk: a Zarr group that xarray opens, written picture by picture, and gone on with after a stop.
+
+A picture is there as a whole or not at all; that it is done, and what is told of it, is noted after it.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+from vcc.base.reading import check_path, expanded, in_words, read_bytes, read_json, stated_at
+from vcc.base.version import VERSION
+from vcc.files.atomic import refusal
+from vcc.files.parts import clear_leftovers, part_of
+from vcc.files.writer_lock import WriterLock
+from vcc.image import Image
+from vcc.store.attributes import difference, plain, same
+from vcc.sweeps.result import PIXEL_AXES, Results, Sweep
+from vcc.sweeps.values import Varied
+
+KEY = "sweep"
+"""The attribute of the group under which all others stand."""
+FORMAT_VERSION = 1
+PICTURES, DONE, FRAME = "pictures", "done", "sensor_frame"
+PLACES = ("y", "x")
+"""Of rows and of columns on the sensor, metres."""
+NOTED_EVERY = 2.0
+"""Seconds after which it is noted what is done: so much work a kill can undo, at most, beside what is at work."""
+IN_WORDS = {"mean": "mean irradiance", "missing_rays": "share of the rays asked for that the light field lacks"}
+
+
+class InStore(Results):
+    """Results of a sweep that go to a store. One writer at a time: another process is told who is at it.
+
+    Args:
+        path: folder of the store; made, or there and of the same sweep, which is gone on with.
+        swept: the sweep, nothing of which is done.
+        picture: the shape of all pictures; None where none are kept.
+        description: all that results depend on (`vcc.sweeps.identity`).
+
+    Raises:
+        InputError: the path is something else, or another sweep (what differs is named); another process writes
+            it; the disk refuses.
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        swept: Sweep,
+        picture: tuple[int, ...] | None,
+        description: dict[str, Any] | None,
+    ) -> None:
+        super().__init__(swept)
+        self.path = Path(path).expanduser()
+        if not self.path.parent.is_dir():
+            raise InputError(f"{self.path} cannot be made: there is no folder {self.path.parent}; make it first")
+        stated = None if description is None else plain({**description, "pictures": picture}, "description")
+        there = os.path.lexists(self.path)
+        if there:
+            _check_same(self.path, stated)
+        self._lock = WriterLock(self.path)
+        try:
+            clear_leftovers(self.path, self._lock.patience)
+            if not there:
+                _make(self.path, swept, picture, stated)
+            for left in self.path.rglob("*.partial"):  # of a run that was killed
+                left.unlink(missing_ok=True)
+            self._group = _opened(self.path, "r+")
+            self._pictures = None if picture is None else self._group[PICTURES]
+            for name, values in (*swept.numbers.items(), (DONE, swept.done)):
+                values[...] = self._group[name][...]
+        except BaseException:
+            self._lock.give_back()
+            raise
+        self._noted = time.monotonic()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """What is done is noted, whatever ended the work; then others may write."""
+        try:
+            self._note()
+        except InputError:
+            if error is None:
+                raise
+        finally:
+            self._lock.give_back()
+
+    def keep(self, place: tuple[int, ...], image: Image) -> None:
+        """See `Results`.
+
+        Raises:
+            InputError: the disk refuses; all that was done before is kept.
+        """
+        if self._pictures is not None:
+            with self._disk(f"the picture of {self.swept.labels(place)}"):
+                self._pictures[place] = image.to_numpy()
+
+    def commit(self) -> None:
+        """Note what is done, unless that was a moment ago."""
+        if time.monotonic() - self._noted > NOTED_EVERY:
+            self._note()
+
+    def finished(self) -> Sweep:
+        """See `Results`."""
+        return replace(self.swept, pictures=self._pictures)
+
+    def _note(self) -> None:
+        with self._disk("what is told of pictures"):
+            for name, values in self.swept.numbers.items():
+                self._group[name][...] = values
+            self._group[DONE][...] = self.swept.done  # last: what it says is there
+        self._noted = time.monotonic()
+
+    @contextmanager
+    def _disk(self, what: str) -> Iterator[None]:
+        """Refusals of the disk in words."""
+        try:
+            yield
+        except OSError as error:
+            done = self.swept.done
+            raise InputError(
+                f"{what} could not be written to {self.path}: {refusal(error, self.path)}. {int(done.sum())} of "
+                f"{done.size} pictures are kept: the same sweep goes on from there"
+            ) from error
+
+
+def open_sweep(path: str | PathLike[str]) -> Sweep:
+    """A sweep that was written to a store, finished or not; pictures are read when they are asked for.
+
+    Args:
+        path: folder of the store.
+
+    Raises:
+        InputError: no such folder, or what is no sweep.
+    """
+    folder = expanded(path)
+    stated = _stated(folder)
+    group = _opened(folder, "r")
+    try:
+        axes = tuple(stated["axes"])
+        coordinates = tuple(
+            Varied(each["name"], tuple(group[each["name"]][...].tolist()), tuple(each["labels"]), each["unit"])
+            for each in stated["parameters"]
+        )
+        return Sweep(
+            axes,
+            coordinates,
+            {name: group[name][...] for name in stated["numbers"]},
+            group.get(PICTURES),
+            group[FRAME][...],
+            group[DONE][...],
+        )
+    except (KeyError, TypeError, ValueError, OSError) as error:
+        raise InputError(f"{folder} cannot be used as a sweep: {in_words(error)}") from error
+
+
+def save_sweep(swept: Sweep, path: str | PathLike[str]) -> None:
+    """Write a sweep that is in memory to a new store; it appears whole or not at all.
+
+    Args:
+        swept: the sweep.
+        path: folder of the store.
+
+    Raises:
+        InputError: there is something of that name; the disk refuses.
+    """
+    folder = Path(path).expanduser()
+    if os.path.lexists(folder):
+        raise InputError(f"{folder} is there already: choose another name")
+    picture = None if swept.pictures is None else swept.pictures.shape[len(swept.shape) :]
+    clear_leftovers(folder)
+    _make(folder, swept, picture, None, swept.pictures)
+
+
+def _stated(folder: Path) -> dict[str, Any]:
+    """What a store states of a sweep.
+
+    Raises:
+        InputError: there is none, or a newer version than this one reads.
+    """
+    check_path(folder, "sweep")
+    if not (folder / "zarr.json").is_file():
+        raise InputError(f"{folder} is no sweep: it {'is a file' if folder.is_file() else 'holds no zarr.json'}")
+    stated = read_json(read_bytes(folder / "zarr.json"), f"{folder / 'zarr.json'}")
+    found = stated_at(stated, "attributes", KEY)
+    if not isinstance(found, dict) or not isinstance(found.get("format_version"), int):
+        raise InputError(f'{folder} is a Zarr group, and no sweep: its attributes have no "{KEY}"')
+    if found["format_version"] > FORMAT_VERSION:
+        raise InputError(
+            f"{folder} has format_version {found['format_version']}, and this vcc reads up to {FORMAT_VERSION}: "
+            "use a newer vcc"
+        )
+    return found
+
+
+def _opened(folder: Path, mode: Literal["r", "r+"]) -> Any:
+    import zarr
+
+    try:
+        store = zarr.storage.LocalStore(folder, read_only=mode == "r")
+        return zarr.open_group(store=store, mode=mode, zarr_format=3)
+    except Exception as error:
+        raise InputError(f"{folder} cannot be used as a sweep: {in_words(error)}") from error
+
+
+def _check_same(folder: Path, wanted: dict[str, Any] | None) -> None:
+    """Refuse a folder that holds anything else than the same sweep."""
+    found = _stated(folder).get("description")
+    if wanted is None or found is None:
+        raise InputError(
+            f"{folder} is there already, and a sweep of functions of Python, of which nobody can tell whether "
+            "they are the same, is not gone on with: remove it, or choose another name"
+        )
+    if not same(wanted, found):
+        raise InputError(
+            f"{folder} is another sweep, and results of two are never mixed. {difference(found, wanted)}. Remove "
+            "it, or choose another name"
+        )
+
+
+def _make(
+    folder: Path,
+    swept: Sweep,
+    picture: tuple[int, ...] | None,
+    description: dict[str, Any] | None,
+    values: Any = None,
+) -> None:
+    """Make the group and its arrays under a temporary name and rename it: it is there or it is not."""
+    import zarr
+
+    part = part_of(folder)
+    try:
+        group = zarr.create_group(zarr.storage.LocalStore(part), attributes={KEY: _statement(swept, description)})
+        remark = {"coordinates": " ".join(each.name for each in swept.coordinates)} if swept.together else {}
+        for each in swept.coordinates:
+            axes = swept.axes if swept.together else (each.name,)
+            _array(group, each.name, each.coordinates, axes, {"units": each.unit} if each.unit else {})
+        for name, numbers in swept.numbers.items():
+            words = {"long_name": IN_WORDS[name]} if name in IN_WORDS else {}
+            _array(group, name, numbers, swept.axes, remark | words)
+        _array(group, DONE, swept.done, swept.axes, remark)
+        _array(group, FRAME, swept.frames, (*(swept.axes if swept.frames.ndim > 2 else ()), "to", "from"), {})
+        if picture is not None:
+            made = _make_pictures(group, swept, picture, remark)
+        if picture is not None and values is not None:
+            for place in np.ndindex(*swept.shape):
+                made[place] = values[place]
+        part.replace(folder)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be made: {refusal(error, part)}") from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _statement(swept: Sweep, description: dict[str, Any] | None) -> dict[str, Any]:
+    return {
+        "format_version": FORMAT_VERSION,
+        "written_by": f"vcc {VERSION}",
+        "axes": list(swept.axes),
+        "parameters": [
+            {"name": each.name, "unit": each.unit, "labels": list(each.labels)} for each in swept.coordinates
+        ],
+        "numbers": list(swept.numbers),
+        "description": description,
+    }
+
+
+def _array(group: Any, name: str, values: NDArray[Any], axes: tuple[str, ...], attributes: dict[str, Any]) -> None:
+    """A small array, in one piece, with labelled axes."""
+    kind = str if values.dtype.kind == "U" else values.dtype
+    made = group.create_array(
+        name,
+        shape=values.shape,
+        dtype=kind,
+        chunks=values.shape,
+        dimension_names=axes,
+        attributes=attributes,
+        fill_value=np.nan if values.dtype.kind == "f" else None,
+    )
+    made[...] = values
+
+
+def _make_pictures(group: Any, swept: Sweep, picture: tuple[int, ...], remark: dict[str, Any]) -> Any:
+    """The array of pictures, one in a piece, and where on the sensor pixels are, if that is one place for all."""
+    from zarr.codecs import BloscCodec, Crc32cCodec
+
+    if swept.frames.ndim == 2:
+        for n, axis in enumerate(PIXEL_AXES[:2]):
+            places = swept.frames[1 - n, 1 - n] * np.arange(picture[n]) + swept.frames[1 - n, 2]
+            _array(group, PLACES[n], places, (axis,), {"units": "m"})
+        remark = {"coordinates": " ".join([*remark.values(), *PLACES])}
+    return group.create_array(
+        PICTURES,
+        shape=(*swept.shape, *picture),
+        dtype="float32",
+        chunks=(*(1,) * len(swept.shape), *picture),
+        compressors=[BloscCodec(cname="zstd", clevel=3, shuffle="shuffle", typesize=4), Crc32cCodec()],
+        fill_value=np.nan,
+        dimension_names=(*swept.axes, *PIXEL_AXES[: len(picture)]),
+        attributes={**remark, "long_name": "irradiance, as light lands on the sensor"},
+    )
