@@ -249,48 +249,6 @@ def test_click_focuses_where_it_was_clicked(page):
     assert 52.5 < float(page.place("sensor").removesuffix(" mm")) < 54
 
 
-AS_A_WIDGET = """async () => {
-  const { default: widget } = await import("/bench.js");
-  const cell = document.body.appendChild(document.createElement("div"));
-  cell.style.width = "700px";
-  const socket = new WebSocket(`ws://${location.host}/bench`);
-  socket.binaryType = "arraybuffer";
-  await new Promise((open) => (socket.onopen = open));
-  const model = {
-    send(content) {
-      const json = new TextEncoder().encode(JSON.stringify(content));
-      const frame = new Uint8Array(4 + json.length);
-      new DataView(frame.buffer).setUint32(0, json.length, true);
-      frame.set(json, 4);
-      socket.send(frame);
-    },
-    on(name, hear) {
-      socket.onmessage = ({ data }) => {
-        let at = 4 + new DataView(data).getUint32(0, true);
-        const message = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, at - 4)));
-        hear(message, (message.buffers ?? []).map((size) => new DataView(data, (at += size) - size, size)));
-      };
-    },
-    off() {},
-  };
-  window.end = widget.render({ model, el: cell });
-}"""
-"""The module as a notebook uses it: a model that sends and hears, here by the socket of the server."""
-
-
-def test_bench_stands_in_a_cell_of_a_notebook(browser, served):
-    context = browser.new_context()
-    page = context.new_page()
-    page.goto(f"{served.address}bench.js")  # a page without a bench of its own
-    page.evaluate(AS_A_WIDGET)
-    page.wait_for_selector('section.picture[aria-busy="false"]')
-    box = page.locator("vcc-bench").bounding_box()
-    assert (box["width"], box["height"]) == (700, 520)
-    page.evaluate("window.end()")
-    assert page.locator("vcc-bench").count() == 0
-    context.close()
-
-
 def without_fault(page):
     """What axe sees has no serious fault."""
     found = page.page.evaluate("axe.run({ resultTypes: ['violations'] })")["violations"]

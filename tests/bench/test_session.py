@@ -659,3 +659,14 @@ def test_whatever_comes_is_done_or_refused_in_words(messages):
         if message.get("turn") == 77 and message["is"] != "state":
             break
     client.close()
+
+
+def test_thread_is_there_while_there_is_work(monkeypatch):
+    monkeypatch.setattr(session_there, "LINGER", 0.01)
+    client = Client()
+    assert client.session.join(0)
+    for turn in (1, 2):
+        client.do("hello", turn=turn)
+        assert client.at_rest()["turn"] == turn
+        assert client.session.join(30)
+    client.close()

@@ -1,7 +1,9 @@
 """The bench in a notebook: the widget's messages are those of any client, its camera is the one on the bench."""
 
+import gc
 import sys
 import threading
+import weakref
 
 import numpy as np
 import pytest
@@ -36,6 +38,17 @@ def test_a_camera_of_arrays_is_on_the_bench_as_it_is():
     assert empty.start.changed(["elements"], []).train(empty.beside).train.elements == ()
 
 
+def test_a_cell_that_is_run_again_makes_no_coarser_copies_again():
+    light_field = noise()
+    one, again = widget._offered(camera(), light_field), widget._offered(camera(), light_field)
+    assert one.field(widget.NAME) is again.field(widget.NAME)
+    assert one.field(widget.NAME) is not widget._offered(camera(), noise()).field(widget.NAME)
+    gone = weakref.ref(light_field)
+    del light_field, one, again
+    gc.collect()
+    assert gone() is None
+
+
 def test_a_camera_that_no_file_can_hold_is_refused():
     own = vcc.Camera([vcc.Mask(lambda x, y: x > 0, width=1 * mm)], camera().sensor)
     with pytest.raises(InputError, match="a piece of Python that a camera file cannot"):
@@ -59,11 +72,15 @@ def test_a_widget_speaks_as_any_client(monkeypatch):
     def pictures():
         return [buffers for message, buffers in told if message["is"] == "picture" and not message["coarse"]]
 
+    assert told[0] == ({"is": "heard"}, None)  # before anything that takes time
     with there:
         assert there.wait_for(pictures, 60)
     assert pictures()[0][0][:2] == b"\xff\xd8"  # as JPEG begins
     assert shown.camera.sensor.z == pytest.approx(53 * mm)
     assert shown.camera.elements == camera().elements
     assert "render" in shown._esm
+    assert (
+        "run this cell again" in shown._repr_mimebundle_()[0]["text/plain"]
+    )  # where a notebook is read without Python
     shown._handle_custom_msg({"do": "format"}, [])
     assert shown._session.join(30)

@@ -54,6 +54,8 @@ type Message = { do: string; turn?: number; [name: string]: unknown };
 export class MockHost implements Host {
   onmessage: Host["onmessage"] = () => {};
   onstate: Host["onstate"] = () => {};
+  readonly awaited = "Waiting for the mock …";
+  readonly lost = "The mock is gone.";
   private document = DOCUMENT;
   private before: BenchDocument | null = null;
   private past: BenchDocument[] = [];

@@ -32,7 +32,8 @@ export interface Options {
 
 export class Bench extends EventTarget {
   open = false;
-  wasOpen = false;
+  /** Why not. */
+  absent: string;
   parts: Parts | null = null;
   document: BenchDocument | null = null;
   side: Side | null = null;
@@ -49,10 +50,12 @@ export class Bench extends EventTarget {
   without: string | null = null;
   refused: { words: string; where: Where | null } | null = null;
   progress: { done: number; total: number; words: string } | null = null;
-  answer: Answer | null = null;
+  /** The newest to each question. */
+  readonly answers = new Map<string, Answer>();
   /** Whether a picture of what was asked last is still to come. */
   waiting = false;
 
+  private silent = false;
   private turn = 0;
   /** What is selected once the host has answered this turn: an element that it adds. */
   private selectAt = Infinity;
@@ -69,6 +72,7 @@ export class Bench extends EventTarget {
 
   constructor(private readonly host: Host, readonly options: Options = {}) {
     super();
+    this.absent = host.awaited;
     host.onmessage = (message, buffers) => void this.hear(message, buffers);
     host.onstate = (state) => void this.connection(state);
   }
@@ -179,13 +183,20 @@ export class Bench extends EventTarget {
 
   // --- what the host says ---
 
-  private async connection(state: "open" | "closed"): Promise<void> {
+  private async connection(state: "open" | "closed" | "silent"): Promise<void> {
+    const wasSilent = this.silent;
     this.open = state === "open";
+    this.silent = state === "silent";
+    if (!this.open) this.absent = this.document || this.silent ? this.host.lost : this.host.awaited;
+    if (this.silent || wasSilent) {
+      // Nothing was lost: what was sent is still to be answered.
+      this.changed();
+      return;
+    }
     this.settle();
     this.valueUnderway = false;
     if (this.open) {
       const document = this.document ?? (this.options.address ? await read(window.location.hash) : null);
-      this.wasOpen = true;
       this.ask({ do: "hello", ...(document ? { document } : {}) });
     } else {
       this.progress = null;
@@ -254,11 +265,7 @@ export class Bench extends EventTarget {
         if (this.nextValue) this.askValue(...this.nextValue);
         break;
       case "answer":
-        for (const each of this.answer?.pictures ?? []) URL.revokeObjectURL(each);
-        this.answer = {
-          message,
-          pictures: buffers.map((each) => URL.createObjectURL(new Blob([bytesOf(each)], { type: "image/jpeg" }))),
-        };
+        this.answers.set(message.what, { message, pictures: buffers.map(dataAddress) });
         break;
       case "file":
         if (buffers[0]) saved(message.name, message.type, buffers[0]);
@@ -366,6 +373,13 @@ function bytesOf(view: DataView): Uint8Array<ArrayBuffer> {
   return new Uint8Array(view.buffer as ArrayBuffer, view.byteOffset, view.byteLength);
 }
 
+/** A picture's address that any page may show, whatever its policy says of those made in it. */
+function dataAddress(view: DataView): string {
+  let letters = "";
+  for (const byte of bytesOf(view)) letters += String.fromCharCode(byte);
+  return `data:image/jpeg;base64,${btoa(letters)}`;
+}
+
 function decoded(view: DataView): Promise<ImageBitmap> {
   return createImageBitmap(new Blob([bytesOf(view)], { type: "image/jpeg" }));
 }
@@ -375,6 +389,10 @@ function saved(name: string, type: string, view: DataView): void {
   const link = document.createElement("a");
   link.href = address;
   link.download = name;
+  // VS Code listens for such clicks at the page's body.
+  link.hidden = true;
+  document.body.append(link);
   link.click();
+  link.remove();
   window.setTimeout(() => URL.revokeObjectURL(address), 10_000);
 }

@@ -6,7 +6,10 @@ import type { FromHost } from "./protocol";
 export interface Host {
   send(message: object, buffers?: ArrayBuffer[]): void;
   onmessage: (message: FromHost, buffers: DataView[]) => void;
-  onstate: (state: "open" | "closed") => void;
+  onstate: (state: "open" | "closed" | "silent") => void;
+  /** What is said while it is not open, the first time and later. */
+  readonly awaited: string;
+  readonly lost: string;
   /** Begins; handlers are set before. */
   start(): void;
   /** Ends for good. */
@@ -47,6 +50,8 @@ const LONGEST_WAIT = 3000;
 export class SocketHost implements Host {
   onmessage: Host["onmessage"] = () => {};
   onstate: Host["onstate"] = () => {};
+  readonly awaited = "Waiting for the server …";
+  readonly lost = "The server is gone. What you see stays; the bench goes on when the server is back.";
   private socket: WebSocket | null = null;
   private wait = FIRST_WAIT;
   private timer = 0;
@@ -91,17 +96,35 @@ export class SocketHost implements Host {
   }
 }
 
+/** After so long without a word from Python it is said that it does not answer, milliseconds. */
+const SILENCE = 4000;
+
 /** What a widget's model has that is used here; anywidget's has more. */
 export interface WidgetModel {
-  send(content: object, callbacks?: undefined, buffers?: ArrayBuffer[]): void;
-  on(name: "msg:custom", handler: (message: FromHost, buffers: DataView[]) => void): void;
-  off(name: "msg:custom", handler: (message: FromHost, buffers: DataView[]) => void): void;
+  send(content: object, callbacks?: undefined, buffers?: ArrayBuffer[]): unknown;
+  on(name: "msg:custom", handler: (message: FromHost | Heard, buffers?: DataView[]) => void): void;
+  off(name: "msg:custom", handler: (message: FromHost | Heard, buffers?: DataView[]) => void): void;
+}
+
+/** Python says at once that it heard something; what it makes of it may take longer. */
+interface Heard {
+  is: "heard";
 }
 
 export class WidgetHost implements Host {
   onmessage: Host["onmessage"] = () => {};
   onstate: Host["onstate"] = () => {};
-  private readonly hears = (message: FromHost, buffers: DataView[]) => this.onmessage(message, buffers ?? []);
+  readonly awaited = "Waiting for Python …";
+  readonly lost = "Python does not answer: it runs a cell, and then the bench goes on; or it was restarted, and then the cell of the bench is to be run again.";
+  private timer = 0;
+  private silent = false;
+  private readonly hears = (message: FromHost | Heard, buffers?: DataView[]) => {
+    window.clearTimeout(this.timer);
+    this.timer = 0;
+    if (this.silent) this.onstate("open");
+    this.silent = false;
+    if (message.is !== "heard") this.onmessage(message, buffers ?? []);
+  };
 
   constructor(private readonly model: WidgetModel) {}
 
@@ -111,10 +134,28 @@ export class WidgetHost implements Host {
   }
 
   send(message: object, buffers: ArrayBuffer[] = []): void {
-    this.model.send(message, undefined, buffers);
+    if (!this.timer) this.timer = window.setTimeout(() => this.hearNothing(), SILENCE);
+    void this.carry(message, buffers);
   }
 
   close(): void {
+    window.clearTimeout(this.timer);
     this.model.off("msg:custom", this.hears);
+  }
+
+  /** Some hosts throw where the kernel is gone, some reject, some say nothing. */
+  private async carry(message: object, buffers: ArrayBuffer[]): Promise<void> {
+    try {
+      await this.model.send(message, undefined, buffers);
+    } catch {
+      this.hearNothing();
+    }
+  }
+
+  private hearNothing(): void {
+    window.clearTimeout(this.timer);
+    this.timer = 0;
+    this.silent = true;
+    this.onstate("silent");
   }
 }

@@ -2,22 +2,26 @@
 
 import { Bench, type Options } from "./bench";
 import { SocketHost, WidgetHost, type Host, type WidgetModel } from "./host";
+import { settled } from "./room";
 import { register, type BenchFrame } from "./view";
 
-const WIDGET_HEIGHT = "520px";
-
-/** Put a bench into an element; what it returns takes it away again. */
+/** Put a bench into an element of a page; what it returns takes it away again. */
 export function mount(element: HTMLElement, host: Host, options: Options = {}): () => void {
-  register();
   const bench = new Bench(host, options);
-  const frame = document.createElement("vcc-bench") as BenchFrame;
-  frame.bench = bench;
-  element.append(frame);
+  const leave = show(element, bench);
   bench.start();
   return () => {
     bench.close();
-    frame.remove();
+    leave();
   };
+}
+
+function show(element: HTMLElement, bench: Bench): () => void {
+  register();
+  const frame = document.createElement("vcc-bench") as BenchFrame;
+  frame.bench = bench;
+  element.append(frame);
+  return () => frame.remove();
 }
 
 /** The bench of the server that this page came from, with the document in the address. */
@@ -30,28 +34,31 @@ function mountServed(element: HTMLElement): () => void {
   return mount(element, new SocketHost(address.href), { address: true });
 }
 
-/** JupyterLab and VS Code have themes of their own, which need not be the system's. */
-function themed(): string {
-  const { body } = document;
-  if (body.dataset["jpThemeLight"] === "true" || body.classList.contains("vscode-light")) return "light";
-  if (body.dataset["jpThemeLight"] === "false" || body.classList.contains("vscode-dark")) return "dark";
-  return "";
-}
-
-function render({ model, el }: { model: WidgetModel; el: HTMLElement }): () => void {
-  const room = document.createElement("div");
-  room.style.cssText = `width: 100%; height: ${el.style.height || WIDGET_HEIGHT}`;
-  // Keys that mean something on the bench mean nothing to JupyterLab while they are pressed there.
-  room.dataset["lmSuppressShortcuts"] = "true";
-  const theme = themed();
-  if (theme) room.style.setProperty("--bench-scheme", theme);
-  el.append(room);
-  const end = mount(room, new WidgetHost(model));
-  return end;
-}
-
-/** The server's page has a place for the bench; a notebook has none, and calls `render`. */
+/** The server's page has a place for the bench; a notebook has none, and takes the widget. */
 const place = document.querySelector<HTMLElement>("main[data-vcc-bench]");
 if (place) mountServed(place);
 
-export default { render };
+/** A widget, made once for each model: one bench, which all cells that show it share. */
+export default () => {
+  let bench: Bench;
+  let started = false;
+  return {
+    initialize({ model }: { model: WidgetModel }): () => void {
+      bench = new Bench(new WidgetHost(model));
+      return () => bench.close();
+    },
+    render({ el }: { el: HTMLElement }): () => void {
+      const room = document.createElement("div");
+      const leaveRoom = settled(room);
+      el.append(room);
+      const leave = show(room, bench);
+      if (!started) bench.start();
+      started = true;
+      return () => {
+        leave();
+        leaveRoom();
+        room.remove();
+      };
+    },
+  };
+};

@@ -12,6 +12,8 @@ export class Part extends LitElement {
   override connectedCallback(): void {
     super.connectedCallback();
     this.bench.addEventListener("change", this.follow);
+    // A notebook takes cells out of the page and puts them back; meanwhile much may have changed.
+    this.requestUpdate();
   }
 
   override disconnectedCallback(): void {

@@ -57,8 +57,14 @@ export class PictureView extends Part {
     this.width = this.height = 0;
   }
 
+  override connectedCallback(): void {
+    super.connectedCallback();
+    void this.updateComplete.then(() => {
+      if (this.isConnected) this.watch.observe(this.renderRoot.querySelector(".stage")!);
+    });
+  }
+
   override firstUpdated(): void {
-    this.watch.observe(this.renderRoot.querySelector(".stage")!);
     // Lit's listeners of wheels are passive in some browsers.
     this.canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
   }
@@ -406,6 +412,7 @@ export class PictureView extends Part {
       .short { display: none; }
       .bar { display: flex; flex-wrap: wrap; align-items: center; gap: 2px 8px; padding: 6px 8px; }
       .group { display: flex; align-items: center; gap: 2px; }
+      .group + label.check { margin-left: 6px; }
       .spring { flex: 1; }
       .stage { position: relative; flex: 1; min-height: 0; background: var(--stage); overflow: hidden; }
       canvas { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: none; cursor: crosshair; }

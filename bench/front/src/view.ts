@@ -32,7 +32,7 @@ export class BenchView extends Part {
   /** Of phase space; empty for each plane of the camera. */
   private plane = "";
   /** While an answer is under way nothing else is asked; the newest question is asked when it has come. */
-  private underway: Answer | null | undefined = undefined;
+  private underway: { what: string; before: Answer | undefined } | null = null;
   private askNext = false;
   private askedFor = "";
   private askTimer = 0;
@@ -94,8 +94,9 @@ export class BenchView extends Part {
 
   /** An answer that is open follows the camera, when it rests. */
   private readonly keepAnswer = () => {
-    if (this.underway !== undefined && (this.bench.answer !== this.underway || this.bench.refused || !this.bench.open)) {
-      this.underway = undefined;
+    const { underway } = this;
+    if (underway && (this.bench.answers.get(underway.what) !== underway.before || this.bench.refused || !this.bench.open)) {
+      this.underway = null;
       if (this.askNext) this.askAgain();
     }
     if (this.beside === "parts" || this.beside === "notes" || !this.bench.document) return;
@@ -112,9 +113,9 @@ export class BenchView extends Part {
 
   private askAgain(): void {
     if (this.beside === "parts" || this.beside === "notes") return;
-    this.askNext = this.underway !== undefined;
+    this.askNext = this.underway !== null;
     if (this.askNext) return;
-    this.underway = this.bench.answer;
+    this.underway = { what: this.beside, before: this.bench.answers.get(this.beside) };
     const distance = this.distance.trim();
     const plane = this.plane.trim();
     if (OF_A_POINT.includes(this.beside) && distance) this.bench.question(this.beside, { distance: withUnit(distance, null, "m") });
@@ -170,9 +171,7 @@ export class BenchView extends Part {
   private banner() {
     const { bench } = this;
     if (bench.open) return nothing;
-    return html`<div class="banner" role="alert">${bench.wasOpen
-      ? "The server is gone. What you see stays; the bench goes on when the server is back."
-      : "Waiting for the server …"}</div>`;
+    return html`<div class="banner" role="alert">${bench.absent}</div>`;
   }
 
   private tabs() {
@@ -204,7 +203,7 @@ export class BenchView extends Part {
         ${bench.side?.words.map((words) => html`<p>${words}</p>`)}
         ${bench.notes.length ? nothing : html`<p class="quiet">Nothing to note: no ray misses, and nothing is too fine for the light field or the sensor.</p>`}
         ${bench.notes.map((note) => html`<p class="advice">${note.element === null ? nothing : html`<button class="link" @click=${() => bench.select(note.element!)}>${bench.partOf(note.element)?.label[0] ?? ""}</button>`}${note.words}</p>`)}</div>`;
-    const answer = bench.answer?.message.what === this.beside ? bench.answer : null;
+    const answer = bench.answers.get(this.beside);
     return html`<div id="pane" class="pane text answer" role="tabpanel" aria-labelledby=${label} tabindex="0" aria-busy=${!answer}>
       ${OF_A_POINT.includes(this.beside) ? html`<label class="distance">point at <input type="text" placeholder="in focus" .value=${this.distance}
         @change=${(event: Event) => {
@@ -366,7 +365,7 @@ export class BenchView extends Part {
       h1 { margin: 0; font-size: 13px; font-weight: 600; letter-spacing: -0.01em; }
       .group { display: flex; }
       .spring { flex: 1; }
-      @container (max-width: 699px) { .hint { display: none; } }
+      @container (max-width: 639px) { .hint { display: none; } }
       .bench { grid-area: bench; min-height: 0; min-width: 0; display: grid; border-bottom: 1px solid var(--line); }
       .picture { grid-area: picture; min-height: 0; min-width: 0; display: grid; border-left: var(--aside-border, 1px) solid var(--line); }
       .beside { grid-area: beside; min-height: 0; min-width: 0; display: flex; flex-direction: column; }
@@ -406,9 +405,10 @@ export class BenchFrame extends Part {
   }
 
   static override styles = css`
-    :host { display: block; width: 100%; height: 100%; container-type: size; overflow: auto; }
+    /* Nothing of the page's type is inherited: a notebook's cell may have any. */
+    :host { all: initial; display: block; width: 100%; height: 100%; container-type: size; overflow: auto; }
     vcc-bench-view { grid-template: "header header" auto "banner banner" auto "bench picture" minmax(180px, 44fr) "beside picture" 56fr / minmax(0, 46fr) minmax(0, 54fr); }
-    @container (max-width: 699px) {
+    @container (max-width: 639px) {
       vcc-bench-view { --aside-border: 0px; height: auto; min-height: 100%; grid-template: "header" auto "banner" auto "picture" min(112cqw, 480px) "bench" 230px "beside" minmax(320px, auto) / minmax(0, 1fr); }
     }
   `;

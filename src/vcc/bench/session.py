@@ -1,7 +1,8 @@
 """One client of a bench: what it says, what is done, what it is told. Nothing here knows how messages travel.
 
 Messages come in from any thread and are worked on by one of the session's own, in order; of what moves only the
-newest counts. A picture that is no longer wanted is broken off.
+newest counts. A picture that is no longer wanted is broken off. The thread is there while there is work: a
+notebook keeps each bench that a cell ever made.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ Send = Callable[[Json, Sequence[bytes]], None]
 
 MOST_WAITING = 200
 """Messages that may wait: who sends more is not listened to any longer."""
+LINGER = 2.0
+"""Seconds that the thread waits for more."""
 SLOW = 0.4
 """Seconds from which on a whole picture is shown coarsely first."""
 
@@ -100,8 +103,7 @@ class Session:
         self._taken: Taken | None = None
         self._shown_white = 1.0
         self._pinned: tuple[Picture, float] | None = None
-        self._thread = threading.Thread(target=self._work, name="vcc bench", daemon=True)
-        self._thread.start()
+        self._thread: threading.Thread | None = None
 
     @property
     def document(self) -> Document:
@@ -127,7 +129,7 @@ class Session:
             if len(self._inbox) >= MOST_WAITING:
                 raise Broken(f"more than {MOST_WAITING} messages wait")
             self._inbox.append((checked, list(buffers)))
-            self._changed.notify()
+            self._wake()
 
     def pause(self) -> None:
         """The client is out of reach: what is being made is broken off, and what is known of it stays."""
@@ -140,7 +142,7 @@ class Session:
         """The client is there again, or by another way: it is told by this one from now on."""
         with self._changed:
             self._send = send
-            self._changed.notify()
+            self._wake()
 
     def close(self) -> None:
         """End: what is being made is broken off, and nothing is sent any longer."""
@@ -151,16 +153,27 @@ class Session:
 
     def join(self, timeout: float | None = None) -> bool:
         """Wait until the session's thread has ended; whether it has."""
-        self._thread.join(timeout)
-        return not self._thread.is_alive()
+        thread = self._thread
+        if thread is None:
+            return True
+        thread.join(timeout)
+        return not thread.is_alive()
 
     # --- the thread ---
+
+    def _wake(self) -> None:
+        """Have it work on what there is; called with the lock held."""
+        self._changed.notify()
+        if self._thread is None and self._has_to_do():
+            self._thread = threading.Thread(target=self._work, name="vcc bench", daemon=True)
+            self._thread.start()
 
     def _work(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(self._has_to_do)
-                if self._closed:
+                self._changed.wait_for(self._has_to_do, LINGER)
+                if self._closed or not self._has_to_do():
+                    self._thread = None
                     return
                 message, buffers = self._inbox.popleft() if self._inbox else (None, [])
             try:

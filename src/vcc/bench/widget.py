@@ -6,6 +6,7 @@ import functools
 from collections.abc import Sequence
 from importlib import resources
 from typing import Any
+from weakref import WeakValueDictionary
 
 from vcc.base import checks
 from vcc.base.errors import InputError
@@ -34,7 +35,20 @@ def bench_of(camera: Train, light_field: LightField) -> Any:
 def _offered(camera: Train, light_field: LightField) -> Offered:
     tables, arrays = tables_of_train(camera, NOWHERE / "camera.toml")
     document = Document({"elements": [], **tables}, NAME)
-    return Offered({NAME: Field(light_field)}, document, Beside(NOWHERE, frozenset(), arrays))
+    return Offered({NAME: _field(light_field)}, document, Beside(NOWHERE, frozenset(), arrays))
+
+
+_fields: WeakValueDictionary[int, Field] = WeakValueDictionary()
+
+
+def _field(light_field: LightField) -> Field:
+    """One for each light field, with its coarser copies: a cell that is run again does not make them again."""
+    found = _fields.get(
+        id(light_field)
+    )  # as long as a field is there, so is its light field, and its id is its own
+    if found is None:
+        found = _fields[id(light_field)] = Field(light_field)
+    return found
 
 
 @functools.cache
@@ -63,6 +77,9 @@ def _kind() -> Any:
             train = self._session.document.train(self._session.offered.beside).train
             return Camera(train.elements, train.sensor)
 
+        def __repr__(self) -> str:
+            return "The optical bench of a camera. It is drawn where Python runs: run this cell again."
+
         def close(self) -> None:
             """End, and take the bench out of the notebook."""
             self._session.close()
@@ -72,6 +89,7 @@ def _kind() -> Any:
             self.send(message, list(buffers) or None)
 
         def _hear(self, _: Any, message: Any, buffers: Sequence[Any] | None) -> None:
+            self._tell({"is": "heard"}, ())
             try:
                 self._session.receive(message, [bytes(each) for each in buffers or ()])
             except Broken:
