@@ -126,6 +126,7 @@ LATE = {
     "starlette",
     "uvicorn",
     "websockets",
+    "distributed",
 }
 """Libraries that take long to load, or need not be there: these may be imported inside functions."""
 

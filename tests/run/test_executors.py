@@ -26,7 +26,7 @@ from vcc.base.units import mm
 from vcc.plan.how import How
 from vcc.run import drive, sent
 from vcc.run.blocks import Blocks
-from vcc.run.executors import TOGETHER, Parcel, Pool, Tree
+from vcc.run.executors import TOGETHER, Parcel, Pool, Tree, Work
 from vcc.shapes.patterns import CosineSum
 from vcc.store import save_store
 
@@ -157,7 +157,7 @@ def test_processes_make_the_same_picture_and_one_that_dies_is_told(stored, in_bl
         picture = operator(samples, executor=pool)
         np.testing.assert_allclose(picture, operator(samples), rtol=0, atol=1e-6 * np.abs(picture).max())
         with pytest.raises(vcc.InputError, match=r"a process of the executor, ProcessPoolExecutor, ended before"):
-            list(Pool(pool).each(end_process, None, [0, 1]))
+            list(Pool(pool).each(Work(end_process, None), [0, 1]))
         with pytest.raises(vcc.InputError, match="ended before its work was done"):
             camera.capture(stored, executor=pool)
 
@@ -212,7 +212,7 @@ def test_a_tree_adds_in_one_order_whoever_comes_first(count):
 def test_the_first_that_fails_ends_the_work():
     executor = Hostile(3, pause=0.01)
     with pytest.raises(ZeroDivisionError):
-        list(Pool(executor).each(inverse, 1.0, [5, 4, 0, *range(1, 40)]))
+        list(Pool(executor).each(Work(inverse, 1.0), [5, 4, 0, *range(1, 40)]))
     executor.shutdown()
     assert executor.done < 42
     assert executor.done + executor.cancelled == 42
@@ -277,7 +277,7 @@ def test_another_version_is_told():
 
 def test_what_cannot_be_packed_is_told():
     with pytest.raises(vcc.InputError, match="this cannot be sent to other processes"):
-        list(Pool(ThreadPoolExecutor(1)).each(inverse, lambda: None, [1]))
+        list(Pool(ThreadPoolExecutor(1)).each(Work(inverse, lambda: None), [1]))
 
 
 def test_a_view_that_is_missing_or_damaged_is_named(tmp_path, monkeypatch):

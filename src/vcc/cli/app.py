@@ -20,6 +20,7 @@ COMMANDS = {
         "Make the picture that a camera records of a light field.",
         'vcc capture camera.toml views/ -o picture.png --spacing "1 mm"',
         "vcc capture camera.toml views/ -o picture.exr --interpolation cubic",
+        "vcc capture camera.toml scene.zarr -o picture.exr --executor processes",
     ),
     "expose": (
         "Record a light field as a real sensor would: photons, electrons, noise, raw numbers.\n\n"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from vcc.advice.explain import Explanation
 from vcc.base.progress import Progress
@@ -16,11 +16,11 @@ SAMPLES_WORTH_A_BAR = 3e8
 """Below this, a picture takes less than a second, and asking for progress would only slow it down."""
 
 
-def captured(camera: Camera, field: Samples, how: How, progress: Progress) -> Image:
+def captured(camera: Camera, field: Samples, how: How, progress: Progress, executor: Any = None) -> Image:
     """The picture; progress is asked for where it takes long."""
     plan = camera.compile(field, how, progress=progress)
     long = field.whole() is None or plan.samples_touched * (field.grid.channels or 1) > SAMPLES_WORTH_A_BAR
-    return camera.capture(field, how, plan=plan, progress=progress if long else None)
+    return camera.capture(field, how, plan=plan, executor=executor, progress=progress if long else None)
 
 
 def exposed(
@@ -31,9 +31,12 @@ def exposed(
     *,
     seed: int,
     radiance: float,
+    executor: Any = None,
 ) -> Recording:
     """What the sensor's electronics make of it; ``seed`` is the noise's, and that of ``how`` the rays'."""
-    return camera.expose(field, exposure, seed=seed, radiance=radiance, ray_seed=how.seed, how=how)
+    return camera.expose(
+        field, exposure, seed=seed, radiance=radiance, ray_seed=how.seed, how=how, executor=executor
+    )
 
 
 def explained(camera: Camera, field: Samples, how: How) -> Explanation:

@@ -3,6 +3,7 @@
 from vcc.camera_file import load_camera
 from vcc.cli.camera_verbs import captured
 from vcc.cli.console import check_output, progress, show
+from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, Factor, LightFieldFile, Making, Output, Reading
 from vcc.files.pictures import WRITE_ENDINGS
 
@@ -16,6 +17,7 @@ def capture(
     exposure: Factor = "auto",
     as_recorded: bool = False,
     how: Making = Making(),
+    executing: Executing = Executing(),
     reading: Reading = Reading(),
 ) -> None:
     """Make the picture that a camera records of a light field.
@@ -28,7 +30,8 @@ def capture(
     """
     output = check_output(output, WRITE_ENDINGS)
     optics = load_camera(camera)
+    executing.check(light_field)
     field = reading.light_field(light_field)
-    with progress("Capturing") as advance:
-        image = captured(optics, field, how, advance)
+    with executing.opened() as executor, progress("Capturing") as advance:
+        image = captured(optics, field, how, advance, executor)
     show(image.save(output, exposure=exposure, upright=not as_recorded).description)

@@ -18,7 +18,7 @@ from vcc.files.atomic import atomic_path
 _LIBRARY_OPTION = re.compile(
     r"\b(transfer|spacing|slope_per_pixel|focus_distance|orientation|scene_distance|interpolation"
     r"|between_views|memory_limit|engine|exposure|radiance|seed|method|samples|tolerance|refine|threads"
-    r"|views|order|every|layout|kind)=(?=(\S?))"
+    r"|views|order|every|layout|kind|executor)=(?=(\S?))"
 )
 _PAIR = re.compile(r"\bviews=\((\w+), (\w+)\)")
 

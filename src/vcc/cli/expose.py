@@ -9,6 +9,7 @@ from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
 from vcc.cli.camera_verbs import exposed
 from vcc.cli.console import check_output, show
+from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time, Whole
 from vcc.files.pictures import RAW_ENDINGS, WRITE_ENDINGS
 
@@ -24,6 +25,7 @@ def expose(
     radiance: float = 1.0,
     picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     how: Making = Making(),
+    executing: Executing = Executing(),
     reading: Reading = Reading(),
 ) -> None:
     """Record a light field as a real sensor would: photons, electrons, noise, raw numbers.
@@ -44,8 +46,10 @@ def expose(
             f"{camera} does not say how its sensor records: add a table [sensor.electronics], which may be "
             "empty for an ordinary one. Irradiance can be had without (vcc capture)"
         )
+    executing.check(light_field)
     field = reading.light_field(light_field)
-    recording = exposed(optics, field, exposure, how, seed=seed, radiance=radiance)
+    with executing.opened() as executor:
+        recording = exposed(optics, field, exposure, how, seed=seed, radiance=radiance, executor=executor)
     show(recording.save(output).description)
     if picture is not None:
         mosaic = recording.electronics.color_filter is not None

@@ -32,7 +32,7 @@ from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
 from vcc.run.blocks import Blocks, Need, cut, cut_for_many
-from vcc.run.executors import Tree, crew
+from vcc.run.executors import Tree, Work, crew
 from vcc.run.sent import Carried, Sent
 
 HELD = 0.25
@@ -346,7 +346,8 @@ class Drive:
                 tree.put(number, self.part(block, beside, counted))
             return _in_double(tree.total)
         asked, views = [(block, beside) for block in used], [self.used_in(block) for block in used]
-        total = self.crew.summed(_share_of, self.sent, asked, _sum_of_shares, lambda n: counted.add(views[n]))
+        work = Work(_share_of, self.sent, first=_begun)
+        total = self.crew.summed(work, asked, _sum_of_shares, lambda n: counted.add(views[n]))
         if self.plan.views_between is not None:
             self.samples.made, self.samples.unseen = total.made, total.unseen  # type: ignore[attr-defined]
         return _in_double(total.part)
@@ -362,6 +363,19 @@ class Drive:
         core, run = self._core_and_run(beside)
         values = self.values(block, counted)
         return run(core.part(self.plan.block(self.around(block))), values)
+
+    def begin(self) -> None:
+        """Run a row of pixels of a view, so that all code is compiled."""
+        row, column = map(int, np.argwhere(self.used)[0])
+        block = replace(
+            Block.all_of(self.samples.grid.shape),
+            rows=(row, row + 1),
+            columns=(column, column + 1),
+            pixel_rows=(0, 1),
+        )
+        core = replace(self.core, raster_shape=(1, 1)) if self.plan.by_rays else self.core
+        values = self.values(block, Counted(None, 0))
+        self.runner(core.part(self.plan.block(self.around(block))), values, threads=self.threads)
 
     def around(self, block: Block) -> Block:
         """What runs with a block: of those that are read, a border of views where it has neighbours, too."""
@@ -432,6 +446,10 @@ def _share_of(sent: Sent, asked: tuple[Block, int]) -> Share:
     drive = Drive(sent.plan, sent.samples, sent.how)
     part = drive.part(*asked, Counted(None, 0))
     return Share(part, getattr(drive.samples, "made", 0), getattr(drive.samples, "unseen", 0))
+
+
+def _begun(sent: Sent, _: None) -> None:
+    Drive(sent.plan, sent.samples, sent.how).begin()
 
 
 def _sum_of_shares(one: Share, other: Share) -> Share:

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import pickle
 import platform
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial, reduce
 from queue import Empty, SimpleQueue
@@ -36,6 +37,22 @@ TAKEN, LIBRARIES = 0.7, 4e8
 libraries and compiled code take of that."""
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Work:
+    """What is done with each item.
+
+    Args:
+        function: of a module; called with ``shared`` and an item.
+        shared: what can be pickled; sent once to each process of a cluster, with each task to those of a pool.
+        first: of a module; called with ``shared`` and None before anything else begins, once on each machine of a
+            cluster, and here for a pool: so that what has to be compiled is compiled once. None for nothing.
+    """
+
+    function: Function
+    shared: Any
+    first: Function | None = None
+
+
 class Crew(Protocol):
     """Who does the work. An executor that `crew` was given stays the caller's: nobody here shuts it down."""
 
@@ -49,12 +66,11 @@ class Crew(Protocol):
         """Bytes of memory that each of these may take; None where nobody says."""
         ...
 
-    def each(self, function: Function, shared: Any, items: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
         """What a function gives for each item.
 
         Args:
-            function: of a module; called with ``shared`` and an item.
-            shared: what can be pickled; sent once to each process of a cluster, with each task to those of a pool.
+            work: what is to be done.
             items: what can be pickled.
 
         Yields:
@@ -66,15 +82,12 @@ class Crew(Protocol):
         """
         ...
 
-    def summed(
-        self, function: Function, shared: Any, items: Sequence[Any], add: Add, told: Callable[[int], None]
-    ) -> Any:
+    def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
         """The sum of what a function gives for each item, by the tree of `Tree`.
 
         Args:
-            function: as in `each`.
-            shared: as in `each`.
-            items: as in `each`; one at least.
+            work: what is to be done.
+            items: what can be pickled; one at least.
             add: of a module; adds two results.
             told: called with the number of each item that is done.
 
@@ -211,7 +224,7 @@ class _Sum:
     value: Any = None
 
 
-def _finished(futures: Sequence[Any], alive: Callable[[], None]) -> Iterator[int]:
+def _finished(futures: Sequence[Any], alive: Callable[[], None]) -> Generator[int, None, None]:
     """The numbers of futures as they finish; somebody looks now and then whether there is any hope."""
     done: SimpleQueue[int] = SimpleQueue()
     for number, future in enumerate(futures):
@@ -249,11 +262,13 @@ class Pool:
         """As Python's own pools say it; 1 of others."""
         return int(getattr(self._executor, "_max_workers", 1))
 
-    def each(self, function: Function, shared: Any, items: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
         """See `Crew.each`."""
-        parcel, futures = Parcel.of(shared), []
+        parcel, futures = Parcel.of(work.shared), []
+        if work.first is not None:
+            perform(None, work.first, parcel)
         try:
-            futures += [self._submit(function, parcel, item) for item in items]
+            futures += [self._submit(work.function, parcel, item) for item in items]
             for number in _finished(futures, lambda: None):
                 result = self._result(futures[number])
                 futures[number] = None  # so that nobody keeps it
@@ -263,14 +278,13 @@ class Pool:
                 if future is not None:
                     future.cancel()
 
-    def summed(
-        self, function: Function, shared: Any, items: Sequence[Any], add: Add, told: Callable[[int], None]
-    ) -> Any:
+    def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
         """See `Crew.summed`; what comes is added here."""
         tree = Tree(len(items), add)
-        for number, result in self.each(function, shared, items):
-            tree.put(number, result)
-            told(number)
+        with closing(self.each(work, items)) as results:
+            for number, result in results:
+                tree.put(number, result)
+                told(number)
         return tree.total
 
     def _submit(self, function: Function, parcel: Parcel, item: Any) -> Any:
@@ -339,9 +353,9 @@ class Cluster:
         ]
         return min(rooms, default=None)
 
-    def each(self, function: Function, shared: Any, items: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
         """See `Crew.each`."""
-        futures = self._mapped(function, shared, items)
+        futures = self._mapped(work, items)
         try:
             for number in _finished(futures, self._look):
                 result = self._result(futures[number])
@@ -350,11 +364,9 @@ class Cluster:
         finally:
             self._cancel(futures)
 
-    def summed(
-        self, function: Function, shared: Any, items: Sequence[Any], add: Add, told: Callable[[int], None]
-    ) -> Any:
+    def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
         """See `Crew.summed`; what comes is added where it is, and one sum comes here."""
-        futures = self._mapped(function, shared, items)
+        futures = self._mapped(work, items)
         total = self._tree(futures, add)
         try:
             for number in _finished(futures, self._look):
@@ -367,12 +379,29 @@ class Cluster:
         finally:
             self._cancel([*futures, total])
 
-    def _mapped(self, function: Function, shared: Any, items: Sequence[Any]) -> list[Any]:
-        parcel = self._client.submit(_kept, Parcel.of(shared), pure=False)
+    def _mapped(self, work: Work, items: Sequence[Any]) -> list[Any]:
+        parcel = self._client.submit(_kept, Parcel.of(work.shared), pure=False)
+        if work.first is not None:
+            self._begin(work.first, parcel)
+        tasks = {"pure": False, "retries": RETRIES}
+        return list(self._client.map(perform, items, function=work.function, parcel=parcel, **tasks))
+
+    def _begin(self, first: Function, parcel: Any) -> None:
+        """What is done once on each machine, or when the first worker comes."""
         if not self.places:
             warn_of_result(f"the Dask scheduler {self._address} has no workers yet: work begins when one comes")
-        tasks = {"pure": False, "retries": RETRIES}
-        return list(self._client.map(perform, items, function=function, parcel=parcel, **tasks))
+        workers = self._client.scheduler_info()["workers"]
+        machines = {worker["host"]: address for address, worker in workers.items()}
+        tasks = {"pure": False, "retries": RETRIES, "allow_other_workers": True}
+        futures = [
+            self._client.submit(perform, None, function=first, parcel=parcel, workers=address, **tasks)
+            for address in machines.values() or [None]
+        ]
+        try:
+            for number in _finished(futures, self._look):
+                self._result(futures[number])
+        finally:
+            self._cancel(futures)
 
     def _tree(self, futures: Sequence[Any], add: Add) -> Any:
         level = 0

@@ -1,0 +1,111 @@
+"""Who runs the blocks of a light field, as one asks for it on the command line."""
+
+import multiprocessing
+import signal
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from cyclopts import Parameter
+
+from vcc.base import checks
+from vcc.base.errors import InputError
+from vcc.cli.options import MAKING
+from vcc.plan.how import cores
+from vcc.store import is_store
+
+DASK = "dask://"
+CONNECTING = 10.0
+"""Seconds in which a scheduler answers."""
+
+
+@Parameter(name="*", group=MAKING)
+@dataclass(frozen=True, kw_only=True)
+class Executing:
+    """Who runs the blocks of a light field.
+
+    Args:
+        executor: Of a light field in a store: who reads and runs its blocks. `processes` or `threads`, one for
+            each core of this machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task takes one
+            thread and a memory limit of its own. Default: one block after the other, each by all cores.
+    """
+
+    executor: str | None = None
+
+    def check(self, light_field: Path) -> None:
+        """Refuse what does not go together, before the light field is read.
+
+        Raises:
+            InputError: no such executor, or a light field that is not in a store.
+        """
+        if self.executor is None:
+            return
+        if self.executor not in ("processes", "threads") and not self.executor.startswith(DASK):
+            raise InputError(f'--executor is processes, threads or "{DASK}host:8786", not {self.executor!r}')
+        if not is_store(light_field):
+            raise InputError(
+                f"--executor is for light fields in stores, whose blocks each reads for itself, and {light_field} "
+                f"is none: vcc convert {light_field} scene.zarr makes one; or leave --executor out"
+            )
+
+    @contextmanager
+    def opened(self) -> Iterator[Any]:
+        """The executor while it is needed; None where none is asked for.
+
+        Raises:
+            InputError: Dask is not installed, or its scheduler does not answer.
+        """
+        if self.executor is None:
+            yield None
+        else:
+            kinds = {"threads": _threads, "processes": _processes}
+            opened = kinds.get(self.executor) or partial(_client, self.executor.removeprefix(DASK))
+            with opened() as executor:
+                yield executor
+
+
+@contextmanager
+def _threads() -> Iterator[Any]:
+    pool = ThreadPoolExecutor(cores())
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _processes() -> Iterator[Any]:
+    pool = ProcessPoolExecutor(cores(), multiprocessing.get_context("spawn"), _leave_interrupts)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in multiprocessing.active_children():  # what they are at is no longer wanted
+            process.terminate()
+        raise
+    else:
+        pool.shutdown()
+
+
+def _leave_interrupts() -> None:
+    """Ctrl-C reaches all processes of a terminal: the first of them ends the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    with checks.package("--executor dask://…", "distributed", "cluster"):
+        from distributed import Client
+    try:
+        client = Client(f"tcp://{address}", timeout=CONNECTING, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no Dask scheduler answers at {address} ({error}): start one with dask scheduler, and workers with "
+            f"dask worker {address}"
+        ) from error
+    with client:
+        yield client

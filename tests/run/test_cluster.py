@@ -1,0 +1,165 @@
+"""Blocks run by a Dask cluster: the same bytes, a worker that is killed loses nothing, what is lost is told.
+
+One cluster of two processes for all of them.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import vcc
+from tests.run.test_executors import CAMERAS, in_blocks, light_field, stored  # noqa: F401  # fixtures
+from vcc.run import executors
+from vcc.run.executors import Tree, Work, crew
+
+distributed = pytest.importorskip("distributed")
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore:Port .* is already in use"),
+]
+
+
+@pytest.fixture(scope="module")
+def client():
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, memory_limit="2GB", dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """Samples whose reader is killed, once for each of some rows of views.
+
+    Args:
+        samples: that are read else.
+        rows: of views.
+        folder: of marks: who was killed before is spared.
+    """
+
+    samples: object
+    rows: tuple[int, ...]
+    folder: Path
+
+    grid = property(lambda self: self.samples.grid)
+    stored_bytes = 0
+
+    def whole(self):
+        return None
+
+    def check_complete(self):
+        pass
+
+    def read(self, block):
+        mark = self.folder / str(block.rows[0])
+        if block.rows[0] in self.rows and not mark.exists():
+            mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return self.samples.read(block)
+
+
+def test_what_workers_lack_is_told(client, stored):  # noqa: F811
+    assert crew(client).places == 2
+    assert crew(client).room == pytest.approx(0.7 * 2e9 - 4e8, rel=1e-3)
+    with pytest.raises(
+        vcc.InputError, match=r"has 1000 MB for each task, .* and 1500 MB are asked for: give workers"
+    ):
+        CAMERAS["fine mask"][0].capture(stored, executor=client, memory_limit=1_500_000_000)
+    with pytest.raises(vcc.InputError, match=r"have no vcc\.other: install version"):
+        list(crew(client).each(Work(lacking, None), [0]))
+
+
+def lacking(*_):
+    raise ModuleNotFoundError("No module named 'vcc.other'", name="vcc.other")
+
+
+def test_a_cluster_makes_the_same_picture_though_a_worker_is_killed(client, stored, in_blocks, tmp_path):  # noqa: F811
+    camera, _ = CAMERAS["fine mask"]
+    calls: list[tuple[int, int]] = []
+    here = camera.capture(stored)
+    found = camera.capture(stored, executor=client, progress=lambda *call: calls.append(call))
+    assert found.values.tobytes() == here.values.tobytes()
+    assert calls[-1] == (16, 16)
+    before = set(client.nthreads())
+    deadly = Deadly(stored, (3,), tmp_path)
+    assert camera.capture(deadly, executor=client).values.tobytes() == here.values.tobytes()
+    assert (tmp_path / "3").exists()
+    assert set(client.nthreads()) != before
+
+
+def test_sums_are_those_of_the_tree_and_results_come_with_their_numbers(client):
+    tree = Tree(70, joined)
+    for number in range(70):
+        tree.put(number, f"{number}!")
+    told: list[int] = []
+    assert crew(client).summed(Work(marked, "!"), range(70), joined, told.append) == tree.total
+    assert sorted(told) == list(range(70))
+    assert sorted(crew(client).each(Work(marked, "?"), "abc")) == [(0, "a?"), (1, "b?"), (2, "c?")]
+
+
+def marked(mark, item):
+    return f"{item}{mark}"
+
+
+def joined(one, other):
+    return f"({one}+{other})"
+
+
+def test_a_view_that_is_missing_is_named(client, tmp_path, monkeypatch):
+    given = vcc.store.save_store(light_field(), tmp_path / "a.zarr")
+    given.view_file(2, 3).unlink()
+    monkeypatch.setattr(type(given), "check_complete", lambda _: None)
+    with pytest.raises(vcc.InputError, match=r"view \(2, 3\) is missing"):
+        CAMERAS["fine mask"][0].capture(given, executor=client)
+
+
+def test_a_task_that_kills_all_workers_is_told(client):
+    client.cluster.scheduler.allowed_failures = 0
+    with pytest.raises(vcc.InputError, match=r"ended each of the workers that took it.* Pass memory_limit="):
+        list(crew(client).each(Work(kill, None), [0]))
+
+
+def kill(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.parametrize("ends", ["scheduler", "interrupt"])
+def test_work_whose_scheduler_is_lost_ends_with_an_error_and_ctrl_c_cancels(ends, monkeypatch):
+    """Threads instead of processes, as nothing is computed."""
+    monkeypatch.setattr(executors, "LOOK", 0.05)
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster.scheduler_address, set_as_default=False, timeout=0.1) as client,
+    ):
+
+        def told(number):
+            if ends == "interrupt":
+                raise KeyboardInterrupt
+            cluster.close()
+
+        expected, words = {
+            "interrupt": (KeyboardInterrupt, None),
+            "scheduler": (vcc.InputError, "connection to the Dask scheduler inproc.* was lost"),
+        }[ends]
+        with pytest.raises(expected, match=words):
+            crew(client).summed(Work(sleep, None), range(100), joined, told)
+    with pytest.raises(vcc.InputError, match="connect anew"):
+        crew(client)
+
+
+def sleep(_, item):
+    time.sleep(0.02)
+    return str(item)
