@@ -30,15 +30,25 @@ CAMERA = {
 }
 
 
+def light_field():
+    """The demo's scene, small."""
+    return demo_scene().light_field(
+        (3, 3), (60, 80), spacing=6 * mm, slope_per_pixel=0.25 / 52, focus_distance=1.3
+    )
+
+
 class Served:
     """A server that can go and come back at the same address."""
 
     def __init__(self) -> None:
-        light_field = demo_scene().light_field(
-            (3, 3), (60, 80), spacing=6 * mm, slope_per_pixel=0.25 / 52, focus_distance=1.3
-        )
         self.offered = Offered(
-            {"scene": Field(light_field)}, Document(CAMERA, "scene"), Beside(Path(), frozenset())
+            {
+                "scene": Field(
+                    light_field(), "from tests.bench.browser import light_field\n\nlight_field = light_field()"
+                )
+            },
+            Document(CAMERA, "scene"),
+            Beside(Path(), frozenset()),
         )
         self.port = 0
 

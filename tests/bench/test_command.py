@@ -9,6 +9,7 @@ import pytest
 import vcc
 from tests.bench.on_bench import PIXELS, Client, noise
 from tests.command_line import KNOWN, refused, run, write_views
+from vcc.bench import cameras
 from vcc.bench.cameras import SCENE
 from vcc.cli import bench as command
 
@@ -92,6 +93,15 @@ def test_without_anything_it_is_a_lens_before_the_scene(offered):
     assert len(there.gallery) >= 5
     for document in there.gallery.values():
         document.train(there.beside)
+
+
+def test_the_program_of_the_scene_makes_the_same_views(monkeypatch):
+    monkeypatch.setattr(cameras, "VIEWS", 2)
+    monkeypatch.setattr(cameras, "PIXELS", 24)
+    field, made = cameras.scene(), {}
+    exec(field.source, made)
+    assert np.array_equal(made["light_field"].values, field.whole().values)
+    assert made["light_field"].frame == field.whole().frame
 
 
 def test_what_is_not_there_is_refused(offered, files):

@@ -1,12 +1,15 @@
 """The bench in headless Chromium: by mouse, keys and typing, in two windows, without a server."""
 
 import json
+import runpy
 import tomllib
+import warnings
 import zipfile
 from pathlib import Path
 
 import pytest
 
+import vcc
 from tests.bench.browser import AXE, Page, Served, chromium
 
 
@@ -239,6 +242,39 @@ def test_camera_and_film_are_taken_away(page):
         page.button("Make the film").click()
     assert Path(taken.value.path()).read_bytes().startswith(b"GIF8")
     assert page.place("sensor") == "52 mm"
+
+
+def test_program_that_is_taken_away_makes_the_identical_picture(page, tmp_path, monkeypatch):
+    page.page.locator("#sensor-z").fill("53 mm")
+    page.page.keyboard.press("Enter")
+    page.settle()
+    for button, name in (("Python program", "program.zip"), ("Picture (PNG)", "wanted.png")):
+        page.page.get_by_text("Export").click()
+        with page.page.expect_download() as taken:
+            page.page.get_by_role("button", name=button).click()
+        taken.value.save_as(tmp_path / name)
+    program = tmp_path / "program.zip"
+    if zipfile.is_zipfile(program):
+        zipfile.ZipFile(program).extractall(tmp_path)
+    else:
+        program.rename(tmp_path / "picture.py")
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.ResultWarning)  # of rays that are missing
+        runpy.run_path("picture.py")
+    assert (tmp_path / "picture.png").read_bytes() == (tmp_path / "wanted.png").read_bytes()
+
+
+def test_neighbours_trade_places_by_their_buttons(page):
+    page.page.get_by_role("tab", name="mask code").click()
+    assert page.button("Move behind the one behind it").is_disabled()
+    page.button("Move before the one before it").click()
+    page.wait_for_place(1, "0 mm")
+    assert page.place(0) == "26 mm"
+    assert page.button("Move before the one before it").is_disabled()
+    page.button("Undo").click()
+    page.wait_for_place(1, "26 mm")
+    assert page.place(0) == "0 mm"
 
 
 def test_click_focuses_where_it_was_clicked(page):

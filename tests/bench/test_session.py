@@ -4,6 +4,7 @@ import dataclasses
 import io
 import json
 import runpy
+import tempfile
 import threading
 import time
 import warnings
@@ -515,6 +516,56 @@ def test_a_film_of_a_sweep(client):
     # 256 colours are dithered: the mean is that of the picture
     assert last.mean() == pytest.approx(codes(values, white).mean(), abs=2)
     assert client.session.document == START
+
+
+@pytest.mark.parametrize("shape", [(24, 26), (23, 25)])
+def test_a_film_as_mp4_tells_how_far_it_is_and_leaves_no_file(client, shape, tmp_path, monkeypatch):
+    av = pytest.importorskip("av", reason="the extra video is not installed")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    client.do("set", where=["sensor", "shape"], value=list(shape))
+    client.at_rest()
+    sweep = {"where": ["sensor", "z"], "from": "50 mm", "to": "54 mm", "frames": 4, "there_and_back": False}
+    client.do("export", what="film", format="mp4", frames_per_second=10, **sweep)
+    told = []
+    while (told and told[-1][0]["is"]) != "file":
+        told.append(client.until("progress", "file"))
+        assert told[-1][0]["is"] != "refused"
+    assert [message["done"] for message, _ in told[:-1]] == [0, 1, 2, 3, 4]
+    message, (data,) = told[-1]
+    assert (message["name"], message["type"]) == ("film.mp4", "video/mp4")
+    with av.open(io.BytesIO(data)) as film:
+        frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+        assert film.streams.video[0].average_rate == 10
+    assert len(frames) == 4
+    assert frames[0].shape[:2] == (24, 26)  # H.264 has pairs of rows and columns: the last is there twice
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.ResultWarning)  # of rays that are missing
+        values = [
+            camera_of(client.session.document.changed(["sensor", "z"], z)).capture(noise()).to_numpy()
+            for z in ("50 mm", "54 mm")
+        ]
+    white = client.session._shown_white
+    for frame, each in zip((frames[0], frames[-1]), values, strict=True):
+        # H.264 at this quality, with a colour for four pixels: means within some codes
+        assert frame[: shape[0], : shape[1]].mean() == pytest.approx(codes(each, white).mean(), abs=4)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("ending", ["gif", "mp4"])
+def test_a_film_that_is_broken_off_leaves_nothing(client, ending, tmp_path, monkeypatch):
+    if ending == "mp4":
+        pytest.importorskip("av", reason="the extra video is not installed")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    client.do("hello")
+    client.at_rest()
+    sweep = {"where": ["sensor", "z"], "from": "50 mm", "to": "54 mm", "frames": 200}
+    client.do("export", what="film", format=ending, **sweep)
+    while client.until("progress")[0]["done"] < 2:
+        pass
+    client.do("set", where=["sensor", "z"], value="53 mm", turn=9)
+    assert "broken off" in client.until("refused", "file")[0]["words"]
+    assert client.at_rest()["turn"] == 9
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def cameras(light_field: str) -> dict[str, Document]:
 def scene() -> Field:
     """The demo's scene before a lens of 50 mm, made when it is first looked at."""
     source = (
-        "from vcc.demo.scene import demo_scene\n\n"
+        "from vcc.showcase.scene import demo_scene\n\n"
         f"light_field = demo_scene().light_field(\n    ({VIEWS}, {VIEWS}),\n    ({PIXELS}, {PIXELS}),\n"
         f"    spacing={APERTURE / VIEWS!r},\n    slope_per_pixel={WIDE / PIXELS / IMAGE!r},\n"
         f"    focus_distance={MIDDLE!r},\n)"
