@@ -54,6 +54,24 @@ def test_sensor_is_dragged_and_picture_follows_and_undo_takes_it_back(page):
     page.wait_for_place("sensor", dragged)
 
 
+def test_of_a_hundred_moves_at_once_one_is_sent_and_after_its_picture_the_last(page):
+    sent = page.page.evaluate(
+        """() => {
+            const { bench } = document.querySelector("vcc-bench");
+            const before = bench.turn;
+            for (let number = 1; number <= 100; number++)
+                bench.set(["sensor", "z"], `${52 + number / 100} mm`, true);
+            return [before, bench.turn];
+        }"""
+    )
+    assert sent[1] == sent[0] + 1
+    page.wait_for_place("sensor", "53 mm")
+    page.page.wait_for_function(
+        "turn => document.querySelector('vcc-bench').bench.picture.about.turn === turn", arg=sent[1] + 1
+    )
+    assert page.page.evaluate("document.querySelector('vcc-bench').bench.turn") == sent[1] + 1
+
+
 def test_drag_is_pulled_to_where_the_scene_is_sharp(page):
     x, y = page.middle("sensor")
     page.page.mouse.move(x, y)

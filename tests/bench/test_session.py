@@ -189,22 +189,37 @@ def test_of_what_moves_only_the_newest_counts(client):
     assert client.session.document == START
 
 
-def test_while_something_moves_few_pictures_are_made_and_the_last_comes_soon(client):
-    """Each picture is held up: those that were asked for meanwhile are never made."""
+def test_of_a_hundred_moves_the_one_under_way_and_the_last_become_pictures(client):
+    """A picture under way is not broken off by what moves on; what is passed over meanwhile is never made."""
     client.do("hello")
     client.at_rest()
-    turn = client.session.offered.turn
-    with turn.held():
-        for number in range(100):
-            client.do(
-                "set", where=["sensor", "z"], value=f"{52 + number / 50:.2f} mm", moving=True, turn=number + 1
-            )
-            time.sleep(0.001)
+    moves = [
+        {"where": ["sensor", "z"], "value": f"{52 + number / 50:.2f} mm", "moving": True, "turn": number}
+        for number in range(1, 101)
+    ]
+    with client.session.offered.turn.held():
+        client.do("set", **moves[0])
+        client.until("state")
+        for move in moves[1:]:
+            client.do("set", **move)
         client.do("value", x=0, y=0)
     turns = []
     while not turns or turns[-1] != 100:
         turns.append(client.until("picture")[0]["turn"])
-    assert len(turns) <= 3
+    assert turns == [1, 100]
+    assert client.session.document.train(NOWHERE).train.sensor.z == pytest.approx(54e-3)
+
+
+def test_letting_go_breaks_off_the_picture_of_a_place_on_the_way(client):
+    client.do("hello")
+    client.at_rest()
+    with client.session.offered.turn.held():
+        client.do("set", where=["sensor", "z"], value="52.5 mm", moving=True, turn=1)
+        client.until("state")
+        client.do("set", where=["sensor", "z"], value="53 mm", turn=2)
+        client.until("state")
+    message, _ = client.until("picture")
+    assert (message["turn"], message["moving"]) == (2, False)
 
 
 def test_who_sends_too_much_is_not_listened_to(client):
@@ -358,13 +373,31 @@ def test_the_pace_is_kept_for_each_kind_of_camera():
     assert pace.fineness("slow") == COARSER[0]
     pace.noted("slower", WHOLE, timed(taken, 100.0))
     assert pace.fineness("slower") == COARSER[-1]
-    for _ in range(60):
+    for _ in range(500):  # 0.98⁵⁰⁰ · 100 s = 4 ms
         pace.noted("slower", COARSER[-1], timed(taken, 1e-4))
     assert pace.fineness("slower") == WHOLE
+    # four times the pixels are four times the run, but one plan: 20 + 4·4 ms are too long, and 20 + 4·2 ms are not
+    for run, finest in ((0.004, COARSER[-1]), (0.002, COARSER[0])):
+        pace.noted(run, COARSER[-1], timed(taken, 0.02 + run, planning=0.02))
+        assert pace.fineness(run) == finest
 
 
-def timed(taken, seconds):
-    return Taken(taken.image, None, taken.plan, taken.found, False, seconds)
+def test_a_first_picture_for_which_kernels_were_compiled_does_not_keep_those_after_it_coarse():
+    pace, taken = Pace(), take(START.train(NOWHERE).train, Field(noise()), START)
+    pace.noted("lens", COARSER[0], timed(taken, 5.0))
+    assert pace.fineness("lens") == COARSER[-1]
+    pace.noted("lens", WHOLE, timed(taken, 0.05))
+    assert pace.fineness("lens").pixels == 2
+    assert pace.seconds("lens") == 0.05
+    # what turns out too slow, although its share of the whole is quick enough, is left for a while
+    for _ in range(5):
+        pace.noted("lens", COARSER[0], timed(taken, 0.05))
+        pace.noted("lens", COARSER[1], timed(taken, 0.05))
+    assert pace.fineness("lens") == COARSER[-1]
+
+
+def timed(taken, seconds, planning=0.0):
+    return Taken(taken.image, None, taken.plan, taken.found, False, seconds, planning)
 
 
 @pytest.mark.parametrize("fineness", COARSER)

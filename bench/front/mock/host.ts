@@ -196,7 +196,7 @@ export class MockHost implements Host {
     const bytes = await this.jpeg(moving);
     const [rows, columns] = this.document.camera.sensor["shape"] as [number, number];
     this.onmessage({
-      is: "picture", turn, coarse: moving, shape: [rows, columns], white: this.document.exposure ?? 1, missing: 0.012,
+      is: "picture", turn, coarse: moving, moving, shape: [rows, columns], white: this.document.exposure ?? 1, missing: 0.012,
       took: performance.now() - began, psnr: this.pinned ? 31.4 : null,
     }, [bytes]);
     if (!moving) this.onmessage({ is: "notes", turn, notes: [{ element: 1, words: "The mask's cells are finer than the light field can show: ghosts appear behind it." }] }, []);

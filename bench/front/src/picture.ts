@@ -41,6 +41,8 @@ export class PictureView extends Part {
   private gesture: "pan" | "wipe" | null = null;
   private travelled = 0;
   private asked: PictureMessage | null = null;
+  /** What the canvas shows: what looks the same is not drawn again, while other things move. */
+  private drawn: unknown[] = [];
   private readonly scratch = document.createElement("canvas");
   private readonly watch = new ResizeObserver(([entry]) => {
     this.width = entry!.contentRect.width;
@@ -250,15 +252,21 @@ export class PictureView extends Part {
     this.askAgain();
     const { canvas } = this;
     const sharp = window.devicePixelRatio || 1;
+    const now = this.bench.picture?.bitmap;
+    const pinned = this.bench.pinned;
+    const shows = [
+      now, pinned, this.mode, this.wipe, this.width, this.height, sharp, ...this.shape, this.unit, this.middle.x, this.middle.y,
+      this.at?.x, this.at?.y, this.matchesFocus(),
+    ];
+    if (shows.every((each, number) => each === this.drawn[number])) return;
+    this.drawn = shows;
     const [wide, high] = [Math.round(this.width * sharp), Math.round(this.height * sharp)];
     if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
     const context = canvas.getContext("2d")!;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, wide, high);
     context.setTransform(sharp, 0, 0, sharp, 0, 0);
-    const now = this.bench.picture?.bitmap;
     if (!now || !this.width) return;
-    const pinned = this.bench.pinned;
     if (this.mode === "alone" || !pinned) this.put(context, now, 0, this.width);
     else if (this.mode === "beside") {
       this.put(context, pinned, 0, this.paneWidth - 1);
@@ -293,7 +301,7 @@ export class PictureView extends Part {
     context.rect(left, 0, width, this.height);
     context.clip();
     context.imageSmoothingEnabled = this.unit < 2;
-    context.imageSmoothingQuality = "high";
+    context.imageSmoothingQuality = this.bench.picture?.about.moving ? "low" : "high";
     context.drawImage(image, origin + corner.x, corner.y, columns * this.unit, rows * this.unit);
     context.restore();
   }

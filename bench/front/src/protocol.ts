@@ -145,6 +145,8 @@ export interface PictureMessage {
   is: "picture";
   turn: number;
   coarse: boolean;
+  /** Whether it was made while something moves. */
+  moving: boolean;
   shape: [number, number];
   white: number;
   missing: number;

@@ -23,8 +23,9 @@ from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
-from vcc.plan.how import How
 from vcc.plan.model import Plan
+from vcc.plan.rays.compile import DEFAULT_SAMPLES
+from vcc.plan.rays.model import Rays
 from vcc.recording import Recording, recorded
 from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
@@ -35,10 +36,12 @@ IN_TIME = 0.03
 """Seconds that a picture may take while something moves: a coarser one is made where a finer takes longer."""
 RECENT = 0.4
 """How much the last picture counts in what the next is expected to take."""
+FORGOTTEN = 0.98
+"""Of what a finer picture took, with each coarser one: after some 35 it is thought to take half as long."""
 MOST_KINDS = 50
 """Of cameras whose time is remembered."""
-RAYS = 64
-"""A pixel, in a whole picture."""
+FEWEST_RAYS = 2
+"""Through a window or a cell, by which a run tells how far they differ."""
 SHADES = 4096
 """Of linear light, told apart in pictures for the screen."""
 QUALITY = {False: 95, True: 75}
@@ -49,26 +52,26 @@ SUBSAMPLING = {False: "444", True: "420"}
 
 @dataclass(frozen=True)
 class Fineness:
-    """How much of the light field and of the sensor a picture is made of.
+    """How much of the light field and of the sensor a picture is made of: all views, always.
+
+    With fewer views what is out of focus would fall apart into copies that are not in the whole picture.
 
     Args:
-        views: every so-many-th view, each way.
         pixels: of sensor and views, so many each way are one.
         rays: a pixel, where rays are traced; None takes as many as always.
     """
 
-    views: int
     pixels: int
     rays: int | None
 
     def share(self, by_rays: bool) -> float:
-        """About how much of the work of a whole picture it is."""
-        rays = 1.0 if self.rays is None else self.rays / RAYS
-        return rays / self.pixels**2 if by_rays else 1 / (self.views * self.pixels) ** 2
+        """About how much of the work of a whole picture it is, at most."""
+        rays = self.rays / DEFAULT_SAMPLES if by_rays and self.rays is not None else 1.0
+        return rays / self.pixels**2
 
 
-WHOLE = Fineness(1, 1, None)
-COARSER = (Fineness(1, 2, 16), Fineness(2, 2, 8), Fineness(2, 4, 4))
+WHOLE = Fineness(1, None)
+COARSER = (Fineness(2, 16), Fineness(2, 4), Fineness(4, 8))
 """What is made in time, finest first."""
 
 
@@ -81,8 +84,9 @@ class Taken(Brief):
         recording: by the sensor's electronics; None without noise.
         plan: by which it was made.
         found: what the run told.
-        coarse: whether fewer views, pixels or rays were taken.
+        coarse: whether fewer pixels or rays were taken.
         seconds: that it took.
+        planning: seconds of these until the plan was there.
     """
 
     image: Image
@@ -91,6 +95,7 @@ class Taken(Brief):
     found: Recorded
     coarse: bool
     seconds: float
+    planning: float
 
     @property
     def values(self) -> Picture:
@@ -100,10 +105,15 @@ class Taken(Brief):
 
 
 class Pace:
-    """How fine a picture may be to be there in time, by what those before of the same kinds of elements took."""
+    """How fine a picture may be to be there in time, by what those before of the same kinds of elements took.
+
+    What was not made yet is expected to take the time of others for its plan, and its share of theirs for its run.
+    What a picture took is forgotten where a finer one takes less, as kernels were compiled for the first; and it
+    is thought to be a little less with each coarser one, so that it is tried again when the machine was busy.
+    """
 
     def __init__(self) -> None:
-        self._whole: dict[Hashable, tuple[float, bool]] = {}
+        self._kept: dict[Hashable, _Kept] = {}
 
     def noted(self, of: Hashable, fineness: Fineness, taken: Taken) -> None:
         """A picture took so long.
@@ -113,24 +123,56 @@ class Pace:
             fineness: of the picture.
             taken: the picture.
         """
-        whole = taken.seconds / fineness.share(taken.plan.by_rays)
-        before = self._whole.pop(of, None)
-        if before is not None and before[1] == taken.plan.by_rays:
-            whole = (1 - RECENT) * before[0] + RECENT * whole
-        self._whole[of] = (whole, taken.plan.by_rays)
-        if len(self._whole) > MOST_KINDS:
-            del self._whole[next(iter(self._whole))]
+        kept = self._kept.pop(of, None)
+        if kept is None or kept.by_rays != taken.plan.by_rays:
+            kept = _Kept(taken.plan.by_rays, {})
+        share = fineness.share(kept.by_rays)
+        before = kept.took.get(share, (taken.planning, taken.seconds))
+        kept.took[share] = (
+            (1 - RECENT) * before[0] + RECENT * taken.planning,
+            (1 - RECENT) * before[1] + RECENT * taken.seconds,
+        )
+        for other, (planning, seconds) in list(kept.took.items()):
+            if other > share:
+                kept.took[other] = planning, seconds * FORGOTTEN
+            elif other < share and seconds > taken.seconds:
+                del kept.took[other]
+        self._kept[of] = kept
+        if len(self._kept) > MOST_KINDS:
+            del self._kept[next(iter(self._kept))]
 
     def seconds(self, of: Hashable) -> float | None:
         """How long a whole picture is expected to take; None where none was made yet."""
-        return self._whole[of][0] if of in self._whole else None
+        return self._kept[of].expected(WHOLE) if of in self._kept else None
 
     def fineness(self, of: Hashable) -> Fineness:
         """The finest that is expected in time; the coarsest where none is."""
-        if of not in self._whole:
+        if of not in self._kept:
             return COARSER[0]
-        whole, by_rays = self._whole[of]
-        return next((each for each in (WHOLE, *COARSER) if whole * each.share(by_rays) <= IN_TIME), COARSER[-1])
+        kept = self._kept[of]
+        return next((each for each in (WHOLE, *COARSER) if kept.expected(each) <= IN_TIME), COARSER[-1])
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What pictures of one kind took.
+
+    Args:
+        by_rays: whether rays made them.
+        took: for each share of the work that was done, seconds until its plan was there, and in all.
+    """
+
+    by_rays: bool
+    took: dict[float, tuple[float, float]]
+
+    def expected(self, fineness: Fineness) -> float:
+        """Seconds that a picture is expected to take."""
+        share = fineness.share(self.by_rays)
+        if share in self.took:
+            return self.took[share][1]
+        return min(
+            planning + share / other * (seconds - planning) for other, (planning, seconds) in self.took.items()
+        )
 
 
 def light_field_of(field: Field, views: Views | None, fineness: Fineness, progress: Progress | None) -> LightField:
@@ -140,18 +182,10 @@ def light_field_of(field: Field, views: Views | None, fineness: Fineness, progre
         InputError: views that it does not have, or a light field that cannot be opened.
     """
     chosen = field.with_pixels_of(fineness.pixels, progress)
-    if views is not None:
-        views.check(chosen.shape)
-        chosen = chosen[views.slices]
-    rows, columns = (_every(size, fineness.views) for size in chosen.shape[:2])
-    return chosen if fineness.views == 1 else chosen[rows, columns]
-
-
-def _every(size: int, step: int) -> slice:
-    """Every so-many-th of a row of views, the same distance from both ends."""
-    count = (size - 1) // step + 1
-    first = (size - 1 - (count - 1) * step) // 2
-    return slice(first, first + (count - 1) * step + 1, step)
+    if views is None:
+        return chosen
+    views.check(chosen.shape)
+    return chosen[views.slices]
 
 
 def coarser_sensor(train: Train, step: int) -> Train:
@@ -185,8 +219,9 @@ def take(
     light_field = document.aperture.placed(light_field_of(field, document.views, fineness, progress))
     camera = train if fineness.pixels == 1 else coarser_sensor(train, fineness.pixels)
     plan = compile_best(camera, light_field.grid)
-    if plan.by_rays and fineness.rays is not None:
-        plan = compile_best(camera, light_field.grid, How(samples=fineness.rays))
+    if fineness.rays is not None and isinstance(plan.core, Rays):
+        plan = _with_fewer_rays(plan, plan.core, fineness.rays)
+    planning = time.perf_counter() - began
     found = drive(plan, light_field, None, progress)
     image = Image(found.values, camera.sensor.frame, found.missing_rays, found.sampling_error, camera=camera)
     recording = None
@@ -196,7 +231,13 @@ def take(
         recording = recorded(image, exposure)
         filtered = recording.electronics.color_filter is not None
         image = recording.demosaiced("bilinear") if filtered else recording.image()
-    return Taken(image, recording, plan, found, fineness != WHOLE, time.perf_counter() - began)
+    return Taken(image, recording, plan, found, fineness != WHOLE, time.perf_counter() - began, planning)
+
+
+def _with_fewer_rays(plan: Plan, core: Rays, rays: int) -> Plan:
+    """A plan with fewer rays, that look at views as they are: sharper ones would only show the noise of so few."""
+    fewer = max(core.samples * rays // DEFAULT_SAMPLES, FEWEST_RAYS)
+    return replace(plan, core=core.more(fewer), before=())
 
 
 # --- for a screen ---

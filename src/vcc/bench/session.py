@@ -213,8 +213,15 @@ class Session:
         self._tell({"is": "refused", "do": message["do"], "words": str(error), "where": where, "turn": turn})
 
     def _check_wanted(self) -> None:
-        """Break off what is being made where another picture is asked for, or nobody is there to see it."""
-        if self._closed or self._send is None or any(message["do"] in CHANGES for message, _ in list(self._inbox)):
+        """Break off what is being made where another picture is asked for, or nobody is there to see it.
+
+        While something moves its next place waits for the picture of this one, which is made to be quick: else who
+        moves faster than pictures are made would see none.
+        """
+        moving = self._wanted is not None and self._wanted.moving
+        waiting = [message for message, _ in list(self._inbox) if message["do"] in CHANGES]
+        gone = self._closed or self._send is None
+        if gone or any(not (moving and message.get("moving")) for message in waiting):
             raise Superseded
 
     # --- what changes the picture ---

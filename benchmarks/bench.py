@@ -1,0 +1,442 @@
+"""The optical bench: from a move of the hand to the picture on the canvas.
+
+    pip install ".[bench,test]"                # and Chromium, from the distribution's packages
+    python benchmarks/bench.py                 # about two minutes; prints Markdown
+    python benchmarks/bench.py --host          # without a browser: from a message to the picture's message
+    python benchmarks/bench.py --jupyterlab    # the widget in JupyterLab (pip install jupyterlab anywidget)
+
+``vcc bench`` runs in a process of its own, as users start it, and headless Chromium drags parts with its mouse, to
+60 places a second. Times are taken in the page: from when the browser had the input until the first task after the
+frame in which the canvas was drawn with a picture of that place or a later one. Nothing is warmed up but the
+picture that the page shows when it opens.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import os
+import platform
+import secrets
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import vcc
+from vcc.bench.carried import packed
+from vcc.bench.document import Document
+from vcc.bench.offered import Field, Offered
+from vcc.bench.session import Session
+from vcc.files.camera_reading import Beside, read_tables
+from vcc.formats.writing import save_light_field
+from vcc.showcase.scene import demo_scene
+from vcc.units import mm, um
+
+MOVES, EVERY = 240, 1 / 60
+"""Of the mouse in a drag, and seconds between them."""
+STILL = 1.0
+"""Seconds for which the hand holds still before it lets go."""
+TURNS = 100
+"""Of the host alone."""
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+WATCH = """
+(() => {
+  const bench = () => document.querySelector("vcc-bench")?.bench;
+  const seen = (window.seen = { inputs: [], drawn: [], ended: 0 });
+  let turn = -1, next = null;
+  window.addEventListener("pointermove", (event) => {
+    const now = bench();
+    if (!now || (now.turn === turn && now.next === next)) return;
+    [turn, next] = [now.turn, now.next];
+    seen.inputs.push([performance.timeOrigin + event.timeStamp, turn + (next ? 1 : 0)]);
+  });
+  window.addEventListener("pointerup", (event) => { seen.ended = performance.timeOrigin + event.timeStamp; });
+  const draw = CanvasRenderingContext2D.prototype.drawImage;
+  CanvasRenderingContext2D.prototype.drawImage = function (image, ...rest) {
+    draw.call(this, image, ...rest);
+    const about = bench()?.picture?.about;
+    if (!about || about === seen.about || !(image instanceof ImageBitmap)) return;
+    seen.about = about;
+    requestAnimationFrame(() => {
+      const { port1, port2 } = new MessageChannel();
+      port1.onmessage = () => {
+        const now = performance.timeOrigin + performance.now();
+        seen.drawn.push([now, about.turn, about.coarse, about.took, about.moving]);
+      };
+      port2.postMessage(0);
+    });
+  };
+})();
+"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """Something that is dragged.
+
+    Args:
+        name: in the table.
+        views: a side of the light field.
+        pixels: a side of each view.
+        camera: the optics, before a sensor of 500×500 pixels.
+        part: what is dragged: an element's number, or "sensor".
+        least: pictures a second that are aimed at.
+        swing: of the mouse to both sides, pixels of the page, some 0.1 mm each.
+    """
+
+    name: str
+    views: int
+    pixels: int
+    camera: vcc.Camera
+    part: int | str
+    least: int
+    swing: int = 40
+
+    @property
+    def where(self) -> list[Any]:
+        """The place of the part in a document."""
+        return ["sensor", "z"] if self.part == "sensor" else ["elements", self.part, "z"]
+
+    @property
+    def z(self) -> float:
+        """Of the part, metres."""
+        return self.camera.sensor.z if self.part == "sensor" else self.camera.elements[int(self.part)].z
+
+
+def cases() -> list[Case]:
+    """What is dragged."""
+    lens = vcc.Lens(focal_length=50 * mm, diameter=18 * mm, name="main")
+    code = vcc.Mask(vcc.patterns.mura(13), width=21 * mm, z=26 * mm, name="code")
+    lenslets = vcc.LensArray(pitch=0.6 * mm, focal_length=1.3 * mm, z=52 * mm, name="lenslets")
+    sensor, behind = (vcc.Sensor(z, (500, 500), 48 * um) for z in (52 * mm, 53.3 * mm))
+    alone, masked = vcc.Camera([lens], sensor), vcc.Camera([lens, code], sensor)
+    further = vcc.Camera([replace(lens, z=6 * mm)], vcc.Sensor(58 * mm, (500, 500), 48 * um))
+    plenoptic = vcc.Camera([lens, lenslets], behind)
+    return [
+        Case("lens; the sensor", 9, 500, alone, "sensor", 20),
+        Case("lens; the lens", 9, 500, further, 0, 20),
+        Case("mask half-way; the mask", 9, 500, masked, 1, 20),
+        Case("plenoptic, by rays; the sensor", 9, 500, plenoptic, "sensor", 20, swing=10),
+        Case("lens; the sensor", 20, 500, alone, "sensor", 10),
+        Case("mask half-way; the mask", 20, 500, masked, 1, 10),
+        Case("plenoptic, by rays; the sensor", 20, 500, plenoptic, "sensor", 10, swing=10),
+    ]
+
+
+def light_field(views: int, pixels: int) -> vcc.LightField:
+    """The demo's scene, before a lens of 18 mm."""
+    return demo_scene().light_field(
+        (views, views),
+        (pixels, pixels),
+        spacing=20 * mm / views,
+        slope_per_pixel=25 / 52 / pixels,
+        focus_distance=1.3,
+    )
+
+
+def written(folder: Path, case: Case) -> tuple[Path, Path]:
+    """A case's camera file and light field, written once."""
+    views = folder / f"views_{case.views}_{case.pixels}.npz"
+    if not views.exists():
+        save_light_field(light_field(case.views, case.pixels), views)
+    camera = folder / f"camera_{len(list(folder.glob('*.toml')))}.toml"
+    case.camera.save(camera)
+    return camera, views
+
+
+# --- the host alone ---
+
+
+class Waiting:
+    """A client that waits for each picture."""
+
+    def __init__(self, offered: Offered) -> None:
+        self.pictures: list[dict[str, Any]] = []
+        self.sent = 0
+        self._came = threading.Condition()
+        self.session = Session(offered, self._told)
+
+    def _told(self, message: dict[str, Any], buffers: Any) -> None:
+        self.sent += len(packed(message, buffers))
+        if message["is"] in ("refused", "failed", "no picture"):
+            print(f"the bench says: {message['words']}", file=sys.stderr)
+        if message["is"] == "picture":
+            with self._came:
+                self.pictures.append(message)
+                self._came.notify()
+
+    def until(self, turn: int, whole: bool = False) -> None:
+        """Wait for a picture of a turn."""
+        with self._came:
+            if not self._came.wait_for(lambda: any(self._is(each, turn, whole) for each in self.pictures), 60):
+                raise SystemExit("no picture came in a minute")
+
+    @staticmethod
+    def _is(picture: dict[str, Any], turn: int, whole: bool) -> bool:
+        return picture["turn"] >= turn and not (whole and picture["coarse"])
+
+
+def host_alone(case: Case, files: tuple[Path, Path], field: Field) -> str:
+    """A line: how long the host takes from a message to its answers."""
+    tables = read_tables(files[0])
+    client = Waiting(Offered({"views": field}, Document(tables, "views"), Beside(files[0].parent, frozenset())))
+    client.session.receive({"do": "hello", "turn": 0})
+    client.until(0, whole=True)
+    whole = client.pictures[-1]["took"]
+
+    def move(turn: int) -> float:
+        z = f"{1e3 * case.z + 0.04 * case.swing * math.sin(turn / 10):.4f} mm"
+        began = time.perf_counter()
+        client.session.receive({"do": "set", "where": case.where, "value": z, "moving": True, "turn": turn})
+        client.until(turn)
+        return time.perf_counter() - began
+
+    for turn in range(1, 21):
+        move(turn)
+    client.pictures, client.sent, used = [], 0, time.process_time()
+    seconds = [1e3 * move(turn) for turn in range(21, 21 + TURNS)]
+    used = 1e3 * (time.process_time() - used) / TURNS
+    took = [picture["took"] for picture in client.pictures]
+    shapes = Counter("×".join(map(str, picture["shape"])) for picture in client.pictures)
+    client.session.close()
+    client.session.join()
+    return row(
+        size_of(case),
+        case.name,
+        f"{np.median(seconds):.1f}",
+        f"{np.percentile(seconds, 95):.1f}",
+        f"{np.median(took):.1f}",
+        f"{used:.1f}",
+        f"{client.sent / TURNS / 1000:.0f}",
+        ", ".join(f"{shape} ({count} %)" for shape, count in shapes.most_common()),
+        f"{whole:.0f}",
+    )
+
+
+# --- in a browser ---
+
+
+@contextlib.contextmanager
+def process(*command: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """A process of ours, and its end."""
+    options: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "cwd": folder}
+    with subprocess.Popen(command, **options) as running:
+        yield running
+        running.send_signal(signal.SIGINT)
+        try:
+            running.communicate(timeout=10)
+        except subprocess.TimeoutExpired:
+            running.kill()
+
+
+@contextlib.contextmanager
+def served(case: Case, files: tuple[Path, Path]) -> Iterator[str]:
+    """The address of a bench with a case's camera and light field."""
+    camera, views = map(str, files)
+    with process(
+        sys.executable, "-m", "vcc", "bench", camera, views, "--no-browser", folder=files[0].parent
+    ) as bench:
+        assert bench.stdout is not None
+        words = ""
+        while "http" not in words:
+            words = bench.stdout.readline()
+            if not words:
+                raise SystemExit("vcc bench has ended")
+        yield next(word for word in words.split() if word.startswith("http"))
+
+
+def drag(page: Any, case: Case) -> dict[str, Any]:
+    """What the page saw of a part that is dragged, held still, and let go."""
+    page.wait_for_selector('section.picture[aria-busy="false"]', timeout=60_000)
+    page.wait_for_timeout(500)
+    box = page.locator(f'[data-part="{case.part}"] .strip').bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 3
+    page.mouse.move(x, y)
+    page.mouse.down()
+    began = time.perf_counter()
+    for number in range(MOVES):
+        time.sleep(max(began + number * EVERY - time.perf_counter(), 0))
+        page.mouse.move(x + case.swing * math.sin(2 * math.pi * (number + 1) / 120.5), y)
+    page.wait_for_timeout(1000 * STILL)
+    page.mouse.up()
+    page.wait_for_timeout(50)
+    page.wait_for_selector('section.picture[aria-busy="false"]', timeout=60_000)
+    page.wait_for_timeout(100)
+    return dict(page.evaluate("window.seen"))
+
+
+def told(case: Case, seen: dict[str, Any]) -> str:
+    """A line of the table: what was seen, with what is aimed at."""
+    inputs, drawn = np.array(seen["inputs"]), sorted(seen["drawn"])
+    turns, times = np.array([one[1] for one in drawn]), np.array([one[0] for one in drawn])
+    shown = np.array([times[turns >= turn].min(initial=math.inf) for turn in inputs[:, 1]])
+    late = shown - inputs[:, 0]
+    during = [one for one in drawn if inputs[0, 0] <= one[0] <= inputs[-1, 0]]
+    rate = len(during) / (inputs[-1, 0] - inputs[0, 0]) * 1e3
+    ends = [now for now, _, coarse, _, moving in drawn if now > seen["ended"] and not (coarse or moving)]
+    return row(
+        size_of(case),
+        case.name,
+        f"{rate:.1f} ({case.least})",
+        f"{np.median(late):.0f}",
+        f"{np.percentile(late, 95):.0f} (100)",
+        f"{late.max():.0f}",
+        f"{late[-1]:.0f} (150)",
+        f"{ends[0] - seen['ended']:.0f}" if ends else "none",
+        f"{np.median([one[3] for one in during]):.0f}" if during else "none",
+    )
+
+
+def in_a_browser(browser: Any, case: Case, files: tuple[Path, Path]) -> str:
+    """A line of the table, from the bench of `vcc bench`."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.add_init_script(WATCH)
+    page = context.new_page()
+    with served(case, files) as address:
+        page.goto(address)
+        found = told(case, drag(page, case))
+        context.close()
+    return found
+
+
+def in_jupyterlab(browser: Any, case: Case, files: tuple[Path, Path]) -> str:
+    """A line of the table, from a notebook in JupyterLab."""
+    folder, token = files[0].parent, secrets.token_hex(8)
+    source = f"import vcc\nvcc.load_camera({files[0].name!r}).bench(vcc.open_light_field({files[1].name!r}))"
+    cell = {
+        "cell_type": "code",
+        "id": "one",
+        "metadata": {},
+        "source": source,
+        "outputs": [],
+        "execution_count": None,
+    }
+    notebook = {"cells": [cell], "metadata": {}, "nbformat": 4, "nbformat_minor": 5}
+    (folder / "bench.ipynb").write_text(json.dumps(notebook))
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    options = [
+        f"--port={port}",
+        "--no-browser",
+        f"--IdentityProvider.token={token}",
+        f"--ServerApp.root_dir={folder}",
+    ]
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        options.append("--allow-root")
+    with process(sys.executable, "-m", "jupyterlab", *options, folder=folder) as lab:
+        assert lab.stdout is not None
+        threading.Thread(target=lab.stdout.read, daemon=True).start()
+        context = browser.new_context(viewport={"width": 1280, "height": 900})
+        context.add_init_script(WATCH)
+        page = context.new_page()
+        wait_for(port)
+        page.goto(f"http://127.0.0.1:{port}/lab/tree/bench.ipynb?token={token}")
+        page.locator(".jp-CodeCell .cm-content").first.click(timeout=60_000)
+        page.wait_for_timeout(3000)  # until the kernel is there
+        page.keyboard.press("Control+Enter")
+        found = told(case, drag(page, case))
+        context.close()
+    return found
+
+
+def wait_for(port: int) -> None:
+    """Until somebody listens there."""
+    for _ in range(300):
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 1):
+            return
+        time.sleep(0.1)
+    raise SystemExit("JupyterLab does not answer")
+
+
+# --- words ---
+
+
+def row(*cells: str) -> str:
+    """Of a table."""
+    return "| " + " | ".join(cells) + " |"
+
+
+def size_of(case: Case) -> str:
+    """Of its light field."""
+    return f"{case.views}×{case.views} of {case.pixels}×{case.pixels}"
+
+
+def heading(*cells: str) -> None:
+    """Of a table."""
+    print(row(*cells))
+    print(row(*["---"] * len(cells)), flush=True)
+
+
+OF_HOST = (
+    "views", "camera; what is moved", "message to picture, median, ms", "95th percentile", "picture made in",
+    "processor", "kB sent", "pixels", "whole picture made in",
+)  # fmt: skip
+OF_LOOP = (
+    "views", "camera; what is dragged", "pictures/s (at least)", "input to picture, median, ms",
+    "95th percentile (at most)", "longest", "last place, after the hand stops (at most)",
+    "whole picture, after it lets go", "made in, while dragging",
+)  # fmt: skip
+
+
+def main() -> None:
+    """Measure, and print Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--host", action="store_true", help="without a browser")
+    parser.add_argument("--jupyterlab", action="store_true", help="the widget in JupyterLab, and nothing else")
+    parser.add_argument("--only", default="", metavar="WORDS", help="cases whose line of the table holds this")
+    arguments = parser.parse_args()
+    wanted = [case for case in cases() if arguments.only in row(size_of(case), case.name)]
+    if arguments.jupyterlab:
+        wanted = [replace(case, least=10) for case in wanted]
+    load, version = os.getloadavg()[0], platform.python_version()
+    print(f"{platform.node()}: {os.cpu_count()} cores, load {load:.1f} at the start, Python {version}\n")
+    with tempfile.TemporaryDirectory() as made:
+        files = [written(Path(made), case) for case in wanted]
+        if arguments.host:
+            measure_host(wanted, files)
+        else:
+            measure_in_chromium(wanted, files, in_jupyterlab if arguments.jupyterlab else in_a_browser)
+
+
+def measure_host(wanted: list[Case], files: list[tuple[Path, Path]]) -> None:
+    """A line for each case, of the host alone."""
+    heading(*OF_HOST)
+    fields: dict[Path, Field] = {}
+    for case, each in zip(wanted, files, strict=True):
+        field = fields.setdefault(each[1], Field(vcc.open_light_field(each[1])))
+        print(host_alone(case, each, field), flush=True)
+
+
+def measure_in_chromium(wanted: list[Case], files: list[tuple[Path, Path]], measure: Callable[..., str]) -> None:
+    """A line for each case, of the closed loop."""
+    from playwright.sync_api import sync_playwright
+
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        raise SystemExit(f"there is no browser: none of {', '.join(BROWSERS)}")
+    heading(*OF_LOOP)
+    with sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=found)
+        for case, each in zip(wanted, files, strict=True):
+            print(measure(browser, case, each), flush=True)
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()
