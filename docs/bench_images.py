@@ -7,10 +7,14 @@ import contextlib
 import io
 import json
 import shutil
+import subprocess
+import sys
+import tempfile
 import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -169,6 +173,25 @@ def main(folder: Path = HERE) -> None:
             save(taken(browser, address, *state), folder / f"{name}.webp")
             print(name)
         browser.close()
+    in_jupyterlab(folder)
+
+
+def in_jupyterlab(folder: Path) -> None:
+    """The bench in a notebook, where there is JupyterLab."""
+    if find_spec("jupyterlab") is None:
+        print("jupyterlab.webp is left as it is: JupyterLab is not installed")
+        return
+    with tempfile.TemporaryDirectory() as name:
+        command = [sys.executable, "-m", "tests.bench.hosts", "jupyterlab", "--pictures", name]
+        subprocess.run(command, cwd=HERE.parents[2], check=True)
+        save_notebook(Path(name) / "jupyterlab-light.png", folder)
+
+
+def save_notebook(shot: Path, folder: Path) -> None:
+    """Its menus, the cells that make a bench, and the one that asks it for its camera."""
+    cut = io.BytesIO()
+    Pillow.open(shot).crop((0, 0, WIDE, 890)).save(cut, "PNG")
+    save(cut.getvalue(), folder / "jupyterlab.webp")
 
 
 def taken(
