@@ -104,7 +104,22 @@ def test_the_program_of_the_scene_makes_the_same_views(monkeypatch):
     assert made["light_field"].frame == field.whole().frame
 
 
+def test_a_camera_of_the_gallery_is_on_the_bench_by_its_name(offered):
+    assert run("bench", "--gallery", "plenoptic").exit_code == 0
+    there = offered["there"]
+    assert [element["kind"] for element in there.start.camera["elements"]] == ["lens", "lens_array"]
+    assert there.start == there.gallery["Gallery: Hand-held plenoptic camera"]
+    client = Client(there)
+    client.do("load", gallery="Gallery: Biprism stereo")
+    state = client.until("state")[0]
+    assert [element["kind"] for element in state["document"]["camera"]["elements"]] == ["biprism", "lens"]
+    client.close()
+
+
 def test_what_is_not_there_is_refused(offered, files):
+    assert "On the bench are conventional" in refused("bench", "--gallery", "camera-obscura")
+    assert "compares many apertures" in refused("bench", "--gallery", "good-apertures")
+    assert "not both" in refused("bench", "camera.toml", "--gallery", "plenoptic")
     assert "none.toml" in refused("bench", "none.toml")
     assert "there is no light field" in refused("bench", "camera.toml", "none")
     assert not offered

@@ -49,6 +49,7 @@ COMMANDS = {
         "Open the optical bench in the browser: move elements along the axis, and see the picture follow.\n\n"
         "Without a camera and a light field it opens a lens before the demo's scene.",
         "vcc bench",
+        "vcc bench --gallery plenoptic",
         "vcc bench camera.toml views/",
     ),
     "demo": (

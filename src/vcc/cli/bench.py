@@ -12,6 +12,7 @@ from vcc.base.progress import Progress
 from vcc.bench.cameras import SCENE, cameras, scene
 from vcc.bench.document import Document
 from vcc.bench.offered import Field, Offered
+from vcc.bench.published import Gallery, title_of
 from vcc.bench.server import LOOPBACK, run
 from vcc.camera_file import load_camera
 from vcc.cli.console import show
@@ -31,6 +32,7 @@ def bench(
     host: Annotated[str, Parameter(metavar="ADDRESS")] = LOOPBACK,
     port: Whole = 0,
     no_browser: bool = False,
+    gallery: Annotated[str | None, Parameter(metavar="NAME")] = None,
     reading: Reading = Reading(),
 ) -> None:
     """Open the optical bench in the browser: move elements along the axis, and see the picture follow.
@@ -40,6 +42,7 @@ def bench(
             the address that is printed.
         port: The port to listen at; 0 takes a free one.
         no_browser: Print the address, and open no browser.
+        gallery: Begin with a published camera of the gallery, such as plenoptic; vcc gallery lists their names.
     """
     fields = {SCENE: scene()}
     name = SCENE
@@ -48,15 +51,15 @@ def bench(
             raise InputError(f"there is no light field {light_field}")
         name = light_field.expanduser().resolve().name or str(light_field)
         fields = {name: _field(light_field, reading), **fields}
-    gallery = cameras(SCENE)
+    shown = Gallery(cameras(SCENE), SCENE)
     if camera is None:
-        start, beside = (
-            dataclasses.replace(next(iter(gallery.values())), light_field=name),
-            Beside(Path(), frozenset()),
-        )
+        first = next(iter(shown)) if gallery is None else title_of(gallery)
+        start, beside = dataclasses.replace(shown[first], light_field=name), Beside(Path(), frozenset())
+    elif gallery is not None:
+        raise InputError("give a camera file or --gallery NAME, not both")
     else:
         start, beside = _document(camera, name)
-    offered = Offered(fields, start, beside, gallery)
+    offered = Offered(fields, start, beside, shown)
     # While the browser starts; whoever looks first waits for the same.
     threading.Thread(target=_opened, args=(fields[name],), daemon=True).start()
     run(offered, host=host, port=port, browser=not no_browser, say=show)
