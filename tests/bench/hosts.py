@@ -1,6 +1,6 @@
 """The bench in real notebooks, driven in headless Chromium: python -m tests.bench.hosts [jupyterlab] [marimo] …
 
-No test of the suite: JupyterLab, Notebook and marimo are no dependencies. Each that is installed is started on a
+No test of the suite: JupyterLab and marimo are no dependencies. Each that is installed is started on a
 folder of its own and told what to run; what was seen is printed line by line, and the first thing that is not so
 ends it.
 """
@@ -111,11 +111,11 @@ class Bench:
         return str(self.frame.evaluate("f => getComputedStyle(f.shadowRoot.firstElementChild).backgroundColor"))
 
 
-# --- JupyterLab, and Notebook 7, which is made of it ---
+# --- JupyterLab ---
 
 
 class Notebook:
-    """A page of JupyterLab or Notebook 7 with one notebook."""
+    """A page of JupyterLab with one notebook."""
 
     def __init__(self, page: Page, address: str) -> None:
         self.page = page
@@ -539,12 +539,7 @@ def in_jupyterlab(browser: Browser, pictures: Path | None) -> None:
     in_jupyter(browser, pictures, "jupyterlab", "lab/tree")
 
 
-def in_notebook(browser: Browser, pictures: Path | None) -> None:
-    """Notebook 7."""
-    in_jupyter(browser, pictures, "notebook", "notebooks")
-
-
-HOSTS = {"jupyterlab": in_jupyterlab, "notebook": in_notebook, "marimo": in_marimo}
+HOSTS = {"jupyterlab": in_jupyterlab, "marimo": in_marimo}
 
 if __name__ == "__main__":
     main()
