@@ -5,19 +5,24 @@ Run by ``test_cuda.py`` in a process of its own: whether Numba simulates is deci
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import vcc
-from tests.engines.test_agreement import CAMERAS, field, samples, turned
+from tests.engines.test_agreement import CAMERAS, LENS, field, samples, turned
 from vcc.base.units import mm
-from vcc.engines import cuda_footprints
+from vcc.engines import cuda as engine
+from vcc.engines import cuda_back, cuda_footprints, cuda_tables, reference
+from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import How
 from vcc.run.drive import Drive
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
 SHAPE = (2, 2, 5, 8)
+SMALL = vcc.Sensor(49 * mm, (4, 5), 49 * mm * 2e-3)
 
 
 def drawn(seed: int) -> vcc.Camera:
@@ -74,7 +79,7 @@ def test_rows_and_columns_that_shear_through_a_mask():
 @pytest.mark.parametrize("angle", [0.0, 0.2])
 def test_divided_samples(angle):
     lf = turned(field(samples((1, 2, 3, 4))), angle)
-    assert_agree(CAMERAS["mask half-way"], lf, refine=2)
+    assert_agree(vcc.Camera([LENS, vcc.Mask(np.eye(3), width=6 * mm, z=20 * mm)], SMALL), lf, refine=2)
 
 
 def test_rows_that_change_places_with_columns():
@@ -105,12 +110,84 @@ def test_samples_stay_on_the_gpu():
 def test_tables_stay_while_a_plan_is_used():
     camera, lf = CAMERAS["in focus"], field(samples(SHAPE, "uint8"))
     plan = camera.compile(lf)
-    of = [cuda_footprints.tables_of(Drive(plan, lf, How(engine="cuda")).core) for _ in range(2)]
+    of = [cuda_tables.tables_of(Drive(plan, lf, How(engine="cuda")).core) for _ in range(2)]
     assert of[0] is of[1]
-    assert cuda_footprints.tables_of(camera.compile(lf[:, :, :5]).core) is not of[0]
+    assert cuda_tables.tables_of(camera.compile(lf[:, :, :5]).core) is not of[0]
+
+
+def with_taps_twice(core: Footprints) -> Footprints:
+    """The last row and the first column of view taps twice, in places of their own: as where cells are divided."""
+    taps = np.ix_([0, 1, 1], [0, 0, 1])
+    return replace(
+        core,
+        view_rows=core.view_rows[[0, 1, 1]],
+        view_columns=core.view_columns[[0, 0, 1]],
+        weights=core.weights[taps] * [[1], [0.3], [0.7]],
+        x=core.x[taps] + [0, 0.4, 0],
+        y=core.y[taps] + [[0], [0], [-0.6]],
+        masks=tuple(mask.of_taps(taps) for mask in core.masks),
+    )
+
+
+def cores() -> dict[str, tuple[Footprints, np.ndarray]]:
+    """Footprints of every kind, and samples."""
+    coloured, plain = samples((2, 2, 4, 5, 3)), samples((2, 2, 3, 3))
+    tilted = field(samples((1, 2, 4, 5, 2)))
+    two, one = drawn(7), vcc.Camera([LENS, vcc.Mask(np.eye(3), width=6 * mm, z=20 * mm)], SMALL)
+    assert sum(isinstance(element, vcc.Mask) for element in two.elements) == 2
+    made = {
+        "three channels": (CAMERAS["in focus"].compile(field(coloured), interpolation="cubic").core, coloured),
+        "two masks": (two.compile(field(coloured), refine=1).core, coloured),
+        "sheared": (two.compile(turned(tilted, 0.3), refine=1, interpolation="linear").core, tilted.values),
+        "divided": (one.compile(field(plain), refine=2).core, plain),
+        "sheared and divided": (one.compile(turned(field(plain[:, :, :2]), 0.2), refine=2).core, plain[:, :, :2]),
+    }
+    core, values = made["two masks"]
+    weights = core.weights.copy()
+    weights[0, 1] = 0
+    made["a view is closed"] = replace(core, weights=weights, view_columns=core.view_columns[::-1].copy()), values
+    made["several taps of a view"] = with_taps_twice(core), values
+    return made
+
+
+CORES = cores()
+
+
+@pytest.mark.parametrize("name", CORES)
+def test_backwards_as_the_reference(name, monkeypatch):
+    core, values = CORES[name]
+    channels = values.shape[4:] or (1,)
+    weights = np.random.default_rng(1).random((*core.raster_shape, *channels))
+    wanted = ["weights", "scale", *(f"masks[{n}].texture" for n in range(len(core.masks)))]
+    expected = reference.footprints_back(core, values, weights, wanted=wanted, threads=1)
+    for at_once in (cuda_footprints.ROOM, 1):  # in one piece, and column by column of views
+        monkeypatch.setattr(cuda_footprints, "ROOM", at_once)
+        monkeypatch.setattr(cuda_back, "ROOM", at_once)
+        found = engine.footprints_back(core, values, weights, wanted=wanted, threads=1)
+        assert_close(found.samples, expected.samples)
+        for number in wanted:
+            assert_close(found.numbers[number], expected.numbers[number])
+
+
+def assert_close(found: np.ndarray, expected: np.ndarray) -> None:
+    """To 1e-5 of the largest."""
+    assert found.shape == expected.shape
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def test_an_operator_and_its_adjoint():
+    lf = field(samples((2, 2, 4, 5, 3)))
+    operator = drawn(7).operator(lf, engine="cuda", refine=1)
+    picture = np.random.default_rng(2).random(operator.picture_shape).astype(np.float32)
+    ahead, back = float((operator(lf.values) * picture).sum()), float((operator.T(picture) * lf.values).sum())
+    assert abs(ahead - back) < 1e-5 * abs(ahead)
 
 
 def test_what_is_not_done_is_refused_by_name():
     lf = field(samples(SHAPE))
+    core, values = CORES["two masks"]
+    weights = np.zeros((*core.raster_shape, 3))
+    with pytest.raises(vcc.InputError, match=r"none to 'masks\[0\].column'.*engine='numba'"):
+        engine.footprints_back(core, values, weights, wanted=["masks[0].column"], threads=1)
     with pytest.raises(vcc.InputError, match=r"engine 'cuda' does footprints.*engine='numba'"):
         CAMERAS["in focus"].capture(lf, engine="cuda", method="rays")

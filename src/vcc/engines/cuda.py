@@ -10,7 +10,8 @@ Loading this module is refused where there is no GPU, with what to do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
-from vcc.engines import cuda_arrays, cuda_footprints, numba_cpu
+from vcc.engines import cuda_arrays, cuda_back, cuda_footprints, numba_cpu
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.protocol import Gradient, Partial
@@ -65,13 +66,31 @@ def rays(core: Rays, values: Any, **options: Any) -> Partial:
     raise InputError("engine 'cuda' does footprints, and this picture is made by rays: use engine='numba'")
 
 
-def footprints_back(core: Footprints, values: Any, raster: Any, **options: Any) -> Gradient:
-    """Nothing, as yet.
+def footprints_back(
+    core: Footprints,
+    values: Any,
+    raster: NDArray[np.floating],
+    *,
+    samples: bool = True,
+    wanted: Collection[str] = (),
+    beside: int = 0,
+    threads: int,
+    progress: Progress | None = None,
+) -> Gradient:
+    """What a raster's weights say of samples, float32 in their library, and of textures of masks, weights and
+    scale.
+
+    See `vcc.plan.protocol.BackRunner`.
 
     Raises:
-        InputError: always.
+        InputError: a number to which there is no derivative, or none by this engine.
     """
-    raise InputError("engine 'cuda' does not go backwards: use engine='numba'")
+    cuda_back.check_known(core, wanted)
+    return Gradient.of(
+        partial(cuda_back.samples_back, core, values, raster) if samples else None,
+        partial(cuda_back.numbers_back, core, values, raster, wanted) if wanted else None,
+        progress,
+    )
 
 
 def rays_back(core: Rays, values: Any, raster: Any, **options: Any) -> Gradient:

@@ -75,6 +75,14 @@ def sent(array: NDArray[Any], stream: Any = 0) -> Any:
     return cuda.to_device(np.ascontiguousarray(array), stream=stream)
 
 
+def brought(array: Any, stream: Any = 0) -> NDArray[Any]:
+    """A copy in main memory, of what has been started in a stream before."""
+    made: NDArray[Any] = array.copy_to_host(stream=stream)
+    if stream:
+        stream.synchronize()
+    return made
+
+
 def zeros(shape: tuple[int, ...], stream: Any = 0) -> Any:
     """New numbers on the GPU, float32."""
     made = cuda.device_array(math.prod(shape), np.float32, stream=stream)
@@ -154,7 +162,7 @@ def given_back(array: Any, like: Any) -> Any:
         return sys.modules["torch"].as_tensor(array, device=like.device)
     if library == "cupy":
         return sys.modules["cupy"].asarray(array)
-    return array.copy_to_host()
+    return brought(array)
 
 
 @cuda.jit

@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cuda, float32
+from numba import cuda, float32, uint32
 from numpy.typing import NDArray
 
 from vcc.engines.numba_kernels import farthest, share_at
@@ -72,13 +72,13 @@ class MaskRows(NamedTuple):
     step: NDArray[np.float64]
 
 
-class Sheared(NamedTuple):
-    """Where samples fall if rows and columns do not part.
+class Places(NamedTuple):
+    """Where sample (0, 0) of each view tap falls, before division.
 
     Args:
-        x: (rows of taps, columns of taps), raster column of sample (0, 0) before division.
+        x: (rows of taps, columns of taps), raster column.
         y: likewise, raster row.
-        masks: (masks, rows of taps, columns of taps, 2), mask column and row of that sample.
+        masks: (masks, rows of taps, columns of taps, 2), mask column and row.
     """
 
     x: NDArray[np.float64]
@@ -90,7 +90,7 @@ class Sheared(NamedTuple):
 
 
 @cache
-def sum_rows(values_each: int, words: bool, masked: bool) -> Any:
+def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
     """The kernel that sums views row by row, for rows of samples of one layout.
 
     Args:
@@ -98,20 +98,22 @@ def sum_rows(values_each: int, words: bool, masked: bool) -> Any:
             by masks, or the bytes of a word.
         words: whether samples are bytes that are read as words of 32 bits, four at once.
         masked: whether there are masks.
+        batch: rows of samples that are asked for at once, before the first is used: memory answers late.
     """
 
     @cuda.jit
-    def kernel(source, weights, quads, masks, start, sums):  # type: ignore[no-untyped-def]
+    def kernel(source, weights, quads, masks, start, rows, sums):  # type: ignore[no-untyped-def]
         """sums[a − start, y, n] = Σ over views b and rows l of weight · share · masks · samples.
 
-        source: `Source`. weights: (rows of taps, columns of taps). quads: `Quads`. masks: `MaskRows`. start: the
-            first
-        column of view taps. sums: (columns of taps, raster rows, values in a row); raster rows a multiple of four.
+        source: `Source`. weights: (rows of taps, columns of taps). quads: `Quads`, as many shares as a multiple of
+        ``batch``. masks: `MaskRows`. start: the first column of view taps. rows: of samples in a view. sums:
+        (columns of taps, raster rows, values in a row); raster rows a multiple of four.
         """
         x, y, z = cuda.grid(3)
         wide, high, deep = cuda.gridsize(3)
         total = cuda.local.array((ROWS, values_each), float32)
-        part = cuda.local.array((ROWS, values_each), float32)
+        asked = cuda.local.array(batch, uint32)
+        values = cuda.local.array((batch, values_each), float32)
         for column in range(z, sums.shape[0], deep):
             a = start + column
             for quad in range(y, quads.first.shape[1], high):
@@ -123,31 +125,32 @@ def sum_rows(values_each: int, words: bool, masked: bool) -> Any:
                         weight = weights[b, a]
                         if weight == 0:
                             continue
-                        for r in range(ROWS):
-                            for n in range(values_each):
-                                part[r, n] = 0
-                        begin, first = source.begin[b] + source.further[a], quads.first[b, quad]
-                        for t in range(quads.counts[b, quad]):
-                            l = first + t
-                            at = np.uint64(begin + l * source.pitch + k * values_each)
-                            through = float32(1)
-                            if masked:
-                                for m in range(masks.rows.size):
-                                    through *= mask_at(masks, m, b, a, l, k)
-                            if words:
-                                word = source.values[at >> np.uint64(2)]
-                            for n in range(values_each):
+                        begin = source.begin[b] + source.further[a] + k * values_each
+                        first = quads.first[b, quad]
+                        for t in range(0, quads.counts[b, quad], batch):
+                            for j in range(batch):
+                                # Beyond what is counted shares are zero, and any row will do.
+                                l = min(first + t + j, rows - 1)
+                                at = np.uint64(begin + l * source.pitch)
                                 if words:
-                                    value = float32(np.uint32((word >> np.uint32(8 * n)) & np.uint32(255)))
+                                    asked[j] = source.values[at >> np.uint64(2)]
                                 else:
-                                    value = float32(source.values[at + np.uint64(n)])
+                                    for n in range(values_each):
+                                        values[j, n] = float32(source.values[at + np.uint64(n)])
+                            for j in range(batch):
+                                through = weight
                                 if masked:
+                                    l = min(first + t + j, rows - 1)
+                                    for m in range(masks.rows.size):
+                                        through *= mask_at(masks, m, b, a, l, k)
+                                for n in range(values_each):
+                                    if words:
+                                        value = float32(uint32((asked[j] >> uint32(8 * n)) & uint32(255)))
+                                    else:
+                                        value = values[j, n]
                                     value = value * through
-                                for r in range(ROWS):
-                                    part[r, n] += quads.shares[b, quad, t, r] * value
-                        for r in range(ROWS):
-                            for n in range(values_each):
-                                total[r, n] += weight * part[r, n]
+                                    for r in range(ROWS):
+                                        total[r, n] += quads.shares[b, quad, t + j, r] * value
                     for r in range(ROWS):
                         for n in range(values_each):
                             sums[column, ROWS * quad + r, k * values_each + n] = total[r, n]
@@ -158,57 +161,62 @@ def sum_rows(values_each: int, words: bool, masked: bool) -> Any:
 @cuda.jit(device=True)
 def mask_at(masks, m, b, a, l, k):  # type: ignore[no-untyped-def]
     """What mask m lets pass at sample (k, l) of view tap (b, a)."""
-    through = float32(0)
     begin, rows = masks.begin[m, b, a], masks.rows[m]
     r, above, level, below = three_around(min(max(masks.row[m, b, a] + l * masks.step[m], -2.0), rows + 1.0))
-    if 0 < r <= rows:
-        through += above * masks.lines[begin + r - 1, k]
-    if 0 <= r < rows:
-        through += level * masks.lines[begin + r, k]
-    if -1 <= r < rows - 1:
-        through += below * masks.lines[begin + r + 1, k]
+    last = rows - 1
+    # Without branches, so that all three are asked for at once.
+    through = (above if 0 < r <= rows else float32(0)) * masks.lines[begin + min(max(r - 1, 0), last), k]
+    through += (level if 0 <= r < rows else float32(0)) * masks.lines[begin + min(max(r, 0), last), k]
+    through += (below if -1 <= r < last else float32(0)) * masks.lines[begin + min(max(r + 1, 0), last), k]
     return through
 
 
 @cuda.jit
-def mask_lines(texture, column, step, lines):  # type: ignore[no-untyped-def]
-    """lines[r, k] = row r of a texture at column + step · k, by quadratic B-splines, dark outside."""
+def mask_lines(textures, m, rows, columns, column, step, lines):  # type: ignore[no-untyped-def]
+    """lines[r, k] = row r of a mask's texture at column + step · k, by quadratic B-splines, dark outside.
+
+    textures: (masks, rows, columns), of which this one fills so many.
+    """
     x, y = cuda.grid(2)
     wide, high = cuda.gridsize(2)
-    rows, columns = texture.shape
     for r in range(y, rows, high):
         for k in range(x, lines.shape[1], wide):
             c, before, at, after = three_around(min(max(column + step * k, -2.0), columns + 1.0))
             found = float32(0)
             if 0 < c <= columns:
-                found += before * texture[r, c - 1]
+                found += before * textures[m, r, c - 1]
             if 0 <= c < columns:
-                found += at * texture[r, c]
+                found += at * textures[m, r, c]
             if -1 <= c < columns - 1:
-                found += after * texture[r, c + 1]
+                found += after * textures[m, r, c + 1]
             lines[r, k] = found
 
 
-@cuda.jit
-def mix_columns(sums, first, shares, channels, start, scale, raster):  # type: ignore[no-untyped-def]
-    """raster[y, x · channels + c] += scale · Σ share · sums[a − start, y, k · channels + c] over columns of taps
-    a.
+@cache
+def mix_columns(width: int) -> Any:
+    """The kernel that mixes sums across, for pixels that gather so many samples."""
 
-    first: (columns of taps, raster columns). shares: (columns of taps, raster columns, width).
-    """
-    n, y = cuda.grid(2)
-    wide, high = cuda.gridsize(2)
-    last = sums.shape[2] // channels - 1
-    for row in range(y, raster.shape[0], high):
-        for to in range(n, raster.shape[1], wide):
-            x, c = to // channels, to % channels
-            total = float32(0)
-            for column in range(sums.shape[0]):
-                k = first[start + column, x]
-                for t in range(shares.shape[2]):
-                    # Beyond the last sample shares are zero.
-                    total += shares[start + column, x, t] * sums[column, row, min(k + t, last) * channels + c]
-            raster[row, to] += scale * total
+    @cuda.jit
+    def kernel(sums, first, shares, channels, start, scale, raster):  # type: ignore[no-untyped-def]
+        """raster[y, x · channels + c] += scale · Σ share · sums[a − start, y, k · channels + c] over columns a.
+
+        first: (columns of taps, raster columns). shares: (columns of taps, raster columns, width).
+        """
+        n, y = cuda.grid(2)
+        wide, high = cuda.gridsize(2)
+        last = sums.shape[2] // channels - 1
+        for row in range(y, raster.shape[0], high):
+            for to in range(n, raster.shape[1], wide):
+                x, c = to // channels, to % channels
+                total = float32(0)
+                for column in range(sums.shape[0]):
+                    k = first[start + column, x]
+                    for t in range(width):
+                        # Beyond the last sample shares are zero.
+                        total += shares[start + column, x, t] * sums[column, row, min(k + t, last) * channels + c]
+                raster[row, to] += scale * total
+
+    return kernel
 
 
 # --- samples divided into finer ones ---
@@ -257,7 +265,7 @@ def gather(channels: int) -> Any:
         """raster[y, x, c] += scale · Σ over view taps (b, a), a from ``start`` to before ``stop``, and their
         samples.
 
-        source: `Source`. weights: (rows of taps, columns of taps). places: `Sheared`. grid, footprint, masks: see
+        source: `Source`. weights: (rows of taps, columns of taps). places: `Places`. grid, footprint, masks: see
         `vcc.engines.footprint_tables`. size: (rows, columns) of the samples of a view, divided if need be.
         """
         x0, y0 = cuda.grid(2)

@@ -1,17 +1,15 @@
-"""Footprints on the GPU, forward: the tables of a plan, samples piece by piece, and the kernels that are started.
+"""Footprints on the GPU, forward: samples piece by piece, and the kernels that are started for each.
 
 A piece is some columns of view taps. Samples that are on the GPU are taken where they lie; those in main memory
 are copied there piece by piece through two places of pinned memory, in a stream of their own, so that a piece is
-on its way while the one before is summed. Tables stay on the GPU while their plan is used.
+on its way while the one before is summed.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, fields
-from threading import Lock
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,18 +19,14 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.base.progress import Progress, tell
 from vcc.engines import cuda_footprint_kernels as kernels
-from vcc.engines import footprint_tables as tables
 from vcc.engines.cuda_arrays import arranged, given_back, is_on_gpu, launch, sent, taken, zeros
-from vcc.engines.footprint_samples import FineGrid, on_raster, textures
+from vcc.engines.cuda_tables import Tables, mask_rows, tables_of
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import taps
 
 ROOM = 2**28
 """Bytes of the GPU's memory that sums of a piece may take, finer samples and lines of masks among them."""
 SENT_AT_ONCE = 2**26
 """Bytes of samples that are sent to the GPU at once: enough for the full speed of the way there."""
-KEPT = 4
-"""Plans whose tables stay on the GPU: those that were used last."""
 
 
 def raster_on_gpu(core: Footprints, values: Any, progress: Progress | None = None) -> Any:
@@ -47,7 +41,7 @@ def raster_on_gpu(core: Footprints, values: Any, progress: Progress | None = Non
     tables, done = tables_of(core), 0
     reading = Pieces(tables, values)
     run = _Run(tables, core.scale, channels, reading.stream)
-    with reading as pieces:
+    with tables.lock, reading as pieces:
         for piece in pieces:
             tell(progress, done, core.taps_used)
             run.add(piece)
@@ -87,13 +81,16 @@ class Pieces:
     Args:
         tables: of what reads them.
         values: (v, u, t, s[, channels]).
+        more: bytes of the GPU's memory that a column of view taps takes beside those of the tables.
+        opened: whether columns count in which no tap lets light through.
     """
 
-    def __init__(self, tables: Tables, values: Any) -> None:
+    def __init__(self, tables: Tables, values: Any, more: int = 0, opened: bool = False) -> None:
         self.tables, self.core, self.values = tables, tables.core, values
         self.on_gpu = is_on_gpu(values)
         column = 0 if self.on_gpu else values[:, :1].nbytes
-        each = tables.bytes_a_column(values.shape[4] if len(values.shape) == 5 else 1)
+        self.used = (tables.core.weights != 0).any(axis=0) | opened
+        each = more + tables.bytes_a_column(values.shape[4] if len(values.shape) == 5 else 1)
         at_once = min(ROOM // max(each, 1), SENT_AT_ONCE // column if column else ROOM)
         self.columns = int(max(at_once, 1))
         self.stream: Any = 0 if self.on_gpu else cuda.stream()
@@ -101,7 +98,7 @@ class Pieces:
     def __enter__(self) -> Iterator[Piece]:
         total = len(self.core.view_columns)
         spans = [(a, min(a + self.columns, total)) for a in range(0, total, self.columns)]
-        used = [(a, b) for a, b in spans if self.core.weights[:, a:b].any()]
+        used = [(a, b) for a, b in spans if self.used[a:b].any()]
         return self._there(used) if self.on_gpu else self._sent(used)
 
     def __exit__(self, *error: object) -> None:
@@ -163,131 +160,6 @@ class _Place:
         self.free.record(working)
 
 
-# --- what plans say, as arrays on the GPU ---
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Tables(Brief):
-    """A plan on the GPU.
-
-    Args:
-        core: the plan's.
-        fine: how its samples are divided.
-        weights: (rows of taps, columns of taps) float32.
-        divided: (first, shares) of rows and of columns of finer samples, or None.
-        along: where rows and columns part: `kernels.Quads` of rows, and (first, shares) of columns; or None.
-        textures: where they part, each mask's; else all of them, `tables.Textures`.
-        sheared: where they do not: (`kernels.Sheared`, `tables.Grid`, `tables.Footprint`); or None.
-        kept: what else was made for it, see `once`.
-    """
-
-    core: Footprints
-    fine: FineGrid
-    weights: Any
-    divided: tuple[Any, Any] | None
-    along: tuple[kernels.Quads, tuple[Any, Any]] | None
-    textures: Any
-    sheared: tuple[kernels.Sheared, tables.Grid, tables.Footprint] | None
-    kept: dict[Any, Any] = field(default_factory=dict)
-
-    def once(self, key: Any, make: Callable[[], Any]) -> Any:
-        """What ``make`` makes, made once."""
-        if key not in self.kept:
-            self.kept[key] = make()
-        return self.kept[key]
-
-    def bytes_a_column(self, channels: int) -> int:
-        """Of the GPU's memory that a column of view taps takes beside its samples."""
-        core, line = self.core, 4 * self.fine.columns * channels
-        finer = len(core.view_rows) * self.fine.rows * line if self.divided else 0
-        if self.along is None:
-            return finer
-        lines = sum(len(mask.texture) for mask in core.masks) * 4 * self.fine.columns
-        return finer + core.raster_shape[0] * line + lines
-
-
-_kept: deque[Tables] = deque(maxlen=KEPT)
-_lock = Lock()
-
-
-def tables_of(core: Footprints) -> Tables:
-    """The tables of a plan: made now, or those that are on the GPU already.
-
-    A plan's arrays are never written to: plans that share all of them are alike, but for what a sample stands for.
-    """
-    with _lock:
-        for known in _kept:
-            if _alike(known.core, core):
-                return known
-        made = _made(core)
-        _kept.append(made)
-        return made
-
-
-def _alike(one: Footprints, other: Footprints) -> bool:
-    for each in fields(Footprints):
-        a, b = getattr(one, each.name), getattr(other, each.name)
-        if each.name == "scale" or a is b:
-            continue
-        if isinstance(a, np.ndarray) or isinstance(b, np.ndarray) or each.name == "masks" or a != b:
-            return False
-    return True
-
-
-def _made(core: Footprints) -> Tables:
-    fine = FineGrid(core)
-    weights = sent(core.weights.astype(np.float32))
-    divided = None
-    if fine.divided_as is not None:
-        divided = tuple((sent(part.first), sent(part.shares.astype(np.float32))) for part in fine.divided_as)
-    if core.separable:
-        masks = [sent(mask.texture.astype(np.float32, copy=False)) for mask in core.masks]
-        return Tables(core, fine, weights, divided, _along(core, fine), masks, None)  # type: ignore[arg-type]
-    grid, footprint = on_raster(core, fine)
-    places = np.zeros((len(core.masks), *core.weights.shape, 2))
-    for place, mask in zip(places, core.masks, strict=True):
-        place[..., 0], place[..., 1] = mask.column, mask.row
-    sheared = kernels.Sheared(sent(core.x), sent(core.y), sent(places))
-    values, size, step = textures(core)
-    masks_there = tables.Textures(sent(values), sent(size), sent(step))
-    grid = grid._replace(step=sent(core.step))
-    return Tables(core, fine, weights, divided, None, masks_there, (sheared, grid, footprint))  # type: ignore[arg-type]
-
-
-def _along(core: Footprints, fine: FineGrid) -> tuple[kernels.Quads, tuple[Any, Any]]:
-    """How rows of the raster gather rows of samples, by fours, and columns columns."""
-    rows, columns = core.raster_shape
-    start_y = core.y[:, 0] + core.row_step * fine.first_row
-    start_x = core.x[0] + core.column_step * fine.first_column
-    row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
-    down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
-    across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
-    quads = kernels.Quads(*map(sent, _quads(down.first, down.weights)))
-    return quads, (sent(across.first.astype(np.int32)), sent(across.weights))
-
-
-def _quads(
-    first: NDArray[np.int64], shares: NDArray[np.float32]
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32]]:
-    """`kernels.Quads` of the rows of samples that each row of the raster gathers: `Taps` of rows."""
-    count, rows, width = shares.shape
-    there = shares != 0
-    lit = there.any(axis=2)
-    low = np.where(lit, first + there.argmax(axis=2), np.iinfo(np.int32).max)
-    high = np.where(lit, first + width - there[..., ::-1].argmax(axis=2), 0)
-    more = -rows % kernels.ROWS
-    fours = (count, -1, kernels.ROWS)
-    top = np.pad(low, [(0, 0), (0, more)], constant_values=np.iinfo(np.int32).max).reshape(fours).min(axis=2)
-    end = np.pad(high, [(0, 0), (0, more)]).reshape(fours).max(axis=2)
-    number = np.maximum(end - top, 0)
-    top = np.where(number > 0, top, 0)
-    made = np.zeros((*top.shape, max(int(number.max(initial=0)), 1), kernels.ROWS), np.float32)
-    tap, row, t = np.nonzero(there)
-    quad = row // kernels.ROWS
-    made[tap, quad, first[tap, row] + t - top[tap, quad], row % kernels.ROWS] = shares[tap, row, t]
-    return top.astype(np.int32), number.astype(np.int32), made
-
-
 # --- the run ---
 
 
@@ -308,7 +180,7 @@ class _Run:
     def _by_columns(self, piece: Piece, source: kernels.Source) -> None:
         assert self.tables.along is not None
         core, channels = self.tables.core, self.channels
-        quads, across = self.tables.along
+        (quads, batch), across = self.tables.along
         rows, columns = core.raster_shape
         fours = quads.first.shape[1]
         masked = bool(core.masks)
@@ -317,30 +189,29 @@ class _Run:
         if words:
             source = source._replace(values=source.values.view(np.uint32))
         shape = (piece.stop - piece.start, fours * kernels.ROWS, source.pitch)
-        sums = cuda.device_array(shape, np.float32, stream=piece.stream)
-        masks = mask_rows(self.tables, piece)
+        sums = self.tables.room("sums", shape)
+        masks = mask_rows(self.tables, tuple(range(piece.start, piece.stop)), piece.stream)
         launch(
-            kernels.sum_rows(each, words, masked),
+            kernels.sum_rows(each, words, masked, batch),
             (source.pitch // each, fours, shape[0]),
             piece.stream,
-            *(source, self.tables.weights, quads, masks, piece.start, sums),
+            *(source, self.tables.weights, quads, masks, piece.start, self.tables.fine.rows, sums),
         )
         flat = self.raster.reshape(rows, columns * channels)
         launch(
-            kernels.mix_columns,
+            kernels.mix_columns(across[1].shape[2]),
             flat.shape,
             piece.stream,
             *(sums, *across, channels, piece.start, self.scale, flat),
         )
 
     def _sheared(self, piece: Piece, source: kernels.Source) -> None:
-        assert self.tables.sheared is not None
-        fine, (places, grid, footprint) = self.tables.fine, self.tables.sheared
+        tables, fine = self.tables, self.tables.fine
         launch(
             kernels.gather(self.channels),
-            self.tables.core.raster_shape[::-1],
+            tables.core.raster_shape[::-1],
             piece.stream,
-            *(source, self.tables.weights, places, grid, footprint, self.tables.textures),
+            *(source, tables.weights, tables.places, tables.grid, tables.footprint, tables.textures),
             *((fine.rows, fine.columns), piece.start, piece.stop, self.scale, self.raster),
         )
 
@@ -362,7 +233,7 @@ def divided(tables: Tables, piece: Piece, channels: int, used: Any) -> kernels.S
     core, fine = tables.core, tables.fine
     line, count = fine.columns * channels, len(core.view_rows)
     shape = (piece.stop - piece.start, count, fine.rows, line)
-    made = cuda.device_array(shape, np.float32, stream=piece.stream)
+    made = tables.room("divided", shape)
     launch(
         kernels.divide,
         (line, fine.rows, shape[0] * count),
@@ -376,47 +247,3 @@ def divided(tables: Tables, piece: Piece, channels: int, used: Any) -> kernels.S
 
     begin, further = tables.once(("divided", piece.start, line), places)
     return kernels.Source(made.reshape(math.prod(shape)), begin, further, line)
-
-
-def mask_rows(tables: Tables, piece: Piece) -> kernels.MaskRows:
-    """The masks' textures at the columns of samples of a piece."""
-    core, fine = tables.core, tables.fine
-    groups, total, given = tables.once(
-        ("masks", piece.start, piece.stop), lambda: _mask_groups(tables, piece.start, piece.stop)
-    )
-    lines = cuda.device_array((max(total, 1), fine.columns if groups else 1), np.float32, stream=piece.stream)
-    for m, place, at in groups:
-        texture = tables.textures[m]
-        part = lines[at : at + texture.shape[0]]
-        across = core.masks[m].step[0, 0] / core.refine
-        launch(kernels.mask_lines, part.shape[::-1], piece.stream, texture, place, across, part)
-    return kernels.MaskRows(lines, *given)
-
-
-def _mask_groups(
-    tables: Tables, start: int, stop: int
-) -> tuple[list[tuple[int, float, int]], int, tuple[Any, ...]]:
-    """Which lines of masks a piece needs: (mask, its column at the first sample, where its lines begin), how many
-    lines that are, and `kernels.MaskRows` but for them.
-
-    Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: lines are made once for
-    all taps that agree.
-    """
-    core, fine = tables.core, tables.fine
-    shape = (len(core.masks), *core.weights.shape)
-    begin, row = np.zeros(shape, np.int32), np.zeros(shape)
-    step = np.zeros(len(core.masks))
-    used = np.zeros(core.weights.shape, dtype=bool)
-    used[:, start:stop] = core.weights[:, start:stop] != 0
-    groups: list[tuple[int, float, int]] = []
-    total = 0
-    for m, mask in enumerate(core.masks):
-        step[m] = mask.step[1, 1] / core.refine
-        row[m] = mask.row + mask.step[1, 1] * fine.first_row
-        places, which = np.unique(np.round(mask.column[used], 7), return_inverse=True)
-        begin[m][used] = total + which * len(mask.texture)
-        for place in places:
-            groups.append((m, float(place + mask.step[0, 0] * fine.first_column), total))
-            total += len(mask.texture)
-    rows = np.array([len(mask.texture) for mask in core.masks], np.int32)
-    return groups, total, tuple(map(sent, (begin, rows, row, step)))

@@ -1,0 +1,257 @@
+"""Footprints on the GPU, backwards: from the weights of a raster to samples, to masks' textures and views'
+weights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from numba import cuda
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+from vcc.base.progress import Progress, tell
+from vcc.engines import cuda_back_kernels as kernels
+from vcc.engines.cuda_arrays import brought, given_back, launch, sent, zeros
+from vcc.engines.cuda_footprint_kernels import Source
+from vcc.engines.cuda_footprints import ROOM, Piece, Pieces, divided
+from vcc.engines.cuda_tables import Tables, mask_rows, tables_of
+from vcc.engines.footprint_axes import Axis, axes
+from vcc.plan.footprints.model import Footprints
+from vcc.plan.footprints.shares import Taps
+
+PARTS = 8
+"""Of the rows of view taps, whose sums for a mask's texture are made side by side: small textures have too few
+points to keep a GPU busy."""
+
+Array = NDArray[np.float64]
+
+
+def samples_back(
+    core: Footprints, values: Any, raster: NDArray[np.floating], progress: Progress | None = None
+) -> Any:
+    """The derivative of ⟨raster, what footprints make of samples⟩ to the samples, float32, in their library.
+
+    Args:
+        core: the footprints.
+        values: samples, of which only the shape is looked at.
+        raster: weights of the raster's values, (rows, columns, channels).
+        progress: called with (done, total) in view taps.
+    """
+    return given_back(samples_back_on_gpu(core, tuple(values.shape), raster, progress), values)
+
+
+def samples_back_on_gpu(
+    core: Footprints, shape: tuple[int, ...], raster: NDArray[np.floating], progress: Progress | None = None
+) -> Any:
+    """The same on the GPU, for samples of a shape."""
+    tables, channels = tables_of(core), raster.shape[2]
+    back = _Back(tables, raster)
+    gradient = zeros(shape)
+    order = np.argsort(core.view_columns, kind="stable")
+    views, begins = np.unique(core.view_columns[order], return_index=True)
+    ends = np.append(begins, len(order))
+    line = 4 * tables.fine.columns * channels
+    each = (core.raster_shape[0] + (shape[0] * tables.fine.rows if tables.divided else 0)) * line
+    at_once = max(ROOM // max(each * int(np.diff(ends).max(initial=1)), 1), 1)
+    done = 0
+    with tables.lock:
+        for first in range(0, len(views), at_once):
+            tell(progress, done, core.taps_used)
+            some = slice(first, min(first + at_once, len(views)))
+            columns = order[begins[some][0] : ends[some.stop]]
+            back.add(columns, ends[first : some.stop + 1] - begins[first], views[some], shape, gradient)
+            done += int(np.count_nonzero(core.weights[:, columns]))
+        cuda.synchronize()  # before others use the rooms
+    tell(progress, core.taps_used, core.taps_used)
+    return gradient
+
+
+def check_known(core: Footprints, wanted: Collection[str]) -> None:
+    """Refuse numbers to which this engine has no derivative.
+
+    Raises:
+        InputError: other numbers than masks' textures, weights of views and the scale.
+    """
+    core.check_wanted(wanted)
+    for name in wanted:
+        if name not in ("weights", "scale") and not name.endswith(".texture"):
+            raise InputError(
+                "engine 'cuda' has derivatives to textures of masks, weights and scale of footprints, and none "
+                f"to {name!r}: use engine='numba'"
+            )
+
+
+def numbers_back(
+    core: Footprints,
+    values: Any,
+    raster: NDArray[np.floating],
+    wanted: Collection[str],
+    progress: Progress | None = None,
+) -> dict[str, Array]:
+    """The derivative of ⟨raster, the raster of the samples⟩ to some of the core's numbers, float64.
+
+    Args:
+        core: the footprints.
+        values: the samples, of NumPy or on the GPU.
+        raster: weights of the raster's values, (rows, columns, channels).
+        wanted: names of masks' textures, ``weights`` and ``scale``.
+        progress: called with (done, total) in view taps.
+    """
+    tables = tables_of(core)
+    back = _Back(tables, raster)
+    masks = [n for n in range(len(core.masks)) if f"masks[{n}].texture" in wanted]
+    of_taps = np.zeros(core.weights.shape) if {"weights", "scale"} & set(wanted) else None
+    textures = {n: zeros((PARTS, *core.masks[n].texture.shape)) for n in masks}
+    cuda.synchronize()  # they are there before kernels in another stream add to them
+    line = tables.fine.rows * tables.fine.columns
+    with tables.lock, Pieces(tables, values, 4 * len(core.view_rows) * line, opened=of_taps is not None) as pieces:
+        for done, piece in enumerate(pieces):
+            tell(progress, done, len(core.view_columns))
+            source = back.source(piece, of_taps is not None)
+            if of_taps is not None:
+                of_taps[:, piece.start : piece.stop] = back.tap_sums(piece, back.agreeing(piece, source, -1))
+            for n, texture in textures.items():
+                given = tables.weights, tables.places, tables.grid, tables.textures.step, n, piece.start, texture
+                told = back.agreeing(piece, source, n)
+                launch(kernels.texture_back, texture.shape[::-1], piece.stream, told, *given)
+    tell(progress, 1, 1)
+    found = {f"masks[{n}].texture": core.scale * _summed(texture) for n, texture in textures.items()}
+    if of_taps is not None:
+        found |= {"weights": core.scale * of_taps, "scale": np.asarray((core.weights * of_taps).sum())}
+    return {name: found[name] for name in wanted}
+
+
+class _Back:
+    """A raster's weights on the GPU, and what they say.
+
+    Args:
+        tables: of the footprints.
+        raster: weights, (rows, columns, channels).
+    """
+
+    def __init__(self, tables: Tables, raster: NDArray[np.floating]) -> None:
+        self.tables, self.core, self.fine = tables, tables.core, tables.fine
+        self.channels = raster.shape[2]
+        self.raster = sent(raster.astype(np.float32))
+        self.scale = np.float32(self.core.scale)
+        self.n = self.fine.columns * self.channels
+        """Values in a row of finer samples."""
+
+    # --- to samples ---
+
+    def add(
+        self,
+        columns: NDArray[np.intp],
+        ends: NDArray[np.intp],
+        views: NDArray[np.int64],
+        shape: tuple[int, ...],
+        gradient: Any,
+    ) -> None:
+        """Fill in what some columns of views get.
+
+        Args:
+            columns: of view taps, sorted by the column of views that they read.
+            ends: where those of one column of views end, with 0 before.
+            views: the columns of views.
+            shape: of the samples.
+            gradient: of them, on the GPU.
+        """
+        tables, fine, channels = self.tables, self.fine, self.channels
+        nv, nu, nt, ns = shape[:4]
+        rows = np.argsort(self.core.view_rows, kind="stable")
+        row_ends = np.searchsorted(self.core.view_rows[rows], np.arange(nv + 1))
+        readers = kernels.Readers(*map(sent, (rows, row_ends, columns, ends)))
+        view = nt * ns * channels
+        flat = gradient.reshape(math.prod(shape))
+        target = kernels.Target(flat, sent(np.arange(nv) * nu * view), sent(views * view), ns * channels)
+        into = target
+        if tables.divided is not None:
+            finer = tables.room("divided", (len(views), nv, fine.rows, self.n))
+            begin, further = np.arange(nv) * fine.rows * self.n, np.arange(len(views)) * nv * fine.rows * self.n
+            into = kernels.Target(finer.reshape(math.prod(finer.shape)), sent(begin), sent(further), self.n)
+        places = fine.columns, fine.rows, nv * len(views)
+        if tables.along is None:
+            masks = tables.places, tables.grid, tables.footprint, tables.textures
+            given = self.raster, tables.weights, self.scale, *masks, fine.rows, readers, into
+            launch(kernels.sheared_back(channels), places, 0, *given)
+        else:
+            masks_rows = mask_rows(tables, tuple(map(int, columns)), 0)
+            mixed = self._mixed(readers.columns, 0)
+            given_rows = mixed, tables.weights, self.scale, *self._spread[0], masks_rows, readers, into
+            each, width = channels if self.core.masks else 1, self._spread[0][1].shape[2]
+            kernel = kernels.rows_back(each, bool(self.core.masks), width)
+            launch(kernel, (self.n // each, fine.rows, nv * len(views)), 0, *given_rows)
+        if tables.divided is not None:
+            given_back_to = finer, *self._undivided, channels, target
+            launch(kernels.give_back, (ns * channels, nt, nv * len(views)), 0, *given_back_to)
+
+    def _mixed(self, columns: Any, stream: Any) -> Any:
+        """See `kernels.mix_back`; columns: of view taps, on the GPU."""
+        rows, wide = self.core.raster_shape
+        mixed = self.tables.room("mixed", (columns.shape[0], rows, self.n))
+        flat = self.raster.reshape(rows, wide * self.channels)
+        kernel = kernels.mix_back(self._spread[1][1].shape[2])
+        launch(kernel, mixed.shape[::-1], stream, flat, columns, *self._spread[1], self.channels, mixed)
+        return mixed
+
+    @property
+    def _spread(self) -> tuple[Any, Any]:
+        """(first, shares) of the rows of the raster that a row of samples falls on; of columns likewise."""
+        return self.tables.once("spread", lambda: tuple(map(_on_pixels, axes(self.core, self.fine))))  # type: ignore[no-any-return]
+
+    @property
+    def _undivided(self) -> tuple[Any, Any]:
+        """(first, shares) of the finer rows that are made of a row of samples; of columns likewise."""
+
+        def made() -> Any:
+            assert self.fine.divided_as is not None
+            turned = [
+                Taps(part.first, part.shares).by_sample(n)
+                for part, n in zip(self.fine.divided_as, self.core.samples, strict=True)
+            ]
+            return tuple((sent(one.first), sent(one.weights)) for one in turned)
+
+        return self.tables.once("undivided", made)  # type: ignore[no-any-return]
+
+    # --- to numbers ---
+
+    def source(self, piece: Piece, opened: bool) -> Source:
+        """The samples of a piece, divided if need be; opened: those of closed taps, too."""
+        if self.tables.divided is None:
+            return piece.source
+        used = sent(np.ones(self.core.weights.shape, np.float32)) if opened else self.tables.weights
+        return divided(self.tables, piece, self.channels, used)
+
+    def agreeing(self, piece: Piece, source: Source, left_out: int) -> Any:
+        """How each sample agrees with the raster's weights, through all masks but one, in a room of the tables."""
+        tables, fine = self.tables, self.fine
+        columns = piece.stop - piece.start
+        told = tables.room("told", (columns, len(self.core.view_rows), fine.rows, fine.columns))
+        places = fine.columns, fine.rows, columns * len(self.core.view_rows)
+        if tables.along is None:
+            given = source, self.raster, tables.places, tables.grid, tables.footprint, tables.textures
+            launch(kernels.met_sheared(self.channels), places, piece.stream, *given, left_out, piece.start, told)
+            return told
+        here = tables.once(("columns", piece.start, piece.stop), lambda: sent(np.arange(piece.start, piece.stop)))
+        mixed = self._mixed(here, piece.stream)
+        along = source, mixed, *self._spread[0], tables.places, tables.grid, tables.textures
+        launch(kernels.met_in_rows(self.channels), places, piece.stream, *along, left_out, piece.start, told)
+        return told
+
+    def tap_sums(self, piece: Piece, told: Any) -> Array:
+        """Sums over the samples of each view tap of a piece, (rows of taps, columns of taps)."""
+        lines = cuda.device_array(told.shape[:3], np.float64)
+        launch(kernels.sum_lines, (told.shape[2], told.shape[0] * told.shape[1]), piece.stream, told, lines)
+        return np.asarray(brought(lines, piece.stream).sum(axis=2).T)
+
+
+def _on_pixels(axis: Axis) -> tuple[Any, Any]:
+    first, _, shares = axis.table()
+    return sent(first), sent(shares[:, :, 0].astype(np.float32))
+
+
+def _summed(parts: Any) -> Array:
+    return np.asarray(brought(parts).sum(axis=0, dtype=np.float64))

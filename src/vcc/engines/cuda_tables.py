@@ -1,0 +1,220 @@
+"""What a plan of footprints says, as arrays on the GPU: tables that stay there while their plan is used."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numba import cuda
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+from vcc.engines import cuda_footprint_kernels as kernels
+from vcc.engines import footprint_tables as tables
+from vcc.engines.cuda_arrays import launch, sent
+from vcc.engines.footprint_samples import FineGrid, on_raster, textures
+from vcc.plan.footprints.model import Footprints
+from vcc.plan.footprints.shares import taps
+
+AT_ONCE = 6
+"""Rows of samples that a thread asks for at once, at most: memory answers after some hundred instructions. Where
+samples are as large as pixels, four rows of the raster gather six."""
+KEPT = 4
+"""Plans whose tables stay on the GPU: those that were used last."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Tables(Brief):
+    """A plan on the GPU.
+
+    Args:
+        core: the plan's.
+        fine: how its samples are divided.
+        weights: (rows of taps, columns of taps) float32.
+        divided: (first, shares) of rows and of columns of finer samples, or None.
+        along: where rows and columns part: `kernels.Quads` of rows and how many are asked for at once, and (first,
+            shares) of columns; or None.
+        places: of samples on the raster and on masks.
+        grid: how samples lie there.
+        footprint: of a sample.
+        textures: the masks'.
+        kept: what else was made for it, see `once`.
+        lock: held by who uses its rooms.
+    """
+
+    core: Footprints
+    fine: FineGrid
+    weights: Any
+    divided: tuple[Any, Any] | None
+    along: tuple[tuple[kernels.Quads, int], tuple[Any, Any]] | None
+    places: kernels.Places
+    grid: tables.Grid
+    footprint: tables.Footprint
+    textures: tables.Textures
+    kept: dict[Any, Any] = field(default_factory=dict)
+    lock: Any = field(default_factory=Lock)
+
+    def once(self, key: Any, make: Callable[[], Any]) -> Any:
+        """What ``make`` makes, made once."""
+        if key not in self.kept:
+            self.kept[key] = make()
+        return self.kept[key]
+
+    def room(self, name: str, shape: tuple[int, ...]) -> Any:
+        """Room for float32 numbers, the same from run to run: new memory takes longer than many a kernel."""
+        size, known = math.prod(shape), self.kept.get(name)
+        if known is None or known.size < size:
+            known = self.kept[name] = cuda.device_array(size, np.float32)
+        return known[:size].reshape(shape)
+
+    def bytes_a_column(self, channels: int) -> int:
+        """Of the GPU's memory that a column of view taps takes beside its samples."""
+        core, line = self.core, 4 * self.fine.columns * channels
+        finer = len(core.view_rows) * self.fine.rows * line if self.divided else 0
+        if self.along is None:
+            return finer
+        lines = sum(len(mask.texture) for mask in core.masks) * 4 * self.fine.columns
+        return finer + core.raster_shape[0] * line + lines
+
+
+_kept: deque[Tables] = deque(maxlen=KEPT)
+_lock = Lock()
+
+
+def tables_of(core: Footprints) -> Tables:
+    """The tables of a plan: made now, or those that are on the GPU already.
+
+    A plan's arrays are never written to: plans that share all of them are alike, but for what a sample stands for.
+    """
+    with _lock:
+        for known in _kept:
+            if _alike(known.core, core):
+                return known
+        made = _made(core)
+        _kept.append(made)
+        return made
+
+
+def _alike(one: Footprints, other: Footprints) -> bool:
+    for each in fields(Footprints):
+        a, b = getattr(one, each.name), getattr(other, each.name)
+        if each.name == "scale" or a is b:
+            continue
+        if isinstance(a, np.ndarray) or isinstance(b, np.ndarray) or each.name == "masks" or a != b:
+            return False
+    return True
+
+
+def _made(core: Footprints) -> Tables:
+    fine = FineGrid(core)
+    weights = sent(core.weights.astype(np.float32))
+    divided = None
+    if fine.divided_as is not None:
+        divided = tuple((sent(part.first), sent(part.shares.astype(np.float32))) for part in fine.divided_as)
+    grid, footprint = on_raster(core, fine)
+    at = np.zeros((len(core.masks), *core.weights.shape, 2))
+    for place, mask in zip(at, core.masks, strict=True):
+        place[..., 0], place[..., 1] = mask.column, mask.row
+    values, size, step = textures(core)
+    return Tables(
+        core,
+        fine,
+        weights,
+        divided,  # type: ignore[arg-type]
+        _along(core, fine) if core.separable else None,
+        kernels.Places(sent(core.x), sent(core.y), sent(at)),
+        grid._replace(step=sent(core.step)),
+        footprint,
+        tables.Textures(sent(values), sent(size), sent(step)),
+    )
+
+
+def _along(core: Footprints, fine: FineGrid) -> tuple[tuple[kernels.Quads, int], tuple[Any, Any]]:
+    """How rows of the raster gather rows of samples, by fours, and columns columns."""
+    rows, columns = core.raster_shape
+    start_y = core.y[:, 0] + core.row_step * fine.first_row
+    start_x = core.x[0] + core.column_step * fine.first_column
+    row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
+    down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
+    across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
+    *quads, batch = _quads(down.first, down.weights)
+    return (kernels.Quads(*map(sent, quads)), batch), (sent(across.first.astype(np.int32)), sent(across.weights))
+
+
+def _quads(
+    first: NDArray[np.int64], shares: NDArray[np.float32]
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32], int]:
+    """`kernels.Quads` of the rows of samples that each row of the raster gathers, and how many are asked for at
+    once.
+
+    Args:
+        first: see `vcc.plan.footprints.shares.Taps`, (taps, rows).
+        shares: likewise, (taps, rows, width).
+    """
+    count, rows, width = shares.shape
+    there = shares != 0
+    lit = there.any(axis=2)
+    low = np.where(lit, first + there.argmax(axis=2), np.iinfo(np.int32).max)
+    high = np.where(lit, first + width - there[..., ::-1].argmax(axis=2), 0)
+    more = -rows % kernels.ROWS
+    fours = (count, -1, kernels.ROWS)
+    top = np.pad(low, [(0, 0), (0, more)], constant_values=np.iinfo(np.int32).max).reshape(fours).min(axis=2)
+    end = np.pad(high, [(0, 0), (0, more)]).reshape(fours).max(axis=2)
+    number = np.maximum(end - top, 0)
+    top = np.where(number > 0, top, 0)
+    most = max(int(number.max(initial=0)), 1)
+    batch = math.ceil(most / math.ceil(most / AT_ONCE))
+    made = np.zeros((*top.shape, math.ceil(most / batch) * batch, kernels.ROWS), np.float32)
+    tap, row, t = np.nonzero(there)
+    quad = row // kernels.ROWS
+    made[tap, quad, first[tap, row] + t - top[tap, quad], row % kernels.ROWS] = shares[tap, row, t]
+    return top.astype(np.int32), number.astype(np.int32), made, batch
+
+
+def mask_rows(tables: Tables, columns: tuple[int, ...], stream: Any) -> kernels.MaskRows:
+    """The masks' textures at the columns of samples that some columns of view taps read."""
+    core, fine = tables.core, tables.fine
+    groups, total, where = tables.once(("masks", columns), lambda: _mask_groups(tables, columns))
+    lines = tables.room("lines", (max(total, 1), fine.columns if groups else 1))
+    for m, place, at in groups:
+        high, wide = core.masks[m].texture.shape
+        part = lines[at : at + high]
+        across = core.masks[m].step[0, 0] / core.refine
+        given = tables.textures.values, m, high, wide, place, across, part
+        launch(kernels.mask_lines, (fine.columns, high), stream, *given)
+    return kernels.MaskRows(lines, *where)
+
+
+def _mask_groups(
+    tables: Tables, columns: tuple[int, ...]
+) -> tuple[list[tuple[int, float, int]], int, tuple[Any, ...]]:
+    """Which lines of masks columns of view taps need, how many that are, and `kernels.MaskRows` but for them.
+
+    Of each mask and place (mask, its column at the first sample, where its lines begin).
+
+    Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: lines are made once for
+    all taps that agree.
+    """
+    core, fine = tables.core, tables.fine
+    shape = (len(core.masks), *core.weights.shape)
+    begin, row = np.zeros(shape, np.int32), np.zeros(shape)
+    step = np.zeros(len(core.masks))
+    used = np.zeros(core.weights.shape, dtype=bool)
+    used[:, columns] = core.weights[:, columns] != 0
+    groups: list[tuple[int, float, int]] = []
+    total = 0
+    for m, mask in enumerate(core.masks):
+        step[m] = mask.step[1, 1] / core.refine
+        row[m] = mask.row + mask.step[1, 1] * fine.first_row
+        places, which = np.unique(np.round(mask.column[used], 7), return_inverse=True)
+        begin[m][used] = total + which * len(mask.texture)
+        for place in places:
+            groups.append((m, float(place + mask.step[0, 0] * fine.first_column), total))
+            total += len(mask.texture)
+    rows = np.array([len(mask.texture) for mask in core.masks], np.int32)
+    return groups, total, tuple(map(sent, (begin, rows, row, step)))
