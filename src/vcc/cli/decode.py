@@ -20,8 +20,7 @@ from vcc.cli.options import FolderNames, OutputFile, Overwrite, ViewExposure, ex
 from vcc.cli.raw_recordings import Recorded
 from vcc.formats.writing import kind_of, save_light_field
 from vcc.light_field import LightField
-from vcc.optics import LensArray, Mask
-from vcc.shapes.patterns import CosineSum
+from vcc.recover.decoding import way_of
 
 
 @Parameter(name="*", group=Group("The light field", sort_key=4))
@@ -54,7 +53,7 @@ def decode(
     output = free_output(output, written.overwrite)
     exposed(written.exposure, kind_of(output, written.kind))  # what cannot be written, before the work
     camera = None if recorded.camera is None else load_camera(recorded.camera)
-    if camera is not None and has_carrier(camera):
+    if camera is not None and way_of(camera) == "cosines":
         _refuse(told(lenslets), "for lenslets, and this camera has a mask of cosines")
         field, way = through_a_mask(raw, camera, recorded, cosines)
     else:
@@ -69,21 +68,6 @@ def _refuse(options: list[str], why: str) -> None:
     """Options that mean nothing for this camera."""
     if options:
         raise InputError(f"{', '.join(options)} {'is' if len(options) == 1 else 'are'} {why}: leave it out")
-
-
-def has_carrier(camera: Camera) -> bool:
-    """Whether a camera has a mask of cosines rather than lenslets.
-
-    Raises:
-        InputError: it has neither.
-    """
-    carrier = any(isinstance(each, Mask) and isinstance(each.pattern, CosineSum) for each in camera.elements)
-    if not carrier and not any(isinstance(each, LensArray) for each in camera.elements):
-        raise InputError(
-            "this camera has neither an array of lenslets nor a mask of cosines (pattern cosine_sum): its "
-            f"recording holds no views. Its elements: {', '.join(e.label for e in camera.elements)}"
-        )
-    return carrier
 
 
 def write(field: LightField, output: Path, written: Written, source: Path) -> None:

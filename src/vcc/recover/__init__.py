@@ -7,6 +7,7 @@ from __future__ import annotations
 from vcc.recover.aberration import without_aberration
 from vcc.recover.blur import blurred
 from vcc.recover.deblur import Deblurred, richardson_lucy, sparse_gradients, wiener
+from vcc.recover.decoding import Decoder
 from vcc.recover.defocus_depth import DefocusDepth, defocus_kernels, depth_from_defocus
 from vcc.recover.depth import DepthMap, depth_by_plane_sweep, depth_by_structure_tensor, disparity_error
 from vcc.recover.focal_stack import AllInFocus, FocalStack, focal_stack, focus_distances
@@ -22,6 +23,7 @@ __all__ = [
     "AllInFocus",
     "BiprismStereo",
     "Deblurred",
+    "Decoder",
     "DefocusDepth",
     "DepthMap",
     "FocalStack",

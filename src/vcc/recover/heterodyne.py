@@ -19,6 +19,7 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_samples
+from vcc.base.progress import Progress, tell
 from vcc.camera import Camera
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -108,6 +109,7 @@ def decode_heterodyne(
     calibration: Image | Recording | ArrayLike | None = None,
     border: float = 0.0,
     memory_limit: int | None = None,
+    progress: Progress | None = None,
 ) -> LightField:
     """The light field in a recording through a mask of cosines: as many views along each axis as spectral tiles.
 
@@ -131,6 +133,7 @@ def decode_heterodyne(
             0 is for scenes that are alike there, as black ones are, and carriers that fit a whole number of times.
         memory_limit: bytes that the tiles and what is made of them may take; None takes
             `vcc.base.memory.MEMORY_LIMIT`.
+        progress: called with (done, total): the calibration's tiles, and those of each channel.
 
     Returns:
         float32 radiance, shape (v, u, t, s[, channels]), at the entrance plane, upright; 0 where ringing
@@ -157,7 +160,10 @@ def decode_heterodyne(
     fade = np.multiply.outer(*(_fade(size, border) for size in raw.shape[:2]))
     strengths = _tiles(white * fade, setup)
     _check_carriers(strengths)
-    pixels = [_decoded(_tiles(channels[..., n] * fade, setup), strengths, setup) for n in range(channels.shape[2])]
+    pixels = []
+    for n in range(channels.shape[2]):
+        tell(progress, n + 1, channels.shape[2] + 1)
+        pixels.append(_decoded(_tiles(channels[..., n] * fade, setup), strengths, setup))
     values = np.stack(pixels, axis=-1)
     if raw.ndim == 2:
         values = values[..., 0]

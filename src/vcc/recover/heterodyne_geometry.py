@@ -242,14 +242,16 @@ def _two(numbers: Any) -> tuple[float, float]:
     return float(first), float(second)
 
 
+def carrier_of(mask: Mask) -> CosineSum | None:
+    """The cosines of a mask, on a sheet of some size or not; None of one with another pattern."""
+    pattern = as_pattern(mask.pattern)  # type: ignore[arg-type]
+    inner = pattern.pattern if isinstance(pattern, Bounded) else pattern
+    return inner if isinstance(inner, CosineSum) else None
+
+
 def _carrier_mask(camera: Camera) -> tuple[Mask, CosineSum]:
-    found = []
-    for element in camera.elements:
-        if isinstance(element, Mask):
-            pattern = as_pattern(element.pattern)  # type: ignore[arg-type]
-            inner = pattern.pattern if isinstance(pattern, Bounded) else pattern
-            if isinstance(inner, CosineSum):
-                found.append((element, inner))
+    masks = [element for element in camera.elements if isinstance(element, Mask)]
+    found = [(mask, carrier) for mask in masks if (carrier := carrier_of(mask)) is not None]
     if len(found) != 1:
         listed = ", ".join(element.label for element in camera.elements) or "none"
         raise InputError(

@@ -20,6 +20,7 @@ from vcc.base.affine import Affine
 from vcc.base.checks import above_zero, whole_number
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.memory import check_samples
+from vcc.base.progress import Progress, tell
 from vcc.camera import Camera
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -57,6 +58,7 @@ def decode_plenoptic(
     step: float | None = None,
     inverted: bool = True,
     memory_limit: int | None = None,
+    progress: Progress | None = None,
 ) -> LightField:
     """The light field that a plenoptic camera recorded: a picture for each place in a micro-image.
 
@@ -83,6 +85,7 @@ def decode_plenoptic(
         inverted: whether the recording is as light lands on the sensor, upside down, which is then turned. Views
             are upright either way.
         memory_limit: bytes that the light field may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        progress: called with (views done, of how many).
 
     Returns:
         float32, shape (v, u, t, s[, channels]), upright; 0 where the white image is dark, and where noise went
@@ -106,7 +109,7 @@ def decode_plenoptic(
     channels = raw.shape[2] if raw.ndim == 3 else None
     check_samples((*counts, *lenslets.shape, channels or 1), memory_limit, "the decoded light field")
     planes = np.moveaxis(np.atleast_3d(raw), 2, 0).astype(np.float32)
-    values = _read(lenslets, planes, prepared.told, counts, view_step, -1 if inverted else 1)
+    values = _read(lenslets, planes, prepared.told, counts, view_step, -1 if inverted else 1, progress)
     if channels is None:
         values = values[..., 0]
     if camera is None:
@@ -121,6 +124,7 @@ def _read(
     counts: tuple[int, int],
     view_step: float,
     turn: int,
+    progress: Progress | None,
 ) -> Floats:
     """All views, (v, u, rows, columns, channels), 0 or more, turned by 180° where ``turn`` is −1."""
     values = np.zeros((*counts, *lenslets.shape, len(planes)), np.float32)
@@ -130,6 +134,7 @@ def _read(
         picture, dark = lenslets.view(planes, told, (turn * right, turn * down))
         values[row, column] = picture[::turn, ::turn]
         missing += dark
+        tell(progress, row * counts[1] + column + 1, math.prod(counts))
     share = missing / math.prod((*counts, *lenslets.shape))
     if share > 0.01:
         warnings.warn(
