@@ -43,6 +43,16 @@ CODE = {
     "width": "18 mm",
 }
 LENSLETS = {"kind": "lens_array", "name": "lenslets", "z": "52.94 mm", "pitch": "0.5 mm", "focal_length": "1.4 mm"}
+DECODED = {
+    "kind": "lens_array",
+    "name": "lenslets",
+    "z": "52.94 mm",
+    "pitch": "0.213 mm",
+    "focal_length": "0.633 mm",
+    "offset": ["0.1065 mm", "0.1065 mm"],
+}
+SQUARE = {"kind": "mask", "name": "square stop", "z": "0 mm", "pattern": [[1]], "width": "18 mm"}
+FINE = {"z": "53.573 mm", "shape": [400, 600], "pitch": "43.1 um"}
 PLATE = {
     "kind": "phase_plate",
     "name": "cubic",
@@ -129,6 +139,13 @@ def lenslets(bench: Bench) -> None:
     bench.settle()
 
 
+def decoded(bench: Bench) -> None:
+    """The views of a plenoptic camera, refocused on what is farthest."""
+    bench.tab("Decoded")
+    bench.page.get_by_role("slider", name="Refocused").press("End")
+    bench.page.wait_for_timeout(700)
+
+
 def compared(bench: Bench) -> None:
     """A plate of wavefront coding against the lens alone, by a wipe."""
     bench.page.get_by_role("button", name="Pin").click()
@@ -155,6 +172,12 @@ STATES: dict[str, tuple[dict[str, Any], Callable[[Bench], None], int, str]] = {
     "dragged": (camera(), dragged, WIDE, "light"),
     "coded": (camera(CODE, z="56 mm"), coded, WIDE, "light"),
     "lenslets": (camera(LENSLETS, z="54.34 mm"), lenslets, WIDE, "dark"),
+    "decoded": (
+        {"elements": [LENS | {"diameter": "26 mm"}, SQUARE, DECODED], "sensor": FINE},
+        decoded,
+        WIDE,
+        "light",
+    ),
     "compared": (camera(), compared, WIDE, "light"),
     "phase-space": (camera(CODE | {"z": "26 mm"}), phase_space, WIDE, "dark"),
     "notes": (camera(PLATE, z="55.5 mm"), notes, WIDE, "light"),

@@ -29,6 +29,15 @@ CAMERA = {
     "sensor": {"z": "52 mm", "shape": [60, 80], "pitch": "0.25 mm"},
 }
 
+LENSLETS = {
+    "elements": [
+        CAMERA["elements"][0],
+        {"kind": "lens_array", "name": "array", "z": "52 mm", "pitch": "0.59 mm", "focal_length": "1.73 mm"},
+    ],
+    "sensor": {"z": "53.73 mm", "shape": [60, 80], "pitch": "0.2 mm"},
+}
+"""3×3 views."""
+
 
 def light_field():
     """The demo's scene, small."""
@@ -49,6 +58,7 @@ class Served:
             },
             Document(CAMERA, "scene"),
             Beside(Path(), frozenset()),
+            {"lenslets": Document(LENSLETS, "scene")},
         )
         self.port = 0
 

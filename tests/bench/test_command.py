@@ -10,7 +10,7 @@ import vcc
 from tests.bench.on_bench import PIXELS, Client, noise
 from tests.command_line import KNOWN, refused, run, write_views
 from vcc.bench import cameras
-from vcc.bench.cameras import SCENE
+from vcc.bench.cameras import SCENE, SOFT
 from vcc.cli import bench as command
 
 
@@ -62,7 +62,7 @@ def test_a_camera_file_and_a_light_field_are_on_the_bench(offered, files, name):
     done = run("bench", "camera.toml", name, *(KNOWN if name == "views" else ()))
     assert done.exit_code == 0, done.output
     there = offered["there"]
-    assert list(there.fields) == [name, SCENE]
+    assert list(there.fields) == [name, SCENE, SOFT]
     assert there.start.light_field == name
     train = there.start.train(there.beside).train
     loaded = vcc.load_camera(files / "camera.toml")
@@ -88,17 +88,18 @@ def test_without_anything_it_is_a_lens_before_the_scene(offered):
     assert run("bench", "--no-browser", "--port", "8123").exit_code == 0
     assert (offered["host"], offered["port"], offered["browser"]) == ("127.0.0.1", 8123, False)
     there = offered["there"]
-    assert list(there.fields) == [SCENE]
+    assert list(there.fields) == [SCENE, SOFT]
     assert there.start.camera["elements"][0]["kind"] == "lens"
     assert len(there.gallery) >= 5
     for document in there.gallery.values():
         document.train(there.beside)
 
 
-def test_the_program_of_the_scene_makes_the_same_views(monkeypatch):
+@pytest.mark.parametrize("name", [SCENE, SOFT])
+def test_the_program_of_a_scene_makes_the_same_views(monkeypatch, name):
     monkeypatch.setattr(cameras, "VIEWS", 2)
     monkeypatch.setattr(cameras, "PIXELS", 24)
-    field, made = cameras.scene(), {}
+    field, made = cameras.scenes()[name], {}
     exec(field.source, made)
     assert np.array_equal(made["light_field"].values, field.whole().values)
     assert made["light_field"].frame == field.whole().frame

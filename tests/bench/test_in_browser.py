@@ -321,9 +321,29 @@ def test_accessibility_has_no_serious_fault(browser, served, scheme, width):
     page.page.get_by_role("button", name="Film of a sweep").click()
     page.page.get_by_role("tab", name="mask code").click()
     without_fault(page)
+    decoded_and_refocused(page)
+    without_fault(page)
     wider = page.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
     assert wider <= 0  # nothing has to be scrolled sideways
     page.close()
+
+
+def decoded_and_refocused(page):
+    """A camera that can be decoded has a tab, and in it a slider of distance that works by keys."""
+    tab = page.page.get_by_role("tab", name="Decoded")
+    assert tab.count() == 0
+    page.page.get_by_text("Open", exact=True).click()
+    page.button("lenslets").click()
+    tab.click()
+    refocused = page.page.get_by_role("img", name="Picture refocused on what is ")
+    before = refocused.get_attribute("src")
+    slider = page.page.get_by_role("slider", name="Refocused")
+    slider.press("End")
+    assert slider.get_attribute("aria-valuetext") == "at 3 m"
+    page.page.get_by_role("img", name="Picture refocused on what is at 3 m").wait_for()
+    assert refocused.get_attribute("src") != before
+    page.button("as the camera is").click()
+    page.page.get_by_role("img", name="Picture refocused on what is at 1.3 m").wait_for()
 
 
 def test_phase_space_is_shown_at_any_plane_and_follows_the_camera(page):

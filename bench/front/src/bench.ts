@@ -3,7 +3,7 @@
 import { read, written } from "./address";
 import type { Host } from "./host";
 import type {
-  AnswerMessage, BenchDocument, FromHost, Note, Parts, PictureMessage, Side, SideAperture, SideElement, SideSensor, Table, Value, ValueMessage, Where,
+  AnswerMessage, BenchDocument, DecodedMessage, FromHost, Note, Parts, PictureMessage, RefocusedMessage, Side, SideAperture, SideElement, SideSensor, Table, Value, ValueMessage, Where,
 } from "./protocol";
 
 /** What is selected: an element's number, or one of the two that always are there. */
@@ -52,11 +52,18 @@ export class Bench extends EventTarget {
   progress: { done: number; total: number; words: string } | null = null;
   /** The newest to each question. */
   readonly answers = new Map<string, Answer>();
+  decoded: { message: DecodedMessage; pictures: string[] } | null = null;
+  /** What was refocused since. */
+  refocused: { message: RefocusedMessage; picture: string } | null = null;
+  /** Whether decoded views are still to come. */
+  decoding = false;
   /** Whether a picture of what was asked last is still to come. */
   waiting = false;
 
+  /** Of what was asked last that shows another picture. */
+  turn = 0;
+
   private silent = false;
-  private turn = 0;
   /** What is selected once the host has answered this turn: an element that it adds. */
   private selectAt = Infinity;
   private selectThen: Selected = "sensor";
@@ -135,6 +142,7 @@ export class Bench extends EventTarget {
   }
 
   question(what: string, options: object = {}): void {
+    if (what === "decoded") this.decoding = true;
     this.host.send({ do: "ask", what, ...options });
   }
 
@@ -239,6 +247,7 @@ export class Bench extends EventTarget {
         break;
       case "failed":
         this.refused = { words: message.words, where: null };
+        this.decoding = false;
         this.waiting = false;
         this.progress = null;
         this.settle();
@@ -265,7 +274,7 @@ export class Bench extends EventTarget {
         if (this.nextValue) this.askValue(...this.nextValue);
         break;
       case "answer":
-        this.answers.set(message.what, { message, pictures: buffers.map(dataAddress) });
+        this.hearAnswer(message, buffers.map(dataAddress));
         break;
       case "file":
         if (buffers[0]) saved(message.name, message.type, buffers[0]);
@@ -273,6 +282,7 @@ export class Bench extends EventTarget {
         break;
       case "refused":
         this.refused = { words: message.words, where: message.where ?? null };
+        this.decoding = false;
         this.selectAt = Infinity;
         this.waiting = false;
         this.progress = null;
@@ -286,6 +296,15 @@ export class Bench extends EventTarget {
         break;
     }
     this.changed();
+  }
+
+  private hearAnswer(message: AnswerMessage | DecodedMessage | RefocusedMessage, pictures: string[]): void {
+    if (message.what === "refocused") this.refocused = { message, picture: pictures[0]! };
+    else if (message.what === "decoded") {
+      this.decoded = { message, pictures };
+      this.refocused = null;
+      this.decoding = false;
+    } else this.answers.set(message.what, { message, pictures });
   }
 
   /** Pictures are decoded beside one another; one that is older than what is shown is not shown. */

@@ -182,6 +182,28 @@ export type AnswerMessage =
   | { is: "answer"; what: "mtf"; across: Curve; down: Curve; distance: number | null }
   | { is: "answer"; what: "phase space"; planes: Plane[]; frame: { place: [number, number]; slope: [number, number] } | null };
 
+/** The decoded views of a camera, or why there are none; metres, null for infinitely far. */
+export type DecodedMessage = { is: "answer"; what: "decoded" } & (
+  | { why: string }
+  | {
+      why?: undefined;
+      words: string;
+      remarks: string[];
+      views: [number, number];
+      shape: [number, number];
+      nearest: number | null;
+      farthest: number | null;
+      focus: number | null;
+      distance: number | null;
+    }
+);
+
+export interface RefocusedMessage {
+  is: "answer";
+  what: "refocused";
+  distance: number | null;
+}
+
 export type FromHost =
   | { is: "key"; key: string }
   | PartsMessage
@@ -189,6 +211,8 @@ export type FromHost =
   | PictureMessage
   | ValueMessage
   | AnswerMessage
+  | DecodedMessage
+  | RefocusedMessage
   | { is: "notes"; turn: number; notes: Note[] }
   | { is: "no picture"; turn: number; words: string }
   | { is: "failed"; words: string }

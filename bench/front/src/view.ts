@@ -6,6 +6,7 @@ import { Part, controls, named } from "./part";
 import { APERTURE, EditorView } from "./editor";
 import { PictureView } from "./picture";
 import { SideView } from "./side";
+import { DecodedView, foldsViews } from "./decoded";
 import { OF_A_POINT, OF_PLANES, QUESTIONS, answerStyles, drawnAnswer } from "./answers";
 import { sign } from "./signs";
 import { inMillimetres, metres, plain, split, withUnit } from "./numbers";
@@ -100,7 +101,7 @@ export class BenchView extends Part {
       if (this.askNext) this.askAgain();
     }
     if (this.beside === "parts" || this.beside === "notes" || !this.bench.document) return;
-    const about = this.beside + JSON.stringify(this.bench.document);
+    const about = `${this.beside} ${this.bench.turn} ${JSON.stringify(this.bench.document)}`;
     if (about === this.askedFor) return;
     const first = this.askedFor === "";
     const end = metres(this.bench.document.camera.sensor["z"]);
@@ -113,6 +114,11 @@ export class BenchView extends Part {
 
   private askAgain(): void {
     if (this.beside === "parts" || this.beside === "notes") return;
+    if (this.beside === "decoded") {
+      const distance = this.renderRoot.querySelector<DecodedView>("vcc-bench-decoded")?.distance;
+      this.bench.question("decoded", distance ? { distance } : {});
+      return;
+    }
     this.askNext = this.underway !== null;
     if (this.askNext) return;
     this.underway = { what: this.beside, before: this.bench.answers.get(this.beside) };
@@ -181,6 +187,7 @@ export class BenchView extends Part {
       ["notes", bench.notes.length ? `Notes ${bench.notes.length}` : "Notes"],
       ...QUESTIONS,
     ];
+    if (foldsViews(bench.document) || this.beside === "decoded") tabs.push(["decoded", "Decoded"]);
     return html`<div class="tabs" role="tablist" aria-label="Beside the picture" @keydown=${(event: KeyboardEvent) => {
         const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
         if (!by) return;
@@ -203,6 +210,9 @@ export class BenchView extends Part {
         ${bench.side?.words.map((words) => html`<p>${words}</p>`)}
         ${bench.notes.length ? nothing : html`<p class="quiet">Nothing to note: no ray misses, and nothing is too fine for the light field or the sensor.</p>`}
         ${bench.notes.map((note) => html`<p class="advice">${note.element === null ? nothing : html`<button class="link" @click=${() => bench.select(note.element!)}>${bench.partOf(note.element)?.label[0] ?? ""}</button>`}${note.words}</p>`)}</div>`;
+    if (this.beside === "decoded")
+      return html`<div id="pane" class="pane text" role="tabpanel" aria-labelledby=${label} tabindex="0" aria-busy=${bench.decoding || !bench.decoded}>
+        <vcc-bench-decoded .bench=${bench}></vcc-bench-decoded></div>`;
     const answer = bench.answers.get(this.beside);
     return html`<div id="pane" class="pane text answer" role="tabpanel" aria-labelledby=${label} tabindex="0" aria-busy=${!answer}>
       ${OF_A_POINT.includes(this.beside) ? html`<label class="distance">point at <input type="text" placeholder="in focus" .value=${this.distance}
@@ -418,6 +428,7 @@ export function register(): void {
   named("vcc-bench-side", SideView);
   named("vcc-bench-picture", PictureView);
   named("vcc-bench-editor", EditorView);
+  named("vcc-bench-decoded", DecodedView);
   named("vcc-bench-view", BenchView);
   named("vcc-bench", BenchFrame);
 }

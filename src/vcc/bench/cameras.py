@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from vcc.base.progress import Progress
 from vcc.base.units import mm
 from vcc.bench.document import Document
@@ -13,6 +15,10 @@ from vcc.showcase.scene import MIDDLE, demo_scene
 
 SCENE = "leaves, chart and town"
 """What the demo's scene is called on a bench."""
+SOFT = "leaves, chart and town, without fine detail"
+"""The same as `without_detail` leaves it: what is finer than its tiles a heterodyne camera cannot tell apart."""
+DETAIL = 1.4
+"""Of the Gaussian that takes it away, pixels of a view: 0.6 pixels of those that the heterodyne camera decodes."""
 VIEWS, PIXELS = 9, 320
 """A side of the demo's light field."""
 APERTURE = 20 * mm
@@ -24,7 +30,12 @@ PITCH = "75 um"
 Json = dict[str, Any]
 
 _LENS: Json = {"kind": "lens", "name": "main", "z": "0 mm", "focal_length": "50 mm", "diameter": "18 mm"}
+_WIDE_LENS: Json = _LENS | {"diameter": "28 mm"}
+_SQUARE_STOP: Json = {"kind": "mask", "name": "square stop", "z": "0 mm", "pattern": [[1]]}
 _SENSOR: Json = {"z": "52 mm", "shape": [PIXELS, PIXELS], "pitch": PITCH}
+
+HETERODYNE = "A cosine mask before the sensor: a heterodyne camera, 5×5 views of 117×117 pixels"
+PLENOPTIC = "Lenslets before the sensor: a plenoptic camera, 5×5 views of 100×100 pixels"
 
 _CAMERAS: dict[str, list[Json]] = {
     "A lens": [_LENS],
@@ -38,9 +49,15 @@ _CAMERAS: dict[str, list[Json]] = {
             "width": "21 mm",
         },
     ],
-    "A cosine mask before the sensor, as in heterodyne cameras": [
-        _LENS,
-        {"kind": "mask", "name": "cosine", "z": "50 mm", "pattern": {"name": "cosine_sum", "period": "1.6 mm"}},
+    HETERODYNE: [
+        _WIDE_LENS,
+        _SQUARE_STOP | {"width": "19.5 mm"},
+        {
+            "kind": "mask",
+            "name": "cosines",
+            "z": "51.52 mm",
+            "pattern": {"name": "cosine_sum", "period": "0.18 mm", "harmonics": 2},
+        },
     ],
     "Wavefront coding: a cubic plate at the lens": [
         _LENS,
@@ -60,36 +77,68 @@ _CAMERAS: dict[str, list[Json]] = {
         _LENS,
         {"kind": "biprism", "name": "biprism", "z": "0 mm", "deflection": 0.04},
     ],
-    "Lenslets before the sensor: a plenoptic camera": [
-        _LENS,
-        {"kind": "lens_array", "name": "lenslets", "z": "52 mm", "pitch": "0.6 mm", "focal_length": "1.3 mm"},
+    PLENOPTIC: [
+        _WIDE_LENS,
+        _SQUARE_STOP | {"width": "19.44 mm"},
+        {
+            "kind": "lens_array",
+            "name": "lenslets",
+            "z": "52 mm",
+            "pitch": "0.24 mm",
+            "focal_length": "0.65 mm",
+            "offset": ["0.12 mm", "0.12 mm"],
+        },
     ],
 }
+
+_SENSORS: dict[str, Json] = {
+    HETERODYNE: {"z": "52 mm", "shape": [660, 660], "pitch": "36.3 um"},
+    PLENOPTIC: {"z": "52.65 mm", "shape": [500, 500], "pitch": "48.6 um"},
+}
+"""Of the cameras that have another one than `_SENSOR`.
+
+Lenslets of pitch p, b before the sensor and d behind the lens, have micro-images p·(1 + b/d) = 0.243 mm apart,
+five pixels; a stop of 0.243 mm·d/b = 19.44 mm fills them. Of a mask g before the sensor, with a period P, the
+recording's spectrum has tiles (1 − g/d)/P apart, a fifth of what pixels of 36.3 µm hold; P·d/g = 19.5 mm
+of the lens are told apart, the stop.
+"""
 
 
 def cameras(light_field: str) -> dict[str, Document]:
     """The cameras, as what a bench shows, by their titles.
 
     Args:
-        light_field: the name of the one before them.
+        light_field: the name of the one before them; before the heterodyne camera it is `SOFT`.
     """
     found = {}
     for title, elements in _CAMERAS.items():
-        behind = any(element["kind"] == "lens_array" for element in elements)
-        sensor = _SENSOR | ({"z": "53.3 mm"} if behind else {})
-        found[title] = Document({"elements": elements, "sensor": sensor}, light_field)
+        tables = {"elements": elements, "sensor": _SENSORS.get(title, _SENSOR)}
+        found[title] = Document(tables, SOFT if title == HETERODYNE else light_field)
     return found
 
 
-def scene() -> Field:
-    """The demo's scene before a lens of 50 mm, made when it is first looked at."""
+def scenes() -> dict[str, Field]:
+    """The demo's scene before a lens of 50 mm, as it is and `SOFT`, each made when it is first looked at."""
     source = (
         "from vcc.showcase.scene import demo_scene\n\n"
         f"light_field = demo_scene().light_field(\n    ({VIEWS}, {VIEWS}),\n    ({PIXELS}, {PIXELS}),\n"
         f"    spacing={APERTURE / VIEWS!r},\n    slope_per_pixel={WIDE / PIXELS / IMAGE!r},\n"
         f"    focus_distance={MIDDLE!r},\n)"
     )
-    return Field(_made, source)
+    softer = "\n\nfrom vcc.bench.cameras import without_detail\n\nlight_field = without_detail(light_field)"
+    soft = Field(lambda progress: without_detail(_made(progress)), source + softer)
+    return {SCENE: Field(_made, source), SOFT: soft}
+
+
+def without_detail(light_field: LightField) -> LightField:
+    """A light field of bytes whose views are blurred by a Gaussian of `DETAIL` pixels."""
+    from scipy.ndimage import gaussian_filter
+
+    values = np.empty_like(light_field.values)
+    for j, i in np.ndindex(values.shape[:2]):  # a view at a time, so that numbers between bytes take little memory
+        view = light_field.values[j, i].astype(np.float32)
+        values[j, i] = np.rint(gaussian_filter(view, (DETAIL, DETAIL, 0), mode="nearest"))
+    return light_field.replaced(values)
 
 
 def _made(progress: Progress | None) -> LightField:

@@ -12,7 +12,8 @@ import logging
 import math
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,7 +23,8 @@ from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.limits import sampling_limits
 from vcc.base import units
 from vcc.base.errors import InputError
-from vcc.bench import additions, answers, export
+from vcc.base.progress import Progress
+from vcc.bench import additions, answers, decoded, export
 from vcc.bench.aperture import drawn_aperture
 from vcc.bench.document import Document, History, shown
 from vcc.bench.focusing import distance_at
@@ -103,6 +105,7 @@ class Session:
         self._taken: Taken | None = None
         self._shown_white = 1.0
         self._pinned: tuple[Picture, float] | None = None
+        self._decoding = decoded.Decoding()
         self._thread: threading.Thread | None = None
 
     @property
@@ -175,7 +178,7 @@ class Session:
                 if self._closed or not self._has_to_do():
                     self._thread = None
                     return
-                message, buffers = self._inbox.popleft() if self._inbox else (None, [])
+                message, buffers = self._next()
             try:
                 if message is None:
                     self._make_picture()
@@ -190,6 +193,12 @@ class Session:
 
     def _has_to_do(self) -> bool:
         return self._closed or bool(self._inbox) or (self._wanted is not None and self._send is not None)
+
+    def _next(self) -> tuple[Json | None, list[bytes]]:
+        """The next message; none where a picture is to be made first."""
+        if not self._inbox or (self._wanted and _after_picture([message for message, _ in self._inbox])):
+            return None, []
+        return self._inbox.popleft()
 
     def _tell(self, message: Json, buffers: Sequence[bytes] = ()) -> None:
         send = self._send
@@ -206,6 +215,8 @@ class Session:
         except (InputError, MemoryError) as error:
             self._refuse(message, _in_words(error))
         except Superseded:
+            if message.get("what") in decoded.QUESTIONS:
+                return  # who looks at it asks again, of what is there then
             self._refuse(message, InputError(f"{doing} was broken off: something else was asked for meanwhile"))
 
     def _refuse(self, message: Json, error: InputError) -> None:
@@ -459,6 +470,17 @@ class Session:
             taken = take(described.train, field, document, fineness, progress)
         return replace(taken, seconds=taken.seconds - waited)
 
+    @contextmanager
+    def _all_cores(self) -> Iterator[Progress]:
+        """The turn of one who keeps all cores at work, and what it says how far it is to."""
+        with self.offered.turn.held(self._check_wanted) as let_pass:
+
+            def progress(done: int, total: int) -> None:
+                self._check_wanted()
+                let_pass()
+
+            yield progress
+
     def _no_picture(self, wanted: Wanted, error: InputError) -> None:
         self._wanted, self._taken = None, None
         self._tell({"is": "no picture", "turn": wanted.turn, "words": str(error)})
@@ -548,8 +570,24 @@ class Session:
 
     def _do_ask(self, message: Json) -> None:
         what = message.get("what")
+        if what in decoded.QUESTIONS:
+            answer, buffers = self._decoding.answer(message, self._asked())
+            self._tell({"is": "answer", "what": what, **answer}, buffers)
+            return
         answer, buffers = answers.answer(what, message, self._described.train, self._light_field())
         self._tell({"is": "answer", "what": what, **answer}, buffers)
+
+    def _asked(self) -> decoded.Asked:
+        """What is there to be decoded."""
+        document, train = self._history.present, self._described.train
+        return decoded.Asked(
+            train,
+            self._light_field(),
+            (train, document.light_field, document.views, document.aperture),
+            document.noise,
+            self._whole_picture,
+            self._all_cores,
+        )
 
     def _do_export(self, message: Json) -> None:
         document = self._history.present
@@ -604,4 +642,12 @@ def _replaces(newer: Json, older: Json) -> bool:
     same = newer["do"] == older["do"]
     if same and newer["do"] == "set":
         return bool(older.get("moving")) and json.dumps(newer.get("where")) == json.dumps(older.get("where"))
+    if same and newer.get("what") in decoded.QUESTIONS:
+        return bool(newer["what"] == older.get("what"))
     return bool(same and newer["do"] == "value")
+
+
+def _after_picture(waiting: Sequence[Json]) -> bool:
+    """Whether the first of some messages is about the picture that is to be made, which is still wanted."""
+    superseded = any(message["do"] in CHANGES for message in waiting)
+    return not superseded and waiting[0].get("what") in decoded.QUESTIONS

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
-from vcc.bench.cameras import SCENE, cameras, scene
+from vcc.bench.cameras import SCENE, cameras, scenes
 from vcc.bench.document import Document
 from vcc.bench.offered import Field, Offered
 from vcc.bench.published import Gallery, title_of
@@ -44,7 +44,7 @@ def bench(
         no_browser: Print the address, and open no browser.
         gallery: Begin with a published camera of the gallery, such as plenoptic; vcc gallery lists their names.
     """
-    fields = {SCENE: scene()}
+    fields = scenes()
     name = SCENE
     if light_field is not None:
         if not light_field.expanduser().exists():

@@ -1,0 +1,220 @@
+"""What a camera that folds views into its picture shows beside it: the decoded views, and pictures refocused.
+
+A session asks for them by `vcc.bench.session`'s ``ask``:
+
+- ``"decoded"``, with ``distance`` (a length in words) or without, is answered by ``words`` (how many views of how
+  many pixels), ``remarks``, ``views`` and ``shape`` (both rows, columns), ``nearest`` and ``farthest`` (between
+  which a distance may be chosen), ``focus`` (the camera's own) and ``distance``, all in metres, null for
+  infinitely far, and three JPEGs: a sheet of all views, the middle view, the picture refocused on the distance.
+  Where the camera cannot be decoded the answer is ``why``, in words, alone.
+- ``"refocused"``, with ``distance``, is answered by ``distance`` and the picture.
+
+What is decoded is kept until the camera, the light field or the noise is another one; the calibration until the
+camera or the light field is.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Hashable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vcc.base import units
+from vcc.base.describe import Brief
+from vcc.base.errors import InputError
+from vcc.base.progress import Progress
+from vcc.bench.picture import Picture, Taken, jpeg, white_of
+from vcc.bench.side import scene_distances
+from vcc.camera import Camera
+from vcc.image import Image
+from vcc.light_field import LightField
+from vcc.notebook.contacts import spread
+from vcc.notebook.pictures import averaged
+from vcc.optics.train import Train
+from vcc.plot.fans import focused_distance
+from vcc.recover import Decoder, refocused
+
+Json = dict[str, Any]
+Answer = tuple[Json, list[bytes]]
+
+QUESTIONS = ("decoded", "refocused")
+MOST_ACROSS = 11
+"""Views along an axis of a sheet: of more, some are left out."""
+SHEET = 800
+"""Pixels of a sheet's longer side, at most."""
+LINE = 2
+"""Pixels between the views of a sheet."""
+AROUND_FOCUS = 2.0
+"""Of a scene whose depth is not known, distances from the focused one over this to infinity are offered."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is to be decoded.
+
+    Args:
+        train: the camera.
+        light_field: before it.
+        of: what tells cameras and light fields apart.
+        noise: whether electronics record the picture.
+        picture: makes the whole picture, or gives it where it is there.
+        turn: held while all cores are at work; gives what is to be called meanwhile, and may end the work.
+    """
+
+    train: Train
+    light_field: LightField
+    of: Hashable
+    noise: bool
+    picture: Callable[[], Taken]
+    turn: Callable[[], AbstractContextManager[Progress]]
+
+    @property
+    def camera(self) -> Camera:
+        """The camera, with its verbs."""
+        return Camera(self.train.elements, self.train.sensor)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Decoded(Brief):
+    """A decoded light field and how it is shown.
+
+    Args:
+        of: what it was decoded of: `Asked.of` and whether there was noise.
+        decoder: by which.
+        views: the light field.
+        white: the radiance that is shown white, in all its pictures.
+        remarks: warnings, in words.
+    """
+
+    of: Hashable
+    decoder: Decoder
+    views: LightField
+    white: float
+    remarks: tuple[str, ...]
+
+
+class Decoding:
+    """What a session has decoded last."""
+
+    def __init__(self) -> None:
+        self._calibrated: tuple[Hashable, Image] | None = None
+        self._decoded: Decoded | None = None
+
+    def answer(self, message: Json, asked: Asked) -> Answer:
+        """The answer to one of `QUESTIONS`, and its pictures.
+
+        Args:
+            message: what was asked.
+            asked: of which camera.
+
+        Raises:
+            InputError: a distance that is none; for ``"refocused"``, a camera that cannot be decoded.
+        """
+        distance = _distance(message, asked.train)
+        try:
+            decoded = self._of(asked)
+        except InputError as error:
+            if message["what"] == "refocused":
+                raise
+            return {"why": str(error)}, []
+        with asked.turn() as progress:
+            picture = _refocused(decoded, distance, progress)
+        if message["what"] == "refocused":
+            return {"distance": _finite(distance)}, [picture]
+        middle = decoded.views.view(*decoded.views.grid.middle_view).to_numpy()
+        pictures = [_jpeg(_sheet(decoded.views), decoded.white), _jpeg(middle, decoded.white), picture]
+        return _told(decoded, distance, asked), pictures
+
+    def _of(self, asked: Asked) -> Decoded:
+        kept = self._decoded
+        if kept is None or kept.of != (asked.of, asked.noise):
+            self._decoded = kept = self._made(asked)
+        return kept
+
+    def _made(self, asked: Asked) -> Decoded:
+        decoder = Decoder.of(asked.camera, asked.light_field.grid)
+        taken = asked.picture()
+        recording = taken.image if taken.recording is None else taken.recording
+        with asked.turn() as progress:
+            if self._calibrated is None or self._calibrated[0] != asked.of:
+                self._calibrated = None  # not two of them at once
+                self._calibrated = asked.of, decoder.calibration(asked.light_field, progress)
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                views = decoder.decoded(recording, self._calibrated[1], progress)
+        remarks = tuple(dict.fromkeys(str(each.message) for each in caught))
+        white = white_of(np.asarray(views.values).reshape(-1, *views.shape[3:]))
+        return Decoded((asked.of, asked.noise), decoder, views, white, remarks)
+
+
+def _told(decoded: Decoded, distance: float, asked: Asked) -> Json:
+    nearest, farthest = _range(asked, distance)
+    nv, nu, nt, ns = decoded.views.shape[:4]
+    way = {"lenslets": "lenslets", "cosines": "a mask of cosines"}[decoded.decoder.way]
+    return {
+        "words": f"{nv}×{nu} views of {nt}×{ns} pixels, told apart through {way}",
+        "remarks": list(decoded.remarks),
+        "views": [nv, nu],
+        "shape": [nt, ns],
+        "nearest": _finite(nearest),
+        "farthest": _finite(farthest),
+        "focus": _finite(_focus(asked.train)),
+        "distance": _finite(distance),
+    }
+
+
+def _range(asked: Asked, distance: float) -> tuple[float, float]:
+    """The nearest and the farthest distance that are offered: of the scene, and what the camera is focused on."""
+    focus = _focus(asked.train)
+    ends = [each for each in scene_distances(asked.light_field.grid).values() if each > 0]
+    if not ends:
+        ends = [focus / AROUND_FOCUS if math.isfinite(focus) else 1.0, math.inf]
+    every = [*ends, focus, distance]
+    return min(every), max(every)
+
+
+def _focus(train: Train) -> float:
+    """What the camera is focused on; infinitely far where nothing real is."""
+    found = focused_distance(train)
+    return math.inf if found is None else found
+
+
+def _distance(message: Json, train: Train) -> float:
+    given = message.get("distance")
+    distance = _focus(train) if given is None else units.parse(given, "length", "distance")
+    if not distance > 0:
+        raise InputError(f"distance is {given}: it lies before the camera, above 0")
+    return distance
+
+
+def _finite(distance: float) -> float | None:
+    return None if math.isinf(distance) else distance
+
+
+def _refocused(decoded: Decoded, distance: float, progress: Progress) -> bytes:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of pixels beyond all views, which are seen to be black
+        picture = refocused(decoded.views, distance, progress=progress)
+    return _jpeg(picture.to_numpy(), decoded.white)
+
+
+def _jpeg(upright: Picture, white: float) -> bytes:
+    """A picture that is upright already."""
+    return jpeg(upright[::-1, ::-1], white)
+
+
+def _sheet(views: LightField) -> Picture:
+    """All views side by side, as they stand in the lens seen from behind it, lines between them."""
+    rows, columns = (spread(count, MOST_ACROSS) for count in views.shape[:2])
+    nt, ns = views.shape[2:4]
+    factor = max(math.ceil(len(rows) * nt / SHEET), math.ceil(len(columns) * ns / SHEET), 1)
+    values = np.asarray(views.values)
+    small = [[averaged(values[row, column], factor) for column in columns] for row in rows]
+    border = ((0, LINE), (0, LINE), *[(0, 0)] * (small[0][0].ndim - 2))
+    whole = np.concatenate([np.concatenate([np.pad(each, border) for each in row], axis=1) for row in small])
+    return whole[:-LINE, :-LINE]
