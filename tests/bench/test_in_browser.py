@@ -325,6 +325,16 @@ def test_accessibility_has_no_serious_fault(browser, served, scheme, width):
     without_fault(page)
     wider = page.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
     assert wider <= 0  # nothing has to be scrolled sideways
+    page.page.get_by_role("tab", name="light field").click()
+    page.page.get_by_role("tab", name="Phase space").click()
+    page.page.locator("#pane figure").first.wait_for()
+    without_fault(page)
+    page.page.get_by_text("Open", exact=True).click()
+    item = page.page.get_by_role("button", name="Camera file")
+    item.evaluate("button => button.append(' with a name that is long'.repeat(5))")
+    box = item.bounding_box()
+    assert box["x"] >= 0
+    assert box["x"] + box["width"] <= width
     page.close()
 
 

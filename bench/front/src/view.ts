@@ -394,8 +394,13 @@ export class BenchView extends Part {
       .link { height: auto; padding: 0 6px 0 0; font-weight: 600; text-decoration: underline; text-underline-offset: 2px; }
       .banner { grid-area: banner; padding: 7px 14px; background: var(--warn-ground); border-bottom: 1px solid var(--line); }
       .menu { position: relative; }
-      .items { position: absolute; right: 0; top: 32px; min-width: 210px; max-height: 420px; overflow-y: auto; padding: 5px; background: var(--well); border: 1px solid var(--line); border-radius: 8px; box-shadow: 0 6px 24px rgb(0 0 0 / 14%); display: grid; }
+      .items { position: absolute; right: 0; top: 32px; min-width: 210px; max-height: min(560px, 80cqh); overflow-y: auto; padding: 5px; background: var(--well); border: 1px solid var(--line); border-radius: 8px; box-shadow: 0 6px 24px rgb(0 0 0 / 14%); display: grid; }
       .items button { justify-content: start; }
+      @container (max-width: 699px) {
+        .menu { position: static; }
+        .items { top: 40px; right: 8px; max-width: calc(100cqw - 16px); }
+        .items button { height: auto; min-height: 28px; padding-block: 4px; white-space: normal; text-align: start; }
+      }
       .items hr { width: 100%; border: 0; border-top: 1px solid var(--line); margin: 4px 0; }
       .items form { display: grid; gap: 6px; padding: 6px 9px; }
       .items form label { display: grid; grid-template-columns: 84px 1fr; align-items: center; overflow-wrap: anywhere; line-height: 1.2; }
