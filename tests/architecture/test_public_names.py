@@ -35,7 +35,7 @@ NAMES = {
     "vcc.sources.synthesis": "synthesize",
     "vcc.sources.textures": "Picture Waves",
     "vcc.store": "create_store open_store save_store",
-    "vcc.sweeps": "DeblurringError PSNR grid listed open_sweep random save_sweep sharpness sobol sweep",
+    "vcc.sweeps": "DeblurringError PSNR contact_sheet grid listed open_sweep random save_sweep sharpness sobol",
     "vcc.surfaces": "Axicon Cubic HeightMap PathMap Quadratic Rough Tilt Zernike",
     "vcc.torch": "CameraModule binary expose levels raw_of sigmoid_mask total_light",
     "vcc.units": "cm deg m mm mrad ms nm rad s um us",

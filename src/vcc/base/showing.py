@@ -61,3 +61,9 @@ class Shown:
 
     def _repr_png_(self) -> bytes | None:
         return _answers[0](self).png
+
+
+def spread(count: int, most: int) -> list[int]:
+    """Up to so many of some things, from the first to the last, in steps as even as can be."""
+    some = min(count, most)
+    return [round(n * (count - 1) / max(some - 1, 1)) for n in range(some)]

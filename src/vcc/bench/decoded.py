@@ -28,12 +28,12 @@ from vcc.base import units
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
+from vcc.base.showing import spread
 from vcc.bench.picture import Picture, Taken, jpeg, white_of
 from vcc.bench.side import scene_distances
 from vcc.camera import Camera
 from vcc.image import Image
 from vcc.light_field import LightField
-from vcc.notebook.contacts import spread
 from vcc.notebook.pictures import averaged
 from vcc.optics.train import Train
 from vcc.plot.fans import focused_distance

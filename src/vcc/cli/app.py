@@ -45,6 +45,13 @@ COMMANDS = {
         "vcc plot camera.toml -o camera.svg",
         "vcc plot camera.toml --phase-space --light-field views/",
     ),
+    "sweep": (
+        "Make the pictures of many cameras: a camera file whose parameters change.\n\n"
+        "Pictures and a table go to a Zarr group that xarray opens; the same command goes on where it stopped.",
+        'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" --set "code.pattern=mura,circle" -o all.zarr',
+        'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm" --design sobol -o table.csv --sharpness',
+        'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" -o all.zarr --sheet all.png --table all.csv',
+    ),
     "bench": (
         "Open the optical bench in the browser: move elements along the axis, and see the picture follow.\n\n"
         "Without a camera and a light field it opens a lens before the demo's scene.",

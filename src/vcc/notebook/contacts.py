@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.showing import spread
 from vcc.base.units import short
 from vcc.files.pictures import auto_exposure
 from vcc.light_field import LightField
@@ -52,11 +53,6 @@ def strip_panel(stack: FocalStack) -> Panel:
     some = f"{len(chosen)} of {len(stack.pictures)}, " if len(chosen) < len(stack.pictures) else ""
     caption = f"{some}focused on {distances}"
     return _panel([list(chosen)], lambda number: stack.pictures[number], caption)
-
-
-def spread(count: int, most: int) -> list[int]:
-    """Up to so many of some things, from the first to the last, in steps as even as can be."""
-    return sorted({round(place) for place in np.linspace(0, count - 1, min(count, most))})
 
 
 def _chosen(rows: int, columns: int, bytes_of_one: int) -> tuple[list[int], list[int]]:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from functools import singledispatch
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -47,9 +48,12 @@ from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Circle, Pattern
 from vcc.shapes.surface import Surface
 from vcc.store import StoredLightField
+from vcc.sweeps import Sweep, contact_sheet
 
 FRONT = 256
 """Points a side at which patterns, kernels and surfaces are looked at from the front."""
+SWEPT_ROWS = 12
+"""Of a sweep's table."""
 MOST_PICTURES = 6
 """Of a result of the gallery."""
 SIDE_BY_SIDE = 270
@@ -119,6 +123,18 @@ def _(stack: FocalStack) -> Exhibit:
 def _(found: AllInFocus) -> Exhibit:
     distances = map_panel(found.distance, "distance of the sharpest picture [m]")
     return Exhibit("AllInFocus", repr(found.image), (*_light(found.image, share=2), distances))
+
+
+@exhibit.register
+def _(swept: Sweep) -> Exhibit:
+    first = repr(swept).partition("\n")[0]
+    names = [each.name for each in swept.coordinates]
+    places = list(islice(np.ndindex(*swept.shape), SWEPT_ROWS))
+    rows = [[*swept.values(place), *(f"{each[place]:.5g}" for each in swept.numbers.values())] for place in places]
+    more = f"… and {len(swept) - SWEPT_ROWS} more rows: swept.table" if len(swept) > SWEPT_ROWS else ""
+    seen = swept.pictures is not None and swept.done.any()
+    panels = (drawn(lambda: contact_sheet(swept)),) if seen else ()
+    return Exhibit(*_parted(first), panels, Table((*names, *swept.numbers), rows), text=more)
 
 
 # --- cameras and what they are made of ---

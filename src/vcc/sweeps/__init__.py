@@ -13,6 +13,7 @@ from vcc.sweeps.design import Design, grid, listed, random, sobol
 from vcc.sweeps.keeping import open_sweep, save_sweep
 from vcc.sweeps.metrics import PSNR, DeblurringError, sharpness
 from vcc.sweeps.result import Sweep
+from vcc.sweeps.sheet import contact_sheet
 from vcc.sweeps.sweeping import sweep
 from vcc.sweeps.table import Table
 
@@ -22,6 +23,7 @@ __all__ = [
     "Design",
     "Sweep",
     "Table",
+    "contact_sheet",
     "grid",
     "listed",
     "open_sweep",

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -17,7 +18,7 @@ from vcc.base.errors import InputError
 from vcc.camera import Camera
 from vcc.files.camera_reading import Beside
 from vcc.learn.parameters import place, replaced, takes_fractions
-from vcc.sweeps.values import Varied, range_of, spread, varied
+from vcc.sweeps.values import Varied, range_of, taking, varied
 
 Kind = Literal["grid", "list", "random", "sobol"]
 CAMERA = "camera"
@@ -42,6 +43,7 @@ class Design(Brief):
             which fill the space of all parameters more evenly.
         count: of cameras that are drawn; None takes 64.
         seed: of the draw. The same seed gives the same cameras.
+        folder: where files are found that words name, as those of a mask; the current one unless told.
 
     Raises:
         InputError: another kind; a count or a seed where nothing is drawn; no whole numbers of 1 or more.
@@ -51,6 +53,7 @@ class Design(Brief):
     kind: Kind = "grid"
     count: int | None = None
     seed: int = 0
+    folder: Path = Path()
 
     def __post_init__(self) -> None:
         checks.one_of("a sweep's design", self.kind, get_args(Kind))
@@ -74,12 +77,11 @@ class Design(Brief):
         """Whether values are drawn."""
         return self.kind in ("random", "sobol")
 
-    def of(self, camera: Camera, beside: Beside | None = None) -> tuple[Varied, ...]:
+    def of(self, camera: Camera) -> tuple[Varied, ...]:
         """The parameters and the values that they take; of equally many each, unless it is a grid.
 
         Args:
             camera: whose parameters they are.
-            beside: the files that words may name.
 
         Raises:
             InputError: a parameter that there is not (those that there are are listed), values that are none,
@@ -88,8 +90,8 @@ class Design(Brief):
         if self.drawn:
             points = self._points(len(self.parameters))
             pairs = zip(self.parameters.items(), points.T, strict=True)
-            return tuple(self._drawn(camera, name, given, shares, beside) for (name, given), shares in pairs)
-        found = tuple(varied(camera, name, given, beside) for name, given in self.parameters.items())
+            return tuple(self._drawn(camera, name, given, shares) for (name, given), shares in pairs)
+        found = tuple(varied(camera, name, given, Beside(self.folder)) for name, given in self.parameters.items())
         if self.kind == "list" and len({len(each) for each in found}) > 1:
             counts = ", ".join(f"{each.name} {len(each)}" for each in found)
             raise InputError(f"a list takes as many values of each parameter, and there are {counts}")
@@ -105,19 +107,17 @@ class Design(Brief):
         points = qmc.Sobol(dimensions, rng=np.random.default_rng(self.seed))
         return np.asarray(points.random_base2(math.ceil(math.log2(count))))[:count]
 
-    def _drawn(
-        self, camera: Camera, name: str, given: Any, shares: NDArray[np.float64], beside: Beside | None
-    ) -> Varied:
+    def _drawn(self, camera: Camera, name: str, given: Any, shares: NDArray[np.float64]) -> Varied:
         """A parameter's values of numbers from 0 to 1: within an interval, or one of a list."""
         ends = range_of(camera, name, given)
         if ends is None:
-            choices = varied(camera, name, given, beside)
+            choices = varied(camera, name, given, Beside(self.folder))
             return choices.taken((shares * len(choices)).astype(int))
         low, high = ends
         found = place(camera, name)
         if isinstance(found.value, int) and not takes_fractions(found):
-            return spread(camera, name, [int(n) for n in np.floor(low + shares * (high - low + 1))])
-        return spread(camera, name, [float(n) for n in low + shares * (high - low)])
+            return taking(camera, name, [int(n) for n in np.floor(low + shares * (high - low + 1))])
+        return taking(camera, name, [float(n) for n in low + shares * (high - low)])
 
 
 def grid(parameters: Mapping[str, Any]) -> Design:
@@ -232,15 +232,12 @@ class Cameras(Brief, Sequence[Camera]):
         return replaced(base, values) if values else base
 
 
-def cameras_of(
-    cameras: Camera | Sequence[Camera], parameters: Mapping[str, Any] | Design | None, beside: Beside | None = None
-) -> Cameras:
+def cameras_of(cameras: Camera | Sequence[Camera], parameters: Mapping[str, Any] | Design | None) -> Cameras:
     """The cameras that a sweep goes through.
 
     Args:
         cameras: one, or several.
         parameters: what changes; of several cameras in each of them. None: nothing.
-        beside: the files that words may name.
 
     Raises:
         InputError: what is no camera, none at all, several of them and a design that is no grid, too many; and
@@ -253,7 +250,7 @@ def cameras_of(
             raise InputError(f"a sweep goes through vcc.Camera objects, not a {type(each).__name__}")
     if not several:
         raise InputError("a sweep goes through one camera at least, and there is none")
-    found = design.of(several[0], beside)
+    found = design.of(several[0])
     together = design.kind != "grid"
     if not isinstance(cameras, Camera):
         if together:

@@ -88,14 +88,14 @@ class DeblurringError:
     """R(K) of what a camera makes of a point (Zhou and Nayar 2009), for each pixel: smaller is better.
 
     The expected mean squared error of a natural picture that is deblurred as well as a linear filter can; see
-    `vcc.analysis.expected_deblurring_error`. The kernel is the camera's point spread, of a sum that is the light
-    its masks pass, so that apertures are compared at one exposure.
+    `vcc.analysis.expected_deblurring_error`. The kernel is the camera's point spread, whose sum is 1, or with
+    ``aperture`` the share of its light that masks pass: so apertures are compared at one exposure.
 
     Args:
         distance: of the point before the camera, metres, above 0.
         noise: standard deviation, of pictures whose values go from 0 to 1.
         aperture: (width, height) of the entrance plane through which light comes, metres; None finds it from the
-            camera's stops. What passes all of it has the sum 1; give it to compare apertures.
+            camera's stops.
 
     Raises:
         InputError: a distance or noise of 0 or less.

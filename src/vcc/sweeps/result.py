@@ -132,10 +132,15 @@ class Sweep(Shown):
         found = np.nanargmax(values) if largest else np.nanargmin(values)
         return tuple(int(n) for n in np.unravel_index(found, self.shape))
 
-    def labels(self, index: Sequence[int]) -> str:
-        """The values of a camera in words."""
+    def values(self, index: Sequence[int]) -> list[str]:
+        """The values of a camera's parameters in words."""
         places = [index[0]] * len(self.coordinates) if self.together else index
-        return ", ".join(f"{each.name} {each.labels[n]}" for each, n in zip(self.coordinates, places, strict=True))
+        return [each.labels[n] for each, n in zip(self.coordinates, places, strict=True)]
+
+    def labels(self, index: Sequence[int]) -> str:
+        """The same with the parameters' names, in a line."""
+        pairs = zip(self.coordinates, self.values(index), strict=True)
+        return ", ".join(f"{each.name} {value}" for each, value in pairs)
 
     def __repr__(self) -> str:
         lines = [

@@ -24,6 +24,8 @@ from vcc.optics.mask import Mask
 from vcc.optics.train import Train
 from vcc.shapes.patterns import Cells
 
+HERE = Beside(Path())
+"""The files of the current folder."""
 MOST_VALUES = 10**6
 """Of a range in words."""
 SI = {"length": "m", "angle": "rad", "time": "s", None: ""}
@@ -77,7 +79,7 @@ def first_few_labels(labels: Sequence[str], most: int = 4) -> str:
     return ", ".join(labels[:most]) + (f" … ({len(labels)})" if len(labels) > most else "")
 
 
-def varied(train: Train, name: str, given: Any, beside: Beside | None = None) -> Varied:
+def varied(train: Train, name: str, given: Any, beside: Beside = HERE) -> Varied:
     """The values of a parameter.
 
     Args:
@@ -85,7 +87,7 @@ def varied(train: Train, name: str, given: Any, beside: Beside | None = None) ->
         name: of it.
         given: values in a list or an array; or words: ``"50mm:54mm:40"``, so many in even steps,
             ``"50 mm, 52 mm"``, ``"mura, circle"``. Each value may be in words itself, as a camera file has it.
-        beside: the files that words may name; None: those in the current folder.
+        beside: the files that words may name.
 
     Raises:
         InputError: there is no such parameter; no values; words that are none.
@@ -105,9 +107,8 @@ def varied(train: Train, name: str, given: Any, beside: Beside | None = None) ->
     return _of(found, listed, beside, in_words=in_words)
 
 
-def _of(found: Parameter, listed: Sequence[Any], beside: Beside | None = None, in_words: bool = False) -> Varied:
-    folder = beside or Beside(Path())
-    values = tuple(_value(found, each, folder, in_words) for each in listed)
+def _of(found: Parameter, listed: Sequence[Any], beside: Beside = HERE, in_words: bool = False) -> Varied:
+    values = tuple(_value(found, each, beside, in_words) for each in listed)
     dimension = _dimension(found)
     pairs = enumerate(zip(values, listed, strict=True))
     labels = tuple(_label(value, each, number, dimension) for number, (value, each) in pairs)
@@ -135,7 +136,7 @@ def range_of(train: Train, name: str, given: Any) -> tuple[float, float] | None:
     return ends[0], ends[1]
 
 
-def spread(train: Train, name: str, numbers: Sequence[float]) -> Varied:
+def taking(train: Train, name: str, numbers: Sequence[float]) -> Varied:
     """A parameter that takes these numbers, SI units."""
     return _of(place(train, name), list(numbers))
 

@@ -1,0 +1,123 @@
+"""``vcc sweep``: many cameras before one light field."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from vcc.base.errors import InputError
+from vcc.camera_file import load_camera
+from vcc.cli.console import DRAWINGS, check_output, progress, save_figure, show
+from vcc.cli.options import (
+    CameraFile,
+    Given,
+    Length,
+    LightFieldFile,
+    Making,
+    Output,
+    Reading,
+    Whole,
+    above_zero,
+    quantity,
+)
+from vcc.image import load_image
+from vcc.sweeps import PSNR, DeblurringError, Design, contact_sheet, sharpness
+from vcc.sweeps import sweep as swept_by
+from vcc.sweeps.design import Kind
+from vcc.sweeps.table import ENDINGS
+
+TOLD = Group("The table", sort_key=1.5)
+
+
+def _setting(text: str, option: str) -> tuple[str, str]:
+    """A parameter's name and its values."""
+    name, equals, values = text.partition("=")
+    if not (equals and name.strip() and values.strip()):
+        raise InputError(f'{option} is "{text}": it is a name and values, like "sensor.z=50mm:54mm:40"')
+    return name.strip(), values.strip()
+
+
+@Parameter(name="*", group=TOLD)
+@dataclass(frozen=True, kw_only=True)
+class Told(Given):
+    """What is told of each picture, beside its mean, missing rays and sampling error.
+
+    Args:
+        sharpness: The energy of the picture's gradient over that of its mean.
+        target: PSNR against this picture, .exr, .npy, .png or .tif that vcc wrote.
+        deblurring: R(K), the expected error of deblurring a point at this distance, "2 m" (Zhou and Nayar 2009).
+        noise: For R(K): standard deviation of the noise, of pictures from 0 to 1.
+    """
+
+    sharpness: bool = False
+    target: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    deblurring: Length | None = None
+    noise: Annotated[float, quantity("NUMBER", above_zero)] = 0.01
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """Functions of a picture by name."""
+        found: dict[str, Any] = {"sharpness": sharpness} if self.sharpness else {}
+        if self.target is not None:
+            found["psnr"] = PSNR(load_image(self.target))
+        if self.deblurring is not None:
+            found["deblurring_error"] = DeblurringError(self.deblurring, self.noise)
+        return found
+
+
+def sweep(
+    camera: CameraFile,
+    light_field: LightFieldFile,
+    /,
+    *,
+    set: Annotated[tuple[tuple[str, str], ...], quantity("NAME=VALUES", _setting, repeated=True)],
+    output: Output,
+    design: Kind = "grid",
+    count: Whole | None = None,
+    seed: Whole = 0,
+    table: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    sheet: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    told: Told = Told(),
+    how: Making = Making(),
+    reading: Reading = Reading(),
+) -> None:
+    """Make the pictures of many cameras: a camera file whose parameters change.
+
+    Args:
+        set: A parameter by the names of its element and its own, and values: a range "sensor.z=50mm:54mm:40" or
+            a list "code.pattern=mura,circle,code.png"; patterns as a camera file has them, or by name alone, as
+            large as the mask. May be repeated. For random and sobol also an interval, "sensor.z=50mm:54mm".
+        output: Pictures and table, .zarr; the same sweep goes on where it was stopped. Or the table alone, .csv or
+            .parquet.
+        design: grid: every combination; list: the first values of all, then the second; random, sobol: drawn.
+        count: How many cameras are drawn. Default: 64.
+        seed: Of the draw.
+        table: Write the table also here, .csv or .parquet.
+        sheet: Draw the pictures side by side, .png, .svg or .pdf.
+    """
+    for name, _ in set:
+        if [each for each, _ in set].count(name) > 1:
+            raise InputError(f"--set {name} is given more than once: give all its values in one")
+    output = check_output(output, (".zarr", *ENDINGS)) if output.suffix != ".zarr" else output.expanduser()
+    stored = output.suffix.lower() == ".zarr"
+    table = None if table is None else check_output(table, ENDINGS)
+    sheet = None if sheet is None else check_output(sheet, DRAWINGS)
+    if sheet is not None and not stored:
+        raise InputError("--sheet shows pictures, and a table alone keeps none: let --output end in .zarr")
+    optics = load_camera(camera)
+    asked = Design(dict(set), design, count, seed, camera.parent)
+    asked.of(optics)  # refused before the light field is read
+    field, metrics = reading.light_field(light_field), told.metrics
+    with progress("Sweeping") as advance:
+        kept = {"output": output} if stored else {"pictures": False}
+        swept = swept_by(optics, field, asked, how, metrics=metrics, progress=advance, **kept)
+    if stored:
+        sizes = "×".join(map(str, swept.pictures.shape[len(swept.shape) :]))
+        show(f"{output}: {len(swept)} pictures of {sizes}, {' × '.join(swept.axes)}")
+    for path in (None if stored else output, table):
+        if path is not None:
+            swept.table.save(path)
+            show(f"{path}: {len(swept)} rows of {len(swept.table.columns)} columns")
+    if sheet is not None:
+        save_figure(contact_sheet(swept), sheet)

@@ -1,0 +1,124 @@
+"""Contact sheets of sweeps: pictures side by side at one exposure, each with its values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.errors import InputError
+from vcc.base.showing import spread
+from vcc.files.pictures import auto_exposure
+from vcc.files.transfer import encode
+from vcc.plot.style import INK, QUIET, SMALL, TEXT, new_axes
+from vcc.sweeps.result import Sweep
+
+MOST_ACROSS, MOST_DOWN = 8, 8
+"""Pictures of a sheet along each axis; of more, some are shown, evenly spread."""
+IN_A_ROW = 6
+"""Pictures of one axis after which a new row begins."""
+INCHES, DOTS = 1.9, 100
+"""Width of a picture on the sheet, and its dots per inch."""
+LONGEST = 26
+"""Letters of a label in a line."""
+
+Place = tuple[int, ...]
+
+
+def contact_sheet(swept: Sweep) -> Any:
+    """Pictures of a sweep side by side, upright and at one exposure, as a Matplotlib figure.
+
+    The last axis goes to the right, all others downwards; one axis alone goes on in the next row. Of more than 8
+    pictures each way some are shown, evenly spread. What is not done yet is left out.
+
+    Args:
+        swept: with pictures.
+
+    Raises:
+        InputError: no pictures were kept, or none is there.
+    """
+    if swept.pictures is None:
+        raise InputError("this sweep kept no pictures to be shown, only the table")
+    if not swept.done.any():
+        raise InputError("none of this sweep's pictures is there yet")
+    places = _chosen(swept.shape)
+    pictures = [[_small(swept, place) if place and swept.done[place] else None for place in row] for row in places]
+    there = [each for row in pictures for each in row if each is not None]
+    exposure = auto_exposure(np.concatenate([each.reshape(1, -1, *each.shape[2:]) for each in there], axis=1))
+    high = INCHES * there[0].shape[0] / there[0].shape[1]
+    lines = len(swept.coordinates) if len(swept.shape) == 1 else 0.2
+    size = len(places[0]) * INCHES + 0.6, len(places) * (high + 0.22 * lines) + 0.7
+    axes = new_axes(*size, len(places), len(places[0]), squeeze=False)
+    for row, line in enumerate(places):
+        for column, place in enumerate(line):
+            _draw(axes[row, column], pictures[row][column], exposure)
+            if place is not None:
+                _label(axes[row, column], swept, place, (row, column))
+    shown = f"{len(there)} of {len(swept)} pictures, " if len(there) < len(swept) else ""
+    axes[0, 0].figure.suptitle(
+        f"{_title(swept)}   ({shown}one exposure, {exposure:.4g})", fontsize=TEXT, color=INK
+    )
+    return axes[0, 0].figure
+
+
+def _title(swept: Sweep) -> str:
+    """Which parameters go where."""
+    names = [each.name for each in swept.coordinates]
+    if len(swept.shape) == 1:
+        return ", ".join(names)
+    return f"{names[-1]} →, {', '.join(names[:-1])} ↓"
+
+
+def _chosen(shape: tuple[int, ...]) -> list[list[Place | None]]:
+    """Which pictures are shown in which row and column; None where a row has no more."""
+    if len(shape) == 1:
+        numbers: list[Place | None] = [(n,) for n in spread(shape[0], MOST_ACROSS * MOST_DOWN)]
+        across = min(len(numbers), IN_A_ROW)
+        numbers += [None] * (-len(numbers) % across)
+        return [numbers[n : n + across] for n in range(0, len(numbers), across)]
+    downwards = [
+        tuple(map(int, np.unravel_index(n, shape[:-1]))) for n in spread(math.prod(shape[:-1]), MOST_DOWN)
+    ]
+    return [[(*row, n) for n in spread(shape[-1], MOST_ACROSS)] for row in downwards]
+
+
+def _small(swept: Sweep, place: Place) -> NDArray[np.float32]:
+    """A picture, upright, of 1 or 3 channels, no larger than it is shown."""
+    values = swept[place].upright().to_numpy()
+    if values.ndim == 3 and values.shape[2] != 3:
+        values = values.mean(axis=2)
+    factor = max(values.shape[1] // round(INCHES * DOTS), 1)
+    rows, columns = (size // factor * factor for size in values.shape[:2])
+    parts = values[:rows, :columns].reshape(rows // factor, factor, columns // factor, factor, *values.shape[2:])
+    return np.asarray(parts.mean(axis=(1, 3)), dtype=np.float32)
+
+
+def _draw(axes: Any, picture: NDArray[np.float32] | None, exposure: float) -> None:
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.spines[:].set_visible(False)
+    if picture is None:
+        return
+    codes = encode(picture * np.float32(exposure), 8)
+    axes.imshow(codes, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
+
+
+def _label(axes: Any, swept: Sweep, place: Place, at: tuple[int, int]) -> None:
+    """The values of a picture: those along an axis once, at its row or column."""
+    if len(swept.shape) == 1:
+        axes.set_title(_lines(swept.values(place)), fontsize=SMALL, color=INK)
+        return
+    if at[0] == 0:
+        axes.set_title(_lines(swept.values(place)[-1:]), fontsize=SMALL, color=INK)
+    if at[1] == 0:
+        axes.set_ylabel(
+            _lines(swept.values(place)[:-1]), fontsize=SMALL, color=INK if swept.done[place] else QUIET
+        )
+
+
+def _lines(labels: Sequence[str]) -> str:
+    """Labels below one another, each no longer than a picture is wide."""
+    return "\n".join(label if len(label) <= LONGEST else f"{label[: LONGEST - 1]}…" for label in labels)
