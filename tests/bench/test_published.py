@@ -7,7 +7,7 @@ import pytest
 import vcc
 from vcc.base.errors import InputError
 from vcc.bench import published
-from vcc.bench.cameras import SCENE, scene
+from vcc.bench.cameras import SCENE, scenes
 from vcc.bench.document import Document
 from vcc.bench.picture import COARSER, take
 from vcc.bench.published import Gallery, title_of
@@ -19,7 +19,7 @@ NOWHERE = Beside(Path(), frozenset())
 
 @pytest.fixture(scope="module")
 def field():
-    return scene()
+    return scenes()[SCENE]
 
 
 def test_every_entry_is_on_the_bench_or_it_is_said_why_not():
