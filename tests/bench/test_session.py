@@ -413,6 +413,20 @@ def test_a_coarse_picture_is_the_picture_with_fewer_pixels(fineness):
     assert coarse[middle, middle] == pytest.approx(whole[PIXELS // 2, PIXELS // 2], rel=0.02)
 
 
+@pytest.mark.parametrize("fineness", COARSER)
+def test_a_coarse_picture_by_few_rays_is_as_bright(fineness):
+    field = Field(noise(8, 48).replaced(np.full((8, 8, 48, 48), 0.5, np.float32)))
+    lens = {"kind": "lens", "z": "0 mm", "focal_length": "50 mm", "diameter": "18 mm"}
+    lenslets = {"kind": "lens_array", "z": "50 mm", "pitch": "3 mm", "focal_length": "20 mm"}
+    document = START.changed(["elements"], [lens, lenslets])
+    document = document.changed(["sensor"], {"z": "52 mm", "shape": [96, 96], "pitch": "0.25 mm"})
+    whole, coarse = (take(document.train(NOWHERE).train, field, START, each) for each in (WHOLE, fineness))
+    assert coarse.plan.by_rays
+    assert coarse.plan.core.samples < whole.plan.core.samples
+    # 24² pixels and 8 rays at least, of which more than half pass: three times 1/√4608
+    assert coarse.values.mean() == pytest.approx(whole.values.mean(), rel=0.045)
+
+
 # --- sequences ---
 
 ACTIONS = some.one_of(
