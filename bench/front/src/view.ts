@@ -424,7 +424,7 @@ export class BenchFrame extends Part {
     :host { all: initial; display: block; width: 100%; height: 100%; container-type: size; overflow: auto; }
     vcc-bench-view { grid-template: "header header" auto "banner banner" auto "bench picture" minmax(180px, 44fr) "beside picture" 56fr / minmax(0, 46fr) minmax(0, 54fr); }
     @container (max-width: 639px) {
-      vcc-bench-view { --aside-border: 0px; height: auto; min-height: 100%; grid-template: "header" auto "banner" auto "picture" min(112cqw, 480px) "bench" 230px "beside" minmax(320px, auto) / minmax(0, 1fr); }
+      vcc-bench-view { --aside-border: 0px; height: auto; min-height: 100%; grid-template: "header" auto "banner" auto "picture" min(112cqw, 480px) "bench" 230px "beside" minmax(320px, 1fr) / minmax(0, 1fr); }
     }
   `;
 }
