@@ -313,6 +313,7 @@ class Camera(Train):
         light_field: Samples,
         how: How | None = None,
         *,
+        executor: Any = None,
         progress: Progress | None = None,
         **options: Unpack[Options],
     ) -> Explanation:
@@ -321,11 +322,14 @@ class Camera(Train):
         Args:
             light_field: given at the entrance plane; in memory or on disk.
             how: as in `capture`.
+            executor: as in `capture`: what it would take with it is foretold, too, and which to take said. It runs
+                some views for that.
             progress: called with (done, total) while disparities are found, where they are needed.
             options: as in `capture`.
         """
         chosen = How.of(how, options)
-        return explained(self, light_field, self.compile(light_field, chosen, progress=progress), chosen)
+        plan = self.compile(light_field, chosen, progress=progress)
+        return explained(self, light_field, plan, chosen, executor)
 
     def light_field_at(
         self,

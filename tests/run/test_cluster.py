@@ -69,19 +69,17 @@ class Deadly:
         return self.samples.read(block)
 
 
-def test_what_workers_lack_is_told(client, stored):  # noqa: F811
+def test_what_workers_lack_is_told(client, stored, monkeypatch):  # noqa: F811
     assert crew(client).places == 2
     assert crew(client).room == pytest.approx(0.7 * 2e9 - 4e8, rel=1e-3)
     with pytest.raises(
         vcc.InputError, match=r"has 1000 MB for each task, .* and 1500 MB are asked for: give workers"
     ):
         CAMERAS["fine mask"][0].capture(stored, executor=client, memory_limit=1_500_000_000)
-    with pytest.raises(vcc.InputError, match=r"have no vcc\.other: install version"):
-        list(crew(client).each(Work(lacking, None), [0]))
-
-
-def lacking(*_):
-    raise ModuleNotFoundError("No module named 'vcc.other'", name="vcc.other")
+    for version, words in (("0.0.1", "version 0.0.1 of the package"), (None, "none of the package")):
+        monkeypatch.setattr(executors.pydoc, "locate", lambda _, found=version: found)  # sent as it is
+        with pytest.raises(vcc.InputError, match=f"the worker tcp://.* has {words}, and what sends the work has"):
+            CAMERAS["fine mask"][0].capture(stored, executor=client)
 
 
 def test_a_cluster_makes_the_same_picture_though_a_worker_is_killed(client, stored, in_blocks, tmp_path):  # noqa: F811

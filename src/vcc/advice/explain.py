@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import textwrap
+from typing import Any
 
-from vcc.advice import explain_footprints, explain_rays, explain_store
+from vcc.advice import explain_executor, explain_footprints, explain_rays, explain_store
 from vcc.advice.limits import sampling_limits
 from vcc.advice.words import in_words
 from vcc.base.showing import Shown
@@ -26,15 +27,16 @@ PLACES_END = 20
 class Explanation(Shown, str):
     """Text that shows itself plainly in a notebook or at the prompt."""
 
-    __slots__ = ("expected_seconds", "plan")
+    __slots__ = ("expected_seconds", "expected_seconds_by_executor", "plan")
     plan: Plan
     expected_seconds: float | None
+    expected_seconds_by_executor: float | None
 
     def __repr__(self) -> str:
         return str(self)
 
 
-def explained(train: Train, samples: Samples, plan: Plan, how: How) -> Explanation:
+def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: Any = None) -> Explanation:
     """A plan for a light field in words; see `vcc.Camera.explain`.
 
     The time is foretold by running a part of the plan on the light field and scaling it up.
@@ -44,6 +46,7 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How) -> Explanati
         samples: that it was made for.
         plan: what is explained.
         how: what was chosen.
+        executor: that may run the blocks, or None.
     """
     run = Drive(plan, samples, how)
     room = explain_rays if plan.by_rays else explain_footprints
@@ -54,8 +57,12 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How) -> Explanati
     if samples.whole() is None:
         more, seconds = explain_store.section(run)
         text = f"{text}\n\n{more}"
+    by_executor = None
+    if executor is not None:
+        more, by_executor = explain_executor.section(Drive(plan, samples, how, executor), seconds)
+        text = f"{text}\n\n{_wrapped(more)}"
     result = Explanation(text)
-    result.plan, result.expected_seconds = plan, seconds
+    result.plan, result.expected_seconds, result.expected_seconds_by_executor = plan, seconds, by_executor
     return result
 
 

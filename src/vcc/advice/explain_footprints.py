@@ -133,14 +133,20 @@ def expected_seconds(run: Drive) -> float | None:
 
 def seconds_from_store(run: Drive) -> float:
     """How long reading and running will take: some views of a row are read and run, then scaled up."""
+    block, share = some_views(run)
+    seconds = min(_timed(lambda: run.summed([block])) for _ in range(2))  # the first run may compile
+    return seconds / share
+
+
+def some_views(run: Drive) -> tuple[Block, float]:
+    """Up to eight views of a row, and the share that they are of all that are looked at."""
     shape = run.samples.grid.shape
     used = run.core.used_views(shape)
     row = int(np.argmax(used.sum(axis=1)))
     columns = np.flatnonzero(used[row])
     some = int(columns[0]), int(columns[min(len(columns), 8) - 1]) + 1
     block = replace(Block.all_of(shape), rows=(row, row + 1), columns=some)
-    seconds = min(_timed(lambda: run.summed([block])) for _ in range(2))  # the first run may compile
-    return seconds * float(used.sum()) / float(used[row, some[0] : some[1]].sum())
+    return block, float(used[row, some[0] : some[1]].sum()) / float(used.sum())
 
 
 def _timed(step: Callable[[], object]) -> float:

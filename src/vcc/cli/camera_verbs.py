@@ -39,6 +39,6 @@ def exposed(
     )
 
 
-def explained(camera: Camera, field: Samples, how: How) -> Explanation:
+def explained(camera: Camera, field: Samples, how: How, executor: Any = None) -> Explanation:
     """The plan in words."""
-    return camera.explain(field, how)
+    return camera.explain(field, how, executor=executor)

@@ -3,6 +3,7 @@
 from vcc.camera_file import load_camera
 from vcc.cli.camera_verbs import explained
 from vcc.cli.console import show
+from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Reading
 
 
@@ -12,8 +13,12 @@ def explain(
     /,
     *,
     how: Making = Making(),
+    executing: Executing = Executing(),
     reading: Reading = Reading(),
 ) -> None:
     """Say how a picture would be made, what it costs and what to beware of."""
     optics = load_camera(camera)
-    show(str(explained(optics, reading.light_field(light_field), how)))
+    executing.check(light_field)
+    field = reading.light_field(light_field)
+    with executing.opened() as executor:
+        show(str(explained(optics, field, how, executor)))

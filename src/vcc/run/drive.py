@@ -346,7 +346,7 @@ class Drive:
                 tree.put(number, self.part(block, beside, counted))
             return _in_double(tree.total)
         asked, views = [(block, beside) for block in used], [self.used_in(block) for block in used]
-        work = Work(_share_of, self.sent, first=_begun)
+        work = Work(_share_of, self.sent, first=begun)
         total = self.crew.summed(work, asked, _sum_of_shares, lambda n: counted.add(views[n]))
         if self.plan.views_between is not None:
             self.samples.made, self.samples.unseen = total.made, total.unseen  # type: ignore[attr-defined]
@@ -448,7 +448,8 @@ def _share_of(sent: Sent, asked: tuple[Block, int]) -> Share:
     return Share(part, getattr(drive.samples, "made", 0), getattr(drive.samples, "unseen", 0))
 
 
-def _begun(sent: Sent, _: None) -> None:
+def begun(sent: Sent, _: None) -> None:
+    """What whoever runs blocks does first."""
     Drive(sent.plan, sent.samples, sent.how).begin()
 
 

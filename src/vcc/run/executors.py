@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import pickle
 import platform
+import pydoc
+import warnings
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor
 from contextlib import closing
@@ -157,9 +159,10 @@ class Parcel:
         return pickle.loads(self.packed)
 
 
-def perform(item: Any, function: Function, parcel: Parcel) -> Any:
-    """One task."""
-    return function(parcel.opened(), item)
+def perform(item: Any, parcel: Parcel) -> Any:
+    """One task: the parcel holds the function and what is shared."""
+    function, shared = parcel.opened()
+    return function(shared, item)
 
 
 def _kept(parcel: Parcel) -> Parcel:
@@ -167,9 +170,9 @@ def _kept(parcel: Parcel) -> Parcel:
     return parcel
 
 
-def _added(add: Add, parts: Sequence[Any]) -> Any:
-    """A sum of a `Tree`."""
-    return reduce(add, parts)
+def _added(parcel: Parcel, parts: Sequence[Any]) -> Any:
+    """A sum of a `Tree`: the parcel holds what adds two."""
+    return reduce(parcel.opened(), parts)
 
 
 class Tree:
@@ -264,11 +267,11 @@ class Pool:
 
     def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
         """See `Crew.each`."""
-        parcel, futures = Parcel.of(work.shared), []
+        parcel, futures = Parcel.of((work.function, work.shared)), []
         if work.first is not None:
-            perform(None, work.first, parcel)
+            perform(None, Parcel.of((work.first, work.shared)))
         try:
-            futures += [self._submit(work.function, parcel, item) for item in items]
+            futures += [self._submit(parcel, item) for item in items]
             for number in _finished(futures, lambda: None):
                 result = self._result(futures[number])
                 futures[number] = None  # so that nobody keeps it
@@ -287,9 +290,9 @@ class Pool:
                 told(number)
         return tree.total
 
-    def _submit(self, function: Function, parcel: Parcel, item: Any) -> Any:
+    def _submit(self, parcel: Parcel, item: Any) -> Any:
         try:
-            return self._executor.submit(perform, item, function, parcel)
+            return self._executor.submit(perform, item, parcel)
         except BrokenExecutor as error:
             raise self._broken() from error
         except RuntimeError as error:
@@ -380,22 +383,44 @@ class Cluster:
             self._cancel([*futures, total])
 
     def _mapped(self, work: Work, items: Sequence[Any]) -> list[Any]:
-        parcel = self._client.submit(_kept, Parcel.of(work.shared), pure=False)
+        self._check_versions()
         if work.first is not None:
-            self._begin(work.first, parcel)
-        tasks = {"pure": False, "retries": RETRIES}
-        return list(self._client.map(perform, items, function=work.function, parcel=parcel, **tasks))
+            self._begin(self._sent(work.first, work.shared))
+        parcel = self._sent(work.function, work.shared)
+        return list(self._client.map(perform, items, parcel=parcel, pure=False, retries=RETRIES))
 
-    def _begin(self, first: Function, parcel: Any) -> None:
+    def _sent(self, function: Function, shared: Any) -> Any:
+        """What tasks need, as the result of a task."""
+        with warnings.catch_warnings():  # of a parcel of some megabytes, which goes to the scheduler once
+            warnings.filterwarnings("ignore", "Sending large graph")
+            return self._client.submit(_kept, Parcel.of((function, shared)), pure=False)
+
+    def _check_versions(self) -> None:
+        """See that all workers have what they are to run: one that lacks a function is lost for good.
+
+        Raises:
+            InputError: one has another version of the package, or none.
+        """
+        # By a function of Python's own, which all have.
+        found = self._client.run(pydoc.locate, "vcc.base.version.VERSION", on_error="return")
+        for address, version in found.items():
+            if version is None or (isinstance(version, str) and version != VERSION):
+                has = f"version {version} of the package" if version else "none of the package"
+                raise InputError(
+                    f"the worker {address} has {has}, and what sends the work has "
+                    f"{VERSION}: install the same on all"
+                )
+
+    def _begin(self, parcel: Any) -> None:
         """What is done once on each machine, or when the first worker comes."""
         if not self.places:
             warn_of_result(f"the Dask scheduler {self._address} has no workers yet: work begins when one comes")
         workers = self._client.scheduler_info()["workers"]
         machines = {worker["host"]: address for address, worker in workers.items()}
-        tasks = {"pure": False, "retries": RETRIES, "allow_other_workers": True}
+        places = [{"workers": address, "allow_other_workers": True} for address in machines.values()]
         futures = [
-            self._client.submit(perform, None, function=first, parcel=parcel, workers=address, **tasks)
-            for address in machines.values() or [None]
+            self._client.submit(perform, None, parcel=parcel, pure=False, retries=RETRIES, **place)
+            for place in places or [{}]
         ]
         try:
             for number in _finished(futures, self._look):
@@ -404,12 +429,12 @@ class Cluster:
             self._cancel(futures)
 
     def _tree(self, futures: Sequence[Any], add: Add) -> Any:
-        level = 0
+        level, parcel = 0, Parcel.of(add)
         while len(futures) > 1:
             level += 1
             futures = [
                 self._client.submit(
-                    _added, add, list(futures[n : n + TOGETHER]), pure=False, retries=RETRIES, priority=level
+                    _added, parcel, list(futures[n : n + TOGETHER]), pure=False, retries=RETRIES, priority=level
                 )
                 for n in range(0, len(futures), TOGETHER)
             ]
@@ -434,11 +459,6 @@ class Cluster:
                 raise InputError(
                     "a task ended each of the workers that took it, one after the other: most likely it takes "
                     "more memory than they have. Pass memory_limit=, the bytes of one task"
-                ) from error
-            if isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == "vcc":
-                raise InputError(
-                    f"the workers of {self._address} have no {error.name}: install version {VERSION} of the "
-                    "package there, with all that it needs"
                 ) from error
             raise
 
