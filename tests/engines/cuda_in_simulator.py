@@ -12,6 +12,9 @@ import pytest
 
 import vcc
 from tests.engines.test_agreement import CAMERAS, LENS, field, samples, turned
+from tests.engines.test_ray_agreement import ELEMENTS
+from tests.engines.test_ray_agreement import camera as elements_before
+from tests.engines.test_ray_agreement import field as field_of_rays
 from vcc.base.units import mm
 from vcc.engines import cuda as engine
 from vcc.engines import cuda_back, cuda_footprints, cuda_tables, reference
@@ -19,7 +22,11 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import How
 from vcc.run.drive import Drive
 
-pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning"),
+    # Hashes are meant to overflow, and NumPy's numbers, which the simulator computes with, say so.
+    pytest.mark.filterwarnings("ignore:.*overflow encountered in scalar multiply"),
+]
 
 SHAPE = (2, 2, 5, 8)
 SMALL = vcc.Sensor(49 * mm, (4, 5), 49 * mm * 2e-3)
@@ -183,11 +190,60 @@ def test_an_operator_and_its_adjoint():
     assert abs(ahead - back) < 1e-5 * abs(ahead)
 
 
+# --- rays ---
+
+
+def assert_rays_agree(camera: vcc.Camera, lf: vcc.LightField, **options) -> vcc.Image:
+    plan = camera.compile(lf, **{"method": "rays", "samples": 16, **options})
+    run = {"tolerance": options.get("tolerance")}
+    expected, picture = (camera.capture(lf, plan=plan, engine=name, **run) for name in ("reference", "cuda"))
+    assert expected.values.any()
+    assert np.abs(picture.values - expected.values).max() < 1e-5 * expected.values.max()
+    assert picture.missing_rays == pytest.approx(expected.missing_rays, abs=1e-6)
+    assert picture.sampling_error == pytest.approx(expected.sampling_error, rel=1e-3, abs=1e-9)
+    return picture
+
+
+def small(camera: vcc.Camera, shape: tuple[int, int] = (2, 3)) -> vcc.Camera:
+    return vcc.Camera(camera.elements, replace(camera.sensor, shape=shape))
+
+
+@pytest.mark.parametrize("name", ELEMENTS)
+def test_rays_through_every_step(name):
+    assert_rays_agree(small(elements_before(name)), field_of_rays(samples((2, 2, 4, 5))))
+
+
+@pytest.mark.parametrize("channels", [None, 1, 2, 3, 4])
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16"])
+def test_types_of_samples_of_rays(dtype, channels):
+    shape = (2, 2, 4, 5) if channels is None else (2, 2, 4, 5, channels)
+    assert_rays_agree(small(elements_before("cubic plate")), field_of_rays(samples(shape, dtype)), samples=4)
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 4, 5), (1, 3, 4, 5), (2, 1, 4, 1)])
+def test_rays_in_few_views(shape):
+    assert_rays_agree(small(elements_before("cubic plate")), field_of_rays(samples(shape)))
+
+
+def test_rays_that_take_the_nearest_view_and_more_rays_until_they_agree():
+    camera, lf = small(elements_before("cells, square")), field_of_rays(samples((2, 2, 4, 5, 3)))
+    few = assert_rays_agree(camera, lf, between_views="none")
+    many = assert_rays_agree(camera, lf, tolerance=0.9 * few.sampling_error / few.values.mean())
+    assert many.sampling_error < few.sampling_error
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "float32"])
+def test_rays_of_samples_that_stay_on_the_gpu(dtype):
+    camera, lf = small(elements_before("cells, square")), field_of_rays(samples((2, 2, 4, 5, 3), dtype))
+    kept = camera.capture(lf.on_gpu(), samples=4).values
+    # Sharpened there: bytes exactly, floats to their last digits.
+    np.testing.assert_allclose(kept, camera.capture(lf, samples=4, engine="cuda").values, rtol=1e-5)
+
+
 def test_what_is_not_done_is_refused_by_name():
-    lf = field(samples(SHAPE))
     core, values = CORES["two masks"]
     weights = np.zeros((*core.raster_shape, 3))
     with pytest.raises(vcc.InputError, match=r"none to 'masks\[0\].column'.*engine='numba'"):
         engine.footprints_back(core, values, weights, wanted=["masks[0].column"], threads=1)
-    with pytest.raises(vcc.InputError, match=r"engine 'cuda' does footprints.*engine='numba'"):
-        CAMERAS["in focus"].capture(lf, engine="cuda", method="rays")
+    with pytest.raises(vcc.InputError, match=r"does not go backwards through rays.*engine='numba'"):
+        engine.rays_back(None, None, None)

@@ -44,3 +44,15 @@ def test_without_the_extra_it_says_what_to_install(monkeypatch):
         vcc.InputError, match=r"needs numba-cuda.*pip install .virtual-computational-camera\[gpu\]"
     ):
         CAMERAS["in focus"].capture(field(np.asarray(samples())), engine="cuda")
+
+
+def test_kernels_compile_for_a_gpu_that_is_not_here():
+    done = subprocess.run(
+        [sys.executable, HERE / "cuda_to_ptx.py"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(HERE.parents[1]), *sys.path])},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if done.returncode == 77:
+        pytest.skip("NVIDIA's compiler is not installed: pip install 'virtual-computational-camera[gpu]'")
+    assert done.returncode == 0, done.stderr[-4000:]
+    assert len(done.stdout.splitlines()) > 20  # kernels

@@ -1,4 +1,5 @@
-"""The engine of GPUs: footprints in kernels that Numba compiles for NVIDIA's, with samples where they are.
+"""The engine of GPUs: footprints and rays in kernels that Numba compiles for NVIDIA's, with samples where they
+are.
 
 Samples of NumPy are sent to the GPU piece by piece while others are summed there; samples that are on the GPU
 already (`vcc.LightField.on_gpu`, PyTorch's CUDA tensors, CuPy's arrays) are taken without a copy, and pictures of
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
-from vcc.engines import cuda_arrays, cuda_back, cuda_footprints, numba_cpu
+from vcc.engines import cuda_arrays, cuda_back, cuda_footprints, cuda_rays, cuda_sharpening, numba_cpu
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.protocol import Gradient, Partial
@@ -39,11 +40,7 @@ def resident(values: Any) -> Any:
     Raises:
         InputError: arrays of another library in main memory.
     """
-    if cuda_arrays.is_on_gpu(values):
-        return values
-    if not isinstance(values, np.ndarray):
-        cuda_arrays.taken(values)
-    return cuda_arrays.sent(values.astype(np.float32) if values.dtype == np.float16 else values)
+    return cuda_arrays.resident(values)
 
 
 def footprints(
@@ -57,13 +54,9 @@ def together(cores: Any, values: Any, **options: Any) -> None:
     """None: several cores run one after the other; see `vcc.plan.protocol.Engine`."""
 
 
-def rays(core: Rays, values: Any, **options: Any) -> Partial:
-    """Nothing, as yet.
-
-    Raises:
-        InputError: always.
-    """
-    raise InputError("engine 'cuda' does footprints, and this picture is made by rays: use engine='numba'")
+def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None) -> Partial:
+    """The raster of samples (v, u, t, s[, channels]), float32, by the processor's rays."""
+    return cuda_rays.traced(core, values, beside, progress)
 
 
 def footprints_back(
@@ -115,6 +108,8 @@ def prepared(before: Sequence[operators.Before], values: Any, threads: int) -> A
             values = operator.apply(values)
         elif isinstance(operator, operators.SwapPixelAxes):
             values = cuda_arrays.swapped(values)
+        elif isinstance(operator, operators.SharpenViews):
+            values = cuda_sharpening.sharpened(operator, values)
         else:
             raise InputError(
                 f"this picture begins with {type(operator).__name__}, which engine 'cuda' does not do with "

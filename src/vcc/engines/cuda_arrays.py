@@ -10,6 +10,10 @@ from __future__ import annotations
 import importlib.util
 import math
 import sys
+from collections import deque
+from collections.abc import Callable
+from dataclasses import fields
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -23,6 +27,8 @@ THREADS = 128
 """Of a block, side by side along memory: four warps, each of which reads one piece of memory. Small blocks leave
 few multiprocessors without work at a launch's end, and no kernel here shares anything between the threads of a
 block."""
+KEPT = 4
+"""Plans whose tables stay on the GPU: those that were used last."""
 MOST_BLOCKS = 65535
 """Along the second and the third axis of a launch; what is beyond is done by the same threads, later."""
 SIMULATED = bool(config.ENABLE_CUDASIM)
@@ -67,12 +73,22 @@ def launch(kernel: Any, threads: tuple[int, ...], stream: Any, *arguments: Any) 
     # In the simulator a thread of Python stands for each of the GPU's: a few do all places, in two blocks.
     wide = 2 if SIMULATED else THREADS
     blocks = (2, 1, min(z, 2)) if SIMULATED else (math.ceil(x / wide), min(y, MOST_BLOCKS), min(z, MOST_BLOCKS))
-    kernel[blocks, (wide, 1, 1), stream](*arguments)
+    quiet, config.CUDA_LOW_OCCUPANCY_WARNINGS = config.CUDA_LOW_OCCUPANCY_WARNINGS, 0  # small pictures are small
+    configured = kernel[blocks, (wide, 1, 1), stream]
+    config.CUDA_LOW_OCCUPANCY_WARNINGS = quiet
+    configured(*arguments)
 
 
 def sent(array: NDArray[Any], stream: Any = 0) -> Any:
     """A copy on the GPU."""
     return cuda.to_device(np.ascontiguousarray(array), stream=stream)
+
+
+def sent_all(given: Any) -> Any:
+    """A named tuple, and those in it, with copies on the GPU of the arrays."""
+    if isinstance(given, np.ndarray):
+        return sent(given)
+    return type(given)(*map(sent_all, given)) if hasattr(given, "_fields") else given
 
 
 def brought(array: Any, stream: Any = 0) -> NDArray[Any]:
@@ -103,7 +119,7 @@ def is_on_gpu(values: Any) -> bool:
             "samples carry gradients, which engine 'cuda' does not: pass tensor.detach(), or engine='array_api', "
             "which carries them"
         )
-    return hasattr(values, "__cuda_array_interface__")
+    return is_of_numba(values) or hasattr(values, "__cuda_array_interface__")
 
 
 def taken(values: Any) -> Any:
@@ -121,6 +137,18 @@ def taken(values: Any) -> Any:
     if array.dtype == np.float16:
         raise InputError("samples on the GPU are not in half precision with engine 'cuda': pass tensor.float()")
     return array
+
+
+def resident(values: Any) -> Any:
+    """Samples on the GPU: NumPy's are copied there, those that are there stay as they are.
+
+    Raises:
+        InputError: arrays of another library in main memory.
+    """
+    if isinstance(values, np.ndarray):
+        return sent(values.astype(np.float32) if values.dtype == np.float16 else values)
+    taken(values)
+    return values
 
 
 def is_of_numba(values: Any) -> bool:
@@ -163,6 +191,51 @@ def given_back(array: Any, like: Any) -> Any:
     if library == "cupy":
         return sys.modules["cupy"].asarray(array)
     return brought(array)
+
+
+def device(function: Any) -> Any:
+    """One of the processor's compiled functions as a part of kernels, put in where it is called."""
+    plain = getattr(function, "py_func", function)
+    return plain if SIMULATED else cuda.jit(device=True, forceinline=True)(plain)
+
+
+class LastUsed:
+    """What was made of the plans' cores that were used last.
+
+    A core's arrays are never written to: cores that share all of them are alike, but for what a sample stands for.
+
+    Args:
+        make: makes it of a core.
+    """
+
+    def __init__(self, make: Callable[[Any], Any]) -> None:
+        self.make = make
+        self._kept: deque[tuple[Any, Any]] = deque(maxlen=KEPT)
+        self._lock = Lock()
+
+    def of(self, core: Any) -> Any:
+        """What is there of a core, or is made now."""
+        with self._lock:
+            for known, made in self._kept:
+                if _alike(known, core):
+                    return made
+            made = self.make(core)
+            self._kept.append((core, made))
+            return made
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Whether two cores are, by what they hold rather than by its content."""
+    pairs = ((getattr(one, each.name), getattr(other, each.name)) for each in fields(one) if each.name != "scale")
+    return type(one) is type(other) and all(a is b or _equal(a, b) for a, b in pairs)
+
+
+def _equal(one: Any, other: Any) -> bool:
+    """Whether two parts of cores are equal that can be told so without looking at arrays."""
+    plain = (str, int, float, bool)
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(_equal, one, other))
+    return isinstance(one, plain) and isinstance(other, plain) and one == other
 
 
 @cuda.jit

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.engines import cuda_footprint_kernels as kernels
 from vcc.engines import footprint_tables as tables
-from vcc.engines.cuda_arrays import launch, sent
+from vcc.engines.cuda_arrays import LastUsed, launch, sent
 from vcc.engines.footprint_samples import FineGrid, on_raster, textures
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import taps
@@ -24,8 +23,6 @@ from vcc.plan.footprints.shares import taps
 AT_ONCE = 6
 """Rows of samples that a thread asks for at once, at most: memory answers after some hundred instructions. Where
 samples are as large as pixels, four rows of the raster gather six."""
-KEPT = 4
-"""Plans whose tables stay on the GPU: those that were used last."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,32 +79,9 @@ class Tables(Brief):
         return finer + core.raster_shape[0] * line + lines
 
 
-_kept: deque[Tables] = deque(maxlen=KEPT)
-_lock = Lock()
-
-
 def tables_of(core: Footprints) -> Tables:
-    """The tables of a plan: made now, or those that are on the GPU already.
-
-    A plan's arrays are never written to: plans that share all of them are alike, but for what a sample stands for.
-    """
-    with _lock:
-        for known in _kept:
-            if _alike(known.core, core):
-                return known
-        made = _made(core)
-        _kept.append(made)
-        return made
-
-
-def _alike(one: Footprints, other: Footprints) -> bool:
-    for each in fields(Footprints):
-        a, b = getattr(one, each.name), getattr(other, each.name)
-        if each.name == "scale" or a is b:
-            continue
-        if isinstance(a, np.ndarray) or isinstance(b, np.ndarray) or each.name == "masks" or a != b:
-            return False
-    return True
+    """The tables of a plan: made now, or those that are on the GPU already."""
+    return _last_used.of(core)  # type: ignore[no-any-return]
 
 
 def _made(core: Footprints) -> Tables:
@@ -132,6 +106,9 @@ def _made(core: Footprints) -> Tables:
         footprint,
         tables.Textures(sent(values), sent(size), sent(step)),
     )
+
+
+_last_used = LastUsed(_made)
 
 
 def _along(core: Footprints, fine: FineGrid) -> tuple[tuple[kernels.Quads, int], tuple[Any, Any]]:

@@ -63,8 +63,13 @@ def given(core: Rays, beside: int) -> tuple[tables.Sensor, tables.Points, tables
 def light_field(core: Rays, values: NDArray[Any], channels: int) -> tables.LightField:
     """Samples, and how the rays of a core look them up."""
     kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
+    return looked_up_as(core, np.ascontiguousarray(values, dtype=kind).reshape(-1), channels)
+
+
+def looked_up_as(core: Rays, values: Any, channels: int) -> tables.LightField:
+    """The same for samples that lie flat, in the order (v, u, t, s, channel), wherever they are."""
     return tables.LightField(
-        tables.Samples(np.ascontiguousarray(values, dtype=kind).reshape(-1), core.views, channels),
+        tables.Samples(values, core.views, channels),
         core.scale,
         core.index_from_ray.matrix[:4].copy(),
         np.ascontiguousarray(core.motion),

@@ -1,0 +1,157 @@
+"""The kernel of rays for the GPU: a thread traces all rays of a pixel, by the functions of the processor's kernel.
+
+Those take packets of rays; here a packet holds one. What is aimed, met and drawn is `vcc.engines.ray_kernels` word
+for word; only the light field is looked up by other words, without vector instructions. A thread adds what its
+rays find in their order, so that nobody waits, and the same bytes come out of every run.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numba import cuda, float32, float64, int64
+
+from vcc.engines import ray_kernels as shared
+from vcc.engines.cuda_arrays import device
+from vcc.engines.ray_tables import Drawn, Packet, Samples
+
+FLUSHED = 256
+"""Rays that are added in single precision, as many as a packet has on the processor; their sums in double."""
+CELLS = 256
+"""Cells through which a pixel is traced, at most: as on the processor."""
+
+_at_pixel = device(shared.at_pixel)
+_through_window = device(shared.through_window)
+_through_cell = device(shared.through_cell)
+_take_steps = device(shared.take_steps)
+_to_indices = device(shared.to_indices)
+_add_view = device(shared.add_view)
+
+
+@cache
+def trace(channels: int, by_cell: bool) -> Any:
+    """The kernel that traces rays of a camera, for light fields of so many channels.
+
+    Args:
+        channels: numbers a sample.
+        by_cell: whether rays are aimed through the cells of an array.
+    """
+
+    @cuda.jit
+    def kernel(field, sensor, points, aim, steps, pictures, tallies):  # type: ignore[no-untyped-def]
+        """As `vcc.engines.ray_kernels.add_tile`, of which the arguments are, for all pixels.
+
+        pictures: (2, rows, columns, channels): what the two halves of a pixel's rays find. tallies: (rows,
+            columns,
+        3): weights of its rays, of the missing ones, how many they are.
+        """
+        x0, y0 = cuda.grid(2)
+        wide, high = cuda.gridsize(2)
+        table, samples, beside, seed = points
+        cells, blocks = aim.cells, table.shape[1] // samples
+        there = Samples(field.samples.values, field.samples.views, channels)
+        x, y, s = cuda.local.array(1, float64), cuda.local.array(1, float64), cuda.local.array(1, float64)
+        t, share = cuda.local.array(1, float64), cuda.local.array(1, float64)
+        rays = Packet(x, y, s, t, share)
+        flipped, images = cuda.local.array(4, int64), cuda.local.array((2, 5), float64)
+        near = cuda.local.array((CELLS if by_cell else 1, 2), int64)
+        found, total = cuda.local.array(channels, float32), cuda.local.array(channels, float64)
+        for row in range(y0, sensor.rows, high):
+            for column in range(x0, sensor.columns, wide):
+                pixel, middle = row * sensor.columns + column, shared.middle_of(sensor, row, column)
+                first = ((np.int64(shared.hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
+                seen = shared.cells_at(by_cell, cells, middle, sensor.sensitive, near)
+                asked, missing, sent = float64(0), float64(0), int64(0)
+                for half in range(2):
+                    for c in range(channels):
+                        total[c] = 0
+                        found[c] = 0
+                    for q in range(seen):
+                        shared.turn_to(by_cell, cells, seed, pixel, near, q, images, flipped)
+                        begin = half * (samples // 2)
+                        for p in range(begin, begin + samples // 2):
+                            drawn = Drawn(table, first + p, 1, flipped)
+                            _at_pixel(drawn, middle, sensor.sensitive, rays)
+                            if by_cell:
+                                _through_cell(drawn, images, cells, rays)
+                            else:
+                                _through_window(drawn, aim.window, rays)
+                            if share[0] > 0:
+                                sent += 1
+                                _take_steps(steps, drawn, rays)
+                                wanted, lacking = look_up(field, there, rays, found)
+                                asked += wanted
+                                missing += lacking
+                            if p % FLUSHED == FLUSHED - 1 or p == begin + samples // 2 - 1:
+                                for c in range(channels):
+                                    total[c] += found[c]
+                                    found[c] = 0
+                    for c in range(channels):
+                        pictures[half, row, column, c] = total[c] * field.scale / samples
+                tallies[row, column, 0], tallies[row, column, 1], tallies[row, column, 2] = asked, missing, sent
+
+    return kernel
+
+
+@cuda.jit(device=True)
+def look_up(field, samples, rays, found):  # type: ignore[no-untyped-def]
+    """Add what a ray finds to ``found`` (channels), as `vcc.engines.ray_kernels.add_rays` does for many.
+
+    Returns what it weighs, where the grid of views holds it or may end, and what of that the light field lacks.
+    """
+    _, _, index_from_ray, motion, between, ends = field
+    _, (nv, nu, nt, ns), channels = samples
+    weight = rays.share[0]
+    if weight == 0:
+        return float64(0), float64(0)
+    _to_indices(index_from_ray, rays, 1)
+    i, j, k, l = rays.x[0], rays.y[0], rays.s[0], rays.t[0]
+    if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
+        return (weight, weight) if ends else (float64(0), float64(0))
+    missing = float64(0)
+    if not (k >= -0.5 and k <= ns - 0.5 and l >= -0.5 and l <= nt - 0.5):
+        missing = weight
+        # So far outside the pictures all views that a ray is between are dark.
+        dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
+        dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
+        if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
+            return weight, missing
+    picture = nt * ns * channels
+    ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
+    if not between:
+        base = (int64(cj + 0.5) * nu + int64(ci + 0.5)) * picture
+        _add_view(samples, base, k, l, float32(weight), found)
+        return weight, missing
+    i0, j0 = min(int64(ci), max(nu - 2, 0)), min(int64(cj), max(nv - 2, 0))
+    fi, fj = ci - i0, cj - j0
+    for dj in range(2):
+        for di in range(2):
+            w = weight * (fj if dj == 1 else 1.0 - fj) * (fi if di == 1 else 1.0 - fi)
+            if w == 0.0:
+                continue
+            away_i, away_j = i - (i0 + di), j - (j0 + dj)
+            view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j
+            view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
+            base = ((j0 + dj) * nu + i0 + di) * picture
+            _add_view(samples, base, view_k, view_l, float32(w), found)
+    return weight, missing
+
+
+@cuda.jit
+def put_together(pictures, tallies, rows):  # type: ignore[no-untyped-def]
+    """Of the two halves their sum and twice their difference; rows[r]: the tallies of a row of pixels, summed."""
+    y = cuda.grid(1)
+    _, high, wide, channels = pictures.shape
+    for row in range(y, high, cuda.gridsize(1)):
+        for n in range(3):
+            total = float64(0)
+            for column in range(wide):
+                total += tallies[row, column, n]
+            rows[row, n] = total
+        for column in range(wide):
+            for c in range(channels):
+                one, two = pictures[0, row, column, c], pictures[1, row, column, c]
+                pictures[0, row, column, c] = one + two
+                pictures[1, row, column, c] = float32(2) * (one - two)

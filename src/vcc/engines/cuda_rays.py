@@ -1,0 +1,53 @@
+"""Tracing rays on the GPU."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import cuda
+
+from vcc.base.progress import Progress, tell
+from vcc.engines import cuda_ray_kernels as kernels
+from vcc.engines.cuda_arrays import LastUsed, arranged, brought, given_back, launch, resident, sent_all, taken
+from vcc.engines.rays_compiled import given, looked_up_as
+from vcc.plan.protocol import Partial
+from vcc.plan.rays.model import Rays
+
+
+def traced(core: Rays, values: Any, beside: int, progress: Progress | None = None) -> Partial:
+    """The raster by one round of rays, in the library of the samples.
+
+    Args:
+        core: what is traced.
+        values: samples (v, u, t, s[, channels]), of NumPy (which are sent as a whole) or on the GPU.
+        beside: 0, or 1 for the blocks of points beside those of the first round.
+        progress: called with (done, total).
+    """
+    tell(progress, 0, 1)
+    pictures, tallies = traced_on_gpu(core, values, beside)
+    asked, lacking, rays = brought(tallies).sum(axis=0).tolist()
+    tell(progress, 1, 1)
+    return Partial(
+        given_back(pictures[0], values), given_back(pictures[1], values), asked, lacking, int(rays), core.samples
+    )
+
+
+def traced_on_gpu(core: Rays, values: Any, beside: int) -> tuple[Any, Any]:
+    """The pictures of `vcc.engines.ray_kernels.add_tile`, and tallies of each row of pixels, (rows, 3), on the
+    GPU."""
+    there = arranged(taken(resident(values)))
+    rows, columns = core.raster_shape
+    channels = there.shape[4]
+    field = looked_up_as(core, there.reshape(math.prod(there.shape)), channels)
+    sensor, points, aim, steps = _last_used.of(core)
+    pictures = cuda.device_array((2, rows, columns, channels), np.float32)
+    tallies, of_rows = cuda.device_array((rows, columns, 3), np.float64), cuda.device_array((rows, 3), np.float64)
+    tables = sent_all(field), sensor, points._replace(beside=beside), aim, steps
+    launch(kernels.trace(channels, bool(aim.by_cell)), (columns, rows), 0, *tables, pictures, tallies)
+    launch(kernels.put_together, (rows,), 0, pictures, tallies, of_rows)
+    return pictures, of_rows
+
+
+_last_used = LastUsed(lambda core: tuple(map(sent_all, given(core, 0))))
