@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from vcc.image import Image as Image
     from vcc.image import load_image as load_image
     from vcc.light_field import LightField as LightField
+    from vcc.motion import MovingCamera as MovingCamera
     from vcc.optics import Biprism as Biprism
     from vcc.optics import CodedDiffuser as CodedDiffuser
     from vcc.optics import Diffuser as Diffuser
@@ -63,6 +64,7 @@ _HOMES = {
     "LensArray": "vcc.optics",
     "LightField": "vcc.light_field",
     "Mask": "vcc.optics",
+    "MovingCamera": "vcc.motion",
     "PhasePlate": "vcc.optics",
     "Prism": "vcc.optics",
     "PrismArray": "vcc.optics",
@@ -84,6 +86,7 @@ _MODULES = {
     "gallery",
     "jax",
     "kernels",
+    "motion",
     "patterns",
     "plot",
     "prescriptions",

@@ -43,6 +43,7 @@ ROOMS = [
     "analysis",
     "recover",
     "sweeps",
+    "motion",
     "showcase",
     "gallery",
     "notebook",

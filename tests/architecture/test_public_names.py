@@ -19,6 +19,7 @@ NAMES = {
     "vcc.gallery": "ENTRIES entries entry write_entry",
     "vcc.jax": "CameraFunction",
     "vcc.kernels": "Gaussian Radial Samples TopHat",
+    "vcc.motion": "Function LightFieldVideo Lines MovingCamera Steps coded",
     "vcc.operators": "masked projected resampled scattered",
     "vcc.patterns": "Bounded Cells Circle CosineSum Polygon mura",
     "vcc.plot": "phase_space_stages plot_camera plot_phase_space_stages",

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-import warnings
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any, Unpack
 
 from vcc.base import checks
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError, ResultWarning, warn_of_result
+from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
 from vcc.base.progress import Progress, tell
+from vcc.base.remarks import Remarks
 from vcc.camera import Camera, captured_together
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.image import Image
@@ -32,8 +30,6 @@ MOST_TOGETHER = 256
 """Pictures that are made together, at most: progress is told, and results are kept, after each batch."""
 BATCH_SAMPLES = 2 * 10**9
 """Samples that are gone through for pictures that are made together, about: some seconds' work."""
-MANY_KINDS = 5
-"""Kinds of remarks on pictures that are still passed on."""
 
 
 def sweep(
@@ -166,14 +162,14 @@ class Work(Brief):
         """Make the pictures that are not there yet."""
         todo = results.left()
         done, total = len(self.cameras) - len(todo), len(self.cameras)
-        remarks = Remarks(total)
+        remarks = Remarks()
         for batch in self.batches(todo):
             for number, image, row in self.made(batch, remarks):
                 results.put(number, image, row)
             results.commit()
             done += len(batch)
             tell(progress, done, total)
-        remarks.say()
+        remarks.say(total, "cameras")
 
     def made(self, batch: Sequence[int], remarks: Remarks) -> Iterator[tuple[int, Image, dict[str, float]]]:
         """The pictures of some cameras, with what is told of them.
@@ -186,35 +182,3 @@ class Work(Brief):
         for number, image in zip(batch, images, strict=True):
             with checks.within(self.cameras.said(number)):
                 yield number, image, row_of(image, self.metrics)
-
-
-class Remarks:
-    """What is remarked on pictures, said once for each kind.
-
-    Args:
-        total: pictures of the whole.
-    """
-
-    def __init__(self, total: int) -> None:
-        self._total, self._kinds, self._first = total, Counter[str](), dict[str, str]()
-
-    def say(self) -> None:
-        """Say what was remarked."""
-        for kind, count in self._kinds.most_common(MANY_KINDS):
-            of = f"{count} of {self._total} cameras, one of them: " if self._total > 1 else ""
-            warn_of_result(f"{of}{self._first[kind]}")
-
-    @contextmanager
-    def gathered(self) -> Iterator[None]:
-        """Take note of what is remarked within."""
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", ResultWarning)
-            yield
-        for each in caught:
-            said = str(each.message)
-            if not issubclass(each.category, ResultWarning):
-                warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
-                continue
-            kind = "".join(letter for letter in said if not letter.isdigit() and letter not in ".e-")
-            self._kinds[kind] += 1
-            self._first.setdefault(kind, said)

@@ -1,0 +1,15 @@
+"""Cameras and light that change while a sensor gathers it: courses over time, exposures, light-field videos.
+
+::
+
+    sweep = vcc.motion.Lines([0, 0.36], [51 * mm, 54 * mm])
+    picture = vcc.MovingCamera(camera, {"sensor.z": sweep}).capture(light_field, exposure=0.36)
+"""
+
+from __future__ import annotations
+
+from vcc.motion.courses import Course, Function, Lines, Steps, coded
+from vcc.motion.moving_camera import MovingCamera
+from vcc.motion.video import LightFieldVideo
+
+__all__ = ["Course", "Function", "LightFieldVideo", "Lines", "MovingCamera", "Steps", "coded"]

@@ -1,0 +1,266 @@
+"""A camera whose parameters are functions of time, and what it gathers while its shutter is open."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Self, Unpack
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import checks
+from vcc.base.describe import Brief
+from vcc.base.errors import InputError, warn_of_result
+from vcc.base.progress import Progress, tell
+from vcc.base.remarks import Remarks
+from vcc.camera import Camera
+from vcc.fields.samples import Samples
+from vcc.image import Image
+from vcc.learn.parameters import replaced
+from vcc.motion.courses import Course, course, pieces
+from vcc.motion.light import Light, light_of
+from vcc.motion.quadrature import MOST, Mean, mean_over
+from vcc.motion.video import LightFieldVideo
+from vcc.plan.how import How, Options
+
+TOLERANCE = 2e-3
+"""Of a picture's mean: half of what a step of 8 bits is of white."""
+KEPT = 2**28
+"""Bytes of pictures that are kept, in case the same light falls through the same camera again."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MovingCamera(Brief):
+    """A camera that changes while its sensor gathers light.
+
+    Times count from when the exposure begins.
+
+    Args:
+        camera: as it is but for what changes.
+        courses: names of parameters, as sweeps and learning have them (``"sensor.z"``, ``"code.pattern"``,
+            ``"code.decentre"``), and what they are at each time: a function from seconds to what the camera takes
+            (SI units), or `Steps` or `Lines`.
+        shutter: the share of the light that passes, 0 to 1, likewise; None is open all the time.
+
+    Raises:
+        InputError: a parameter that there is not (those that there are are listed), or what is no course; what the
+            camera refuses at the beginning.
+    """
+
+    camera: Camera
+    courses: Mapping[str, Course | Callable[[float], Any]] = field(default_factory=dict)
+    shutter: Course | Callable[[float], float] | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.camera, Camera):
+            raise InputError(f"what moves is a vcc.Camera, not a {type(self.camera).__name__}")
+        if not isinstance(self.courses, Mapping):
+            raise InputError(
+                'what changes is named, {"sensor.z": lambda t: 52 * mm + 0.1 * t}, not a '
+                f"{type(self.courses).__name__}"
+            )
+        object.__setattr__(self, "courses", {name: course(each) for name, each in self.courses.items()})
+        if self.shutter is not None:
+            object.__setattr__(self, "shutter", course(self.shutter))
+        self.at(0.0)
+
+    def at(self, time: float) -> Camera:
+        """The camera at a time after the exposure began, seconds.
+
+        Raises:
+            InputError: what it does not take then, with the time.
+        """
+        if not self.courses:
+            return self.camera
+        with checks.within(f"at {time:g} s"):
+            return replaced(self.camera, {name: each(time) for name, each in self.courses.items()})
+
+    def open_at(self, time: float) -> float:
+        """The share of the light that the shutter lets through, 0 to 1.
+
+        Raises:
+            InputError: the shutter gives no such number.
+        """
+        if self.shutter is None:
+            return 1.0
+        return checks.zero_or_more(f"the shutter at {time:g} s", self.shutter(time), most=1)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """When something of it jumps or bends, seconds."""
+        changing: list[Any] = [*self.courses.values(), *([] if self.shutter is None else [self.shutter])]
+        return tuple(sorted({time for each in changing for time in each.breaks}))
+
+    def capture(
+        self,
+        light_field: Samples | LightFieldVideo | Callable[[float], Samples],
+        exposure: float,
+        how: How | None = None,
+        *,
+        start: float = 0.0,
+        time_tolerance: float = TOLERANCE,
+        progress: Progress | None = None,
+        **options: Unpack[Options],
+    ) -> Image:
+        """The picture that the sensor gathers over an exposure.
+
+        It is (1/T)·∫ q(t)·E(t) dt over the exposure T, with the shutter's q and the irradiance E that the camera
+        of each moment would record: a camera that stands still with its shutter open gives what
+        `vcc.Camera.capture` gives, and `vcc.expose_image` with the same exposure time records it. Each pixel
+        gathers what falls on it, wherever it is moved.
+
+        The integral is cut where something switches, bends or a frame ends, and refined in each part until its
+        estimated error is small enough (`vcc.motion.quadrature.mean_over`). Pictures of the same camera before the
+        same frame are made once; what switches in steps costs one for each state.
+
+        Args:
+            light_field: one that stays, a video, or a function from seconds to a light field; all of one shape.
+            exposure: T, seconds.
+            how: as in `vcc.Camera.capture`.
+            start: when the exposure begins, in the time of the video or function, seconds.
+            time_tolerance: refine until the estimated error of the mean over time, root mean square over the
+                pixels, is at most this share of the picture's mean, with up to 729 moments of each part.
+            progress: called with (done, total) in parts of the exposure.
+            options: as in `vcc.Camera.capture`.
+
+        Returns:
+            Irradiance, radiance × steradian, in the frame of the camera as it was given. Its ``sampling_error`` is
+            the estimated error of rays and moments together.
+
+        Warns:
+            ResultWarning: the tolerance was not reached; what `vcc.Camera.capture` warns of, once for each kind.
+
+        Raises:
+            InputError: no exposure above 0, a video that does not last that long, a shutter that lets through less
+                than 0 or more than 1; what the camera refuses at a time, or what `vcc.Camera.capture` refuses.
+        """
+        length = checks.above_zero("exposure", exposure, unit="s")
+        begun = checks.finite("start", start, "seconds")
+        tolerance = checks.above_zero("time_tolerance", time_tolerance, "a share of the picture's mean")
+        light = light_of(light_field)
+        light.check_lasts(begun, begun + length)
+        work = _Work(self, light, begun, How.of(how, options))
+        return work.gathered(length, tolerance, progress)
+
+
+@dataclass(frozen=True, eq=False)
+class _Gathered:
+    """Irradiance and what is known of it, in double precision: what is added over time."""
+
+    values: NDArray[np.float64]
+    missing_rays: float
+    sampling_error: float
+
+    def __add__(self, other: Self) -> Self:
+        return replace(
+            self,
+            values=self.values + other.values,
+            missing_rays=self.missing_rays + other.missing_rays,
+            # All moments take the same rays: their errors add up in the worst case.
+            sampling_error=self.sampling_error + other.sampling_error,
+        )
+
+    def __mul__(self, factor: float) -> Self:
+        return replace(
+            self,
+            values=self.values * factor,
+            missing_rays=self.missing_rays * factor,
+            sampling_error=self.sampling_error * factor,
+        )
+
+    def size(self) -> float:
+        return float(self.values.mean())
+
+    def distance(self, other: Self) -> float:
+        return math.sqrt(float(np.square(self.values - other.values).mean()))
+
+
+class _Work:
+    """One exposure: pictures of moments, those of the last states kept."""
+
+    def __init__(self, moving: MovingCamera, light: Light, start: float, how: How) -> None:
+        self._moving, self._light, self._start, self._how = moving, light, start, how
+        self._kept: OrderedDict[tuple[Camera, Any], _Gathered] = OrderedDict()
+        self._remarks, self._made = Remarks(), 0
+
+    def gathered(self, exposure: float, tolerance: float, progress: Progress | None) -> Image:
+        breaks = (*self._moving.breaks, *(time - self._start for time in self._light.breaks))
+        parts = pieces(0.0, exposure, breaks)
+        total, error, reached, passed = None, 0.0, True, 0.0
+        for done, (begin, end) in enumerate(parts, start=1):
+            share = (end - begin) / exposure
+            found: Mean[_Gathered] = mean_over(begin, end, self._moment, tolerance, MOST)
+            part = found.value * share
+            total = part if total is None else total + part
+            error, reached = error + share * found.error, reached and found.reached
+            passed += share * self._moving.open_at((begin + end) / 2)
+            tell(progress, done, len(parts))
+        assert total is not None
+        self._remarks.say(self._made, "moments")
+        if not reached:
+            warn_of_result(
+                f"the error of the mean over time is estimated as {error:.2g}, {error / total.size():.2g} of "
+                f"the picture's mean, after {MOST} moments of a part of the exposure; {tolerance:g} was asked "
+                "for. Say at which times something jumps (vcc.motion.Steps, vcc.motion.Function(…, breaks=…))"
+            )
+        return self._image(total, error, passed)
+
+    def _image(self, total: _Gathered, error: float, passed: float) -> Image:
+        camera = self._moving.camera
+        return Image(
+            total.values.astype(np.float32),
+            camera.sensor.frame,
+            missing_rays=total.missing_rays / passed if passed > 0 else 0.0,
+            sampling_error=total.sampling_error + error,
+            camera=camera,
+        )
+
+    def _moment(self, time: float) -> _Gathered:
+        """What falls on the sensor at a time after the exposure began."""
+        through = self._moving.open_at(time)
+        if through == 0:
+            return self._dark
+        camera, pixels = self._moving.at(time), self._moving.camera.sensor.shape
+        if camera.sensor.shape != pixels:
+            raise InputError(
+                f"the sensor has {camera.sensor.shape} pixels at {time:g} s and {pixels} else: pixels gather "
+                "light all the time, and stay as many"
+            )
+        frames = self._light.at(self._start + time)
+        return _sum([self._picture(camera, key, samples) * (share * through) for key, samples, share in frames])
+
+    @cached_property
+    def _dark(self) -> _Gathered:
+        channels = next(iter(self._light.at(self._start)))[1]().grid.shape[4:]
+        return _Gathered(np.zeros((*self._moving.camera.sensor.shape, *channels)), 0.0, 0.0)
+
+    def _picture(self, camera: Camera, key: Any, samples: Callable[[], Samples]) -> _Gathered:
+        """The picture of a camera and a frame, made once while it is kept."""
+        known = self._kept.get((camera, key))
+        if known is not None:
+            self._kept.move_to_end((camera, key))
+            return known
+        with self._remarks.gathered():
+            image = camera.capture(samples(), self._how)
+        if not isinstance(image.values, np.ndarray):
+            raise InputError(
+                f"a moving camera takes samples of NumPy, not of {type(image.values).__module__.split('.')[0]}, "
+                "whose gradients would end here: sum pictures of camera.capture yourself"
+            )
+        self._made += 1
+        made = _Gathered(image.values.astype(np.float64), image.missing_rays, image.sampling_error)
+        self._kept[camera, key] = made
+        while len(self._kept) > max(2, KEPT // made.values.nbytes):
+            self._kept.popitem(last=False)
+        return made
+
+
+def _sum(parts: list[_Gathered]) -> _Gathered:
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total
