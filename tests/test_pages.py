@@ -10,6 +10,7 @@ import re
 import shlex
 import shutil
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import imagecodecs
@@ -235,6 +236,10 @@ def quick(monkeypatch):
     smaller = CameraArray(views=(3, 3), pixels=(20, 24), spacing=1e-3, slope_per_pixel=0.02, focus_distance=1.3)
     monkeypatch.setattr(ViewsAndPixels, "cameras", lambda *_, **__: smaller)
     monkeypatch.setattr(Entry, "run", lambda *_: Result("", (), ()))
+    # Processes and clusters take seconds to begin, and tests/run has them.
+    for executor in ("concurrent.futures.ProcessPoolExecutor", "distributed.Client"):
+        monkeypatch.setattr(executor, lambda *_, **__: ThreadPoolExecutor(1))
+    monkeypatch.setattr("vcc.cli.executing._processes", lambda: ThreadPoolExecutor(1))
 
 
 # --- the run ---
