@@ -5,10 +5,15 @@ Run by ``test_cuda.py`` in a process of its own: whether Numba simulates is deci
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
+from numba import cuda
+from numba.cuda.simulator.cudadrv.devicearray import FakeCUDAArray
 
 import vcc
 from tests.engines.test_agreement import CAMERAS, LENS, field, samples, turned
@@ -188,6 +193,80 @@ def test_an_operator_and_its_adjoint():
     picture = np.random.default_rng(2).random(operator.picture_shape).astype(np.float32)
     ahead, back = float((operator(lf.values) * picture).sum()), float((operator.T(picture) * lf.values).sum())
     assert abs(ahead - back) < 1e-5 * abs(ahead)
+
+
+# --- arrays of other libraries ---
+
+
+class Elsewhere:
+    """An array on the GPU, of another library: what it shows is the CUDA array interface."""
+
+    requires_grad = False
+
+    def __init__(self, array: np.ndarray) -> None:
+        self.array, self.shape, self.dtype, self.ndim = array, array.shape, array.dtype, array.ndim
+
+    @property
+    def __cuda_array_interface__(self) -> dict:
+        place = (self.array.ctypes.data, False)
+        return {"shape": self.shape, "typestr": self.dtype.str, "data": place, "version": 3, "strides": None}
+
+    def __mul__(self, other: Elsewhere) -> Elsewhere:
+        return Elsewhere(self.array * other.array)
+
+    def __array__(self, dtype=None, copy=None) -> np.ndarray:
+        return self.array
+
+    def __getitem__(self, index) -> Elsewhere:
+        return Elsewhere(self.array[index])
+
+
+@pytest.fixture
+def _another_library(monkeypatch):
+    """The arrays are CuPy's, by name, and the simulator takes them as they lie (it takes none itself)."""
+    of_cupy = SimpleNamespace(asarray=lambda there: Elsewhere(there._ary), ndarray=Elsewhere)
+    monkeypatch.setattr(Elsewhere, "__module__", "cupy")
+    monkeypatch.setitem(sys.modules, "cupy", of_cupy)
+    monkeypatch.setattr(cuda, "as_cuda_array", lambda values: FakeCUDAArray(values.array), raising=False)
+
+
+@pytest.mark.usefixtures("_another_library")
+def test_arrays_that_are_on_the_gpu_are_taken_and_given_as_they_are():
+    camera, lf = CAMERAS["in focus"], field(samples((*SHAPE, 3)))
+    there = vcc.LightField.of(Elsewhere(lf.values), lf.grid)
+    for method, samples_ in (("footprints", None), ("rays", 4)):
+        options = {"method": method, "samples": samples_, "interpolation": "linear", "engine": "cuda"}
+        picture = camera.capture(there, **options).values
+        assert isinstance(picture, Elsewhere)
+        np.testing.assert_array_equal(picture.array, camera.capture(lf, **options).values)
+    lf.values[:] *= 2  # what was taken is no copy, which would show the light as it was
+    np.testing.assert_allclose(camera.capture(there, **options).values.array, 2 * picture.array, rtol=1e-6)
+    core, values = CORES["two masks"]
+    found = engine.footprints_back(core, Elsewhere(values), np.ones((*core.raster_shape, 3)), threads=1)
+    assert isinstance(found.samples, Elsewhere)
+
+
+@pytest.mark.usefixtures("_another_library")
+def test_arrays_that_do_not_lie_in_one_piece_are_put_into_one():
+    camera, lf = CAMERAS["in focus"], field(samples((2, 4, 5, 8)))
+    there = vcc.LightField.of(Elsewhere(lf.values), lf.grid)
+    options = {"interpolation": "linear", "engine": "cuda"}
+    picture = camera.capture(there[:, ::2, :, ::-1], **options).values.array
+    np.testing.assert_array_equal(picture, camera.capture(lf[:, ::2, :, ::-1], **options).values)
+
+
+@pytest.mark.usefixtures("_another_library")
+def test_tensors_with_gradients_or_in_main_memory_are_refused(monkeypatch):
+    camera, lf = CAMERAS["in focus"], field(samples(SHAPE))
+    with pytest.raises(vcc.InputError, match=r"not torch.Tensor in main memory.*tensor.cuda\(\)"):
+        camera.capture(lf.replaced(torch.asarray(lf.values)), engine="cuda")
+    monkeypatch.setattr(Elsewhere, "requires_grad", True)
+    with pytest.raises(vcc.InputError, match=r"carry gradients.*tensor.detach\(\).*array_api"):
+        camera.capture(vcc.LightField.of(Elsewhere(lf.values), lf.grid), engine="cuda")
+    monkeypatch.setattr(Elsewhere, "requires_grad", False)
+    half = lf.values.astype(np.float16)
+    with pytest.raises(vcc.InputError, match=r"half precision.*tensor.float\(\)"):
+        camera.capture(vcc.LightField.of(Elsewhere(half), lf.replaced(half).grid), engine="cuda")
 
 
 # --- rays ---

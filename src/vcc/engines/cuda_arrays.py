@@ -107,10 +107,11 @@ def zeros(shape: tuple[int, ...], stream: Any = 0) -> Any:
 
 
 def is_on_gpu(values: Any) -> bool:
-    """Whether an array is on the GPU already.
+    """Whether samples are on the GPU already, rather than in an array of NumPy.
 
     Raises:
-        InputError: a tensor that carries gradients, which this engine would leave behind.
+        InputError: a tensor that carries gradients, which this engine would leave behind; an array of another
+            library in main memory, with what to do.
     """
     if isinstance(values, np.ndarray):
         return False
@@ -119,20 +120,20 @@ def is_on_gpu(values: Any) -> bool:
             "samples carry gradients, which engine 'cuda' does not: pass tensor.detach(), or engine='array_api', "
             "which carries them"
         )
-    return is_of_numba(values) or hasattr(values, "__cuda_array_interface__")
-
-
-def taken(values: Any) -> Any:
-    """An array on the GPU as Numba's, where it lies.
-
-    Raises:
-        InputError: an array elsewhere, with what to do; samples in half precision.
-    """
-    if not is_on_gpu(values):
+    if not is_of_numba(values) and not hasattr(values, "__cuda_array_interface__"):
         raise InputError(
             f"engine 'cuda' takes NumPy arrays and arrays on the GPU, not {type(values).__module__}."
             f"{type(values).__name__} in main memory: pass numpy.asarray(values), or tensor.cuda()"
         )
+    return True
+
+
+def taken(values: Any) -> Any:
+    """Samples on the GPU as an array of Numba's, where they lie.
+
+    Raises:
+        InputError: samples in half precision.
+    """
     array = values if is_of_numba(values) else cuda.as_cuda_array(values)
     if array.dtype == np.float16:
         raise InputError("samples on the GPU are not in half precision with engine 'cuda': pass tensor.float()")
@@ -143,12 +144,11 @@ def resident(values: Any) -> Any:
     """Samples on the GPU: NumPy's are copied there, those that are there stay as they are.
 
     Raises:
-        InputError: arrays of another library in main memory.
+        InputError: what `is_on_gpu` refuses.
     """
-    if isinstance(values, np.ndarray):
-        return sent(values.astype(np.float32) if values.dtype == np.float16 else values)
-    taken(values)
-    return values
+    if is_on_gpu(values):
+        return values
+    return sent(values.astype(np.float32) if values.dtype == np.float16 else values)
 
 
 def is_of_numba(values: Any) -> bool:

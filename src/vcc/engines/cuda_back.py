@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.engines import cuda_back_kernels as kernels
-from vcc.engines.cuda_arrays import brought, given_back, launch, sent, zeros
+from vcc.engines.cuda_arrays import brought, given_back, is_on_gpu, launch, sent, zeros
 from vcc.engines.cuda_footprint_kernels import Source
 from vcc.engines.cuda_footprints import ROOM, Piece, Pieces, divided
 from vcc.engines.cuda_tables import Tables, mask_rows, tables_of
@@ -40,6 +40,7 @@ def samples_back(
         raster: weights of the raster's values, (rows, columns, channels).
         progress: called with (done, total) in view taps.
     """
+    is_on_gpu(values)  # or refused
     return given_back(samples_back_on_gpu(core, tuple(values.shape), raster, progress), values)
 
 

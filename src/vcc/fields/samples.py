@@ -9,6 +9,7 @@ from os import PathLike
 from typing import Any, Protocol, Self, get_args
 
 import numpy as np
+from array_api_compat import array_namespace, is_array_api_obj
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
@@ -271,16 +272,26 @@ def check_samples(values: Any) -> None:
         )
     if kind.kind == "u" or not has_values(values):
         return  # integers are neither negative nor NaN by construction
-    samples = to_numpy(values)
-    lowest, highest = samples.min(), samples.max()  # a NaN anywhere makes both NaN
+    lowest, highest = _extremes(values)
     if not (np.isfinite(lowest) and np.isfinite(highest)):
+        samples = to_numpy(values)
         bad = tuple(int(n) for n in np.argwhere(~np.isfinite(samples))[0])
         raise InputError(
             f"a light field needs finite samples; at index {bad} (v, u, t, s, …) it has {samples[bad]}"
         )
     if lowest < 0:
+        samples = to_numpy(values)
         bad = tuple(int(n) for n in np.unravel_index(samples.argmin(), samples.shape))
         raise InputError(f"radiance is not negative; at index {bad} (v, u, t, s, …) it is {lowest}")
+
+
+def _extremes(values: Any) -> tuple[float, float]:
+    """The least and the largest of an array's numbers, found where they are; NaN anywhere makes both NaN."""
+    if isinstance(values, np.ndarray) or not is_array_api_obj(values):
+        samples = to_numpy(values)
+        return float(samples.min()), float(samples.max())
+    xp, plain = array_namespace(values), values.detach() if hasattr(values, "detach") else values
+    return float(xp.min(plain)), float(xp.max(plain))
 
 
 def _range_of(values: Any, frame: Affine) -> tuple[float, float] | None:
