@@ -26,6 +26,7 @@ from vcc.engines import cuda_back, cuda_footprints, cuda_tables, reference
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import How
 from vcc.run.drive import Drive
+from vcc.store import open_store, save_store
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning"),
@@ -107,6 +108,18 @@ def test_samples_in_main_memory_are_sent_in_pieces(monkeypatch):
         monkeypatch.setattr(cuda_footprints, "SENT_AT_ONCE", 1)  # a column of views at a time
         np.testing.assert_allclose(assert_agree(camera, lf), whole, rtol=1e-5, atol=1e-8)
         monkeypatch.undo()
+
+
+def test_a_store_is_read_and_sent_block_by_block(monkeypatch, tmp_path):
+    lf, camera = field(samples((*SHAPE, 3), "uint8")), CAMERAS["in focus"]
+    save_store(lf, tmp_path / "views.zarr")
+    stored = open_store(tmp_path / "views.zarr")
+    monkeypatch.setattr(cuda_footprints, "SENT_AT_ONCE", 1)
+    need = Drive(camera.compile(lf), stored, How(engine="cuda")).need
+    how = How(engine="cuda", memory_limit=int(need.fixed + 6 * need.view))
+    assert len(list(Drive(camera.compile(lf), stored, how).blocks)) > 1
+    expected = camera.capture(lf, engine="reference").values
+    assert np.abs(camera.capture(stored, how).values - expected).max() < 1e-5 * expected.max()
 
 
 def test_samples_stay_on_the_gpu():

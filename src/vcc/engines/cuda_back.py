@@ -45,9 +45,9 @@ def samples_back(
 
 
 def samples_back_on_gpu(
-    core: Footprints, shape: tuple[int, ...], raster: NDArray[np.floating], progress: Progress | None = None
+    core: Footprints, shape: tuple[int, ...], raster: Any, progress: Progress | None = None
 ) -> Any:
-    """The same on the GPU, for samples of a shape."""
+    """The same on the GPU, for samples of a shape; weights may be there, too, float32."""
     tables, channels = tables_of(core), raster.shape[2]
     back = _Back(tables, raster)
     gradient = zeros(shape)
@@ -65,7 +65,6 @@ def samples_back_on_gpu(
             columns = order[begins[some][0] : ends[some.stop]]
             back.add(columns, ends[first : some.stop + 1] - begins[first], views[some], shape, gradient)
             done += int(np.count_nonzero(core.weights[:, columns]))
-        cuda.synchronize()  # before others use the rooms
     tell(progress, core.taps_used, core.taps_used)
     return gradient
 
@@ -106,7 +105,6 @@ def numbers_back(
     masks = [n for n in range(len(core.masks)) if f"masks[{n}].texture" in wanted]
     of_taps = np.zeros(core.weights.shape) if {"weights", "scale"} & set(wanted) else None
     textures = {n: zeros((PARTS, *core.masks[n].texture.shape)) for n in masks}
-    cuda.synchronize()  # they are there before kernels in another stream add to them
     line = tables.fine.rows * tables.fine.columns
     with tables.lock, Pieces(tables, values, 4 * len(core.view_rows) * line, opened=of_taps is not None) as pieces:
         for done, piece in enumerate(pieces):
@@ -130,13 +128,13 @@ class _Back:
 
     Args:
         tables: of the footprints.
-        raster: weights, (rows, columns, channels).
+        raster: weights, (rows, columns, channels), of NumPy or on the GPU, float32.
     """
 
-    def __init__(self, tables: Tables, raster: NDArray[np.floating]) -> None:
+    def __init__(self, tables: Tables, raster: Any) -> None:
         self.tables, self.core, self.fine = tables, tables.core, tables.fine
         self.channels = raster.shape[2]
-        self.raster = sent(raster.astype(np.float32))
+        self.raster = sent(raster.astype(np.float32)) if isinstance(raster, np.ndarray) else raster
         self.scale = np.float32(self.core.scale)
         self.n = self.fine.columns * self.channels
         """Values in a row of finer samples."""
@@ -162,17 +160,23 @@ class _Back:
         """
         tables, fine, channels = self.tables, self.fine, self.channels
         nv, nu, nt, ns = shape[:4]
-        rows = np.argsort(self.core.view_rows, kind="stable")
-        row_ends = np.searchsorted(self.core.view_rows[rows], np.arange(nv + 1))
-        readers = kernels.Readers(*map(sent, (rows, row_ends, columns, ends)))
-        view = nt * ns * channels
-        flat = gradient.reshape(math.prod(shape))
-        target = kernels.Target(flat, sent(np.arange(nv) * nu * view), sent(views * view), ns * channels)
-        into = target
+        view, finer_view = nt * ns * channels, fine.rows * self.n
+
+        def placed() -> tuple[Any, ...]:
+            rows = np.argsort(self.core.view_rows, kind="stable")
+            row_ends = np.searchsorted(self.core.view_rows[rows], np.arange(nv + 1))
+            each = np.arange(nv), np.arange(len(views))
+            to_finer = each[0] * finer_view, each[1] * nv * finer_view
+            return tuple(map(sent, (rows, row_ends, columns, ends, each[0] * nu * view, views * view, *to_finer)))
+
+        *taps, begin, further, finer_begin, finer_further = tables.once(
+            ("readers", shape, tuple(views.tolist())), placed
+        )
+        readers, flat = kernels.Readers(*taps), gradient.reshape(math.prod(shape))
+        into = target = kernels.Target(flat, begin, further, ns * channels)
         if tables.divided is not None:
             finer = tables.room("divided", (len(views), nv, fine.rows, self.n))
-            begin, further = np.arange(nv) * fine.rows * self.n, np.arange(len(views)) * nv * fine.rows * self.n
-            into = kernels.Target(finer.reshape(math.prod(finer.shape)), sent(begin), sent(further), self.n)
+            into = kernels.Target(finer.reshape(math.prod(finer.shape)), finer_begin, finer_further, self.n)
         places = fine.columns, fine.rows, nv * len(views)
         if tables.along is None:
             masks = tables.places, tables.grid, tables.footprint, tables.textures

@@ -25,7 +25,7 @@ from vcc.plan.footprints.model import Footprints
 
 ROOM = 2**28
 """Bytes of the GPU's memory that sums of a piece may take, finer samples and lines of masks among them."""
-SENT_AT_ONCE = 2**26
+SENT_AT_ONCE = 2**25
 """Bytes of samples that are sent to the GPU at once: enough for the full speed of the way there."""
 
 
