@@ -83,12 +83,11 @@ def _processes() -> Iterator[Any]:
     try:
         yield pool
     except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
         for process in multiprocessing.active_children():  # what they are at is no longer wanted
             process.terminate()
         raise
-    else:
-        pool.shutdown()
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _leave_interrupts() -> None:
