@@ -17,7 +17,6 @@ import numpy as np
 from numba import cuda, typeof
 
 import vcc
-from tests.engines.test_agreement import LENS, field, samples, turned
 from vcc.base.units import mm
 from vcc.engines import cuda_arrays
 from vcc.plan.operators import SharpenViews
@@ -75,6 +74,7 @@ def main() -> None:
     }
     for name, function in instead.items():
         setattr(cuda_arrays, name, function)
+    from tests.engines.test_agreement import LENS, field, samples, turned
     from vcc.engines import cuda as engine
     from vcc.engines import cuda_sharpening
 
