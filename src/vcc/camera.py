@@ -22,12 +22,12 @@ from vcc.optics.focusing import focused_train
 from vcc.optics.plenoptic import Plenoptic
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
-from vcc.plan.choice import compile_best
+from vcc.plan.choice import compile_best, compile_several
 from vcc.plan.how import OF_THE_RUN, How, Options
 from vcc.plan.model import Plan
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
-from vcc.run.drive import Drive, Recorded, drive, rounds_of
+from vcc.run.drive import Drive, Recorded, drive, recorded_together
 from vcc.run.expose import Exposure
 from vcc.run.operator import Operator
 from vcc.run.operators import carried_to
@@ -392,7 +392,7 @@ def captured_together(
 ) -> list[Image]:
     """What `Camera.capture` gives of one light field for several cameras, which share what they can of the work.
 
-    Each is planned by itself; `vcc.run.drive.rounds_of` says what plans share.
+    Each is planned by itself; `vcc.run.drive.recorded_together` says what plans share.
 
     Args:
         cameras: as many as there is memory for their pictures.
@@ -407,10 +407,13 @@ def captured_together(
         InputError: as `Camera.capture`.
     """
     check_is_light_field(light_field)
+    light_field.check_complete()
+    if how.between_views == "depth":
+        return [camera.capture(light_field, how, progress=progress) for camera in cameras]
     absurd = [camera._absurd(light_field) for camera in cameras]
-    plans = [camera._planned(light_field, how, None, {}, progress) for camera in cameras]
+    plans = compile_several(cameras, light_field.grid, how)
+    for caution in (caution for plan in plans for caution in plan.cautions):
+        warn_of_result(caution)
     drives = [Drive(plan, light_field, how) for plan in plans]
-    made = zip(cameras, plans, drives, rounds_of(drives), absurd, strict=True)
-    return [
-        camera._image(plan, light_field, drive.finished(found), said) for camera, plan, drive, found, said in made
-    ]
+    made = zip(cameras, plans, recorded_together(drives), absurd, strict=True)
+    return [camera._image(plan, light_field, found, said) for camera, plan, found, said in made]

@@ -202,7 +202,7 @@ def test_remarks_are_made_once_for_each_kind(field):
             {"code.pattern": "hexagon"},
             r'"hexagon", which is no file in .*no pattern by name: there are mura, open,',
         ),
-        ({"code.width": [8 * mm], "code": [1]}, "no parameter 'code'"),
+        ({"code": [1]}, "no parameter 'code'"),
         ([1], "names and values"),
     ],
 )
@@ -245,3 +245,13 @@ def test_progress_is_told_and_memory_asked_for(field):
     large = vcc.Camera([vcc.Lens(50 * mm)], vcc.Sensor(52 * mm, (4000, 4000), 2e-6))
     with pytest.raises(vcc.InputError, match=r"50 pictures of 4000×4000×3 needs .*pictures=False"):
         vcc.sweep(large, field, {"sensor.z": "52mm:53mm:50"})
+
+
+@pytest.mark.filterwarnings("ignore::vcc.ResultWarning")
+@pytest.mark.parametrize("interpolation", ["sharp", "linear"])
+def test_more_masks_at_the_views_than_views_are_made_of_their_pictures(field, interpolation):
+    codes = [np.random.default_rng(n).random((5, 5)) for n in range(30)]  # of 25 views
+    codes[7][:, :2] = 0
+    swept = vcc.sweep(camera(), field, {"code.pattern": codes}, interpolation=interpolation)
+    for n in (0, 7, 29):
+        same_picture(swept[n], camera(codes[n]).capture(field, interpolation=interpolation))

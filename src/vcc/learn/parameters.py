@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -119,11 +119,15 @@ def put(train: AnyTrain, values: Mapping[str, Any]) -> AnyTrain:
     """
     listed = _listed(train)
     found = [_learned(train, listed, name) for name in values]
-    return _with_changes(train, [(one, _checked(one, values[one.name])) for one in found])
+    return with_values(train, [(one, _checked(one, values[one.name])) for one in found])
 
 
-def _with_changes(train: AnyTrain, values: Sequence[tuple[Parameter, Any]]) -> AnyTrain:
-    """A camera with other values in some places."""
+def with_values(train: AnyTrain, values: Sequence[tuple[Parameter, Any]]) -> AnyTrain:
+    """A camera with other values in places that were found in it, by `place` or `parameter`.
+
+    Raises:
+        InputError: what an element does not take, named by parameter and element.
+    """
     changes: dict[int, dict[Any, Any]] = {}
     for found, value in values:
         inside = changes.setdefault(id(found.owner), {})
@@ -167,11 +171,20 @@ def replaced(train: AnyTrain, values: Mapping[str, Any]) -> AnyTrain:
         InputError: as `place`; what an element does not take, named by parameter and element; one name within
             another.
     """
-    for name in values:
-        within = [other for other in values if other.startswith((f"{name}.", f"{name}["))]
+    check_apart(values)
+    return with_values(train, [(place(train, name, value), value) for name, value in values.items()])
+
+
+def check_apart(names: Collection[str]) -> None:
+    """Refuse names of which one is a part of another.
+
+    Raises:
+        InputError: there are such.
+    """
+    for name in names:
+        within = [other for other in names if other.startswith((f"{name}.", f"{name}["))]
         if within:
             raise InputError(f"{within[0]} is a part of {name}, and both are given: leave one of them out")
-    return _with_changes(train, [(place(train, name, value), value) for name, value in values.items()])
 
 
 def why_none(found: Parameter) -> str | None:

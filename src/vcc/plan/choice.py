@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from vcc.base.errors import InputError
@@ -9,6 +10,7 @@ from vcc.fields.grid import Grid
 from vcc.optics.train import Train
 from vcc.plan.decisions import ANEW, Decisions, plan_again
 from vcc.plan.depth_rule import denser
+from vcc.plan.footprints.codes import Codes
 from vcc.plan.footprints.compile import blurs_or_why_not, compile_footprints
 from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.how import How
@@ -35,6 +37,21 @@ def compile_best(train: Train, grid: Grid, how: How | None = None, decisions: De
     kept.hold("the order of the elements", tuple((element.kind, element.name) for element in train.elements))
     plan = _compiled(train, grid, how or How(), kept)
     return replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame))
+
+
+def compile_several(trains: Sequence[Train], grid: Grid, how: How) -> list[Plan]:
+    """The plans of several trains, as `compile_best` makes each of them; what they share is made once.
+
+    Raises:
+        InputError: as `compile_best`.
+    """
+    alone = how.method == "rays" or how.between_views == "depth" or (how.samples, how.tolerance) != (None, None)
+    codes = None if alone or len(trains) < 2 else Codes.of(trains)
+    plans = None if codes is None else codes.plans(grid, how)
+    if plans is None:
+        return [compile_best(train, grid, how) for train in trains]
+    made = zip(trains, plans, strict=True)
+    return [replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame)) for train, plan in made]
 
 
 def _compiled(train: Train, grid: Grid, how: How, decisions: Decisions) -> Plan:

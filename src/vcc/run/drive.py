@@ -23,11 +23,13 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.progress import Progress
+from vcc.base.workers import Workers
 from vcc.engines import chosen, engine
 from vcc.fields.grid import Block
 from vcc.fields.sampled import has_values, to_dtype, to_numpy
 from vcc.fields.samples import Samples
 from vcc.plan.depth_rule import ViewsBetween
+from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
@@ -94,20 +96,68 @@ def rounds_of(drives: Sequence[Drive]) -> list[Partial]:
     """The rasters of several plans of one light field, read once where an engine can share it.
 
     It can where the samples are in memory as a whole, the same is done to them before, and the cores differ in one
-    mask alone (see `vcc.plan.protocol.Engine.together`); else one after the other.
+    mask alone (see `vcc.plan.protocol.Engine.together`); other plans of samples in memory are run side by side.
 
     Args:
         drives: plans on their way through one engine, with the same samples.
     """
     first = drives[0]
-    whole = first.in_memory and first.how.tolerance is None and len(list(first.blocks)) == 1
-    if len(drives) > 1 and whole and all(drive.plan.before == first.plan.before for drive in drives):
-        found = first.engine.together([drive.core for drive in drives], first.prepared, threads=first.threads)
+    alike = [drive for drive in drives if drive.plan.before == first.plan.before]
+    if len(drives) > 1 and all(drive.is_one_block for drive in drives):
+        for drive in alike:
+            drive.prepared = first.prepared  # once for all, for the way back, too
+        found = None
+        if len(alike) == len(drives):
+            found = first.engine.together([drive.core for drive in drives], first.prepared, threads=first.threads)
         if found is not None:
-            for drive in drives:
-                drive.prepared = first.prepared  # once for all, for the way back, too
             return found
+        if first.name == "numba":
+            # Each by one thread: nothing waits for the slowest of several at the end of each.
+            with Workers(first.threads) as pool:
+                return list(pool.map(Drive.rounds_by_one_thread, drives))
     return [drive.rounds() for drive in drives]
+
+
+def recorded_together(drives: Sequence[Drive]) -> list[Recorded]:
+    """What `Drive.recorded` gives of several plans of one light field.
+
+    Plans that weigh views otherwise and differ in nothing else, more of them than there are views, are made of one
+    picture of each view: all that is done is linear. Others share what `rounds_of` shares.
+
+    Args:
+        drives: plans on their way through one engine, with the same samples.
+    """
+    first = drives[0]
+    weights = _weights_of_views(drives)
+    if weights is None:
+        rasters = rounds_of(drives)
+        with Workers(first.threads) as pool:
+            return list(pool.map(Drive.finished, drives, rasters))
+    used = np.flatnonzero(weights.any(axis=0))
+    views = [first.of_one_view(int(tap)) for tap in used]
+    pictures = np.stack([one.picture(found) for one, found in zip(views, rounds_of(views), strict=True)])
+    mixed = weights[:, used].astype(pictures.dtype) @ pictures.reshape(len(used), -1)
+    return [
+        Recorded(values.reshape(pictures.shape[1:]), drive.plan.missing_rays or 0.0, drive.plan.missing_reason)
+        for values, drive in zip(mixed, drives, strict=True)
+    ]
+
+
+def _weights_of_views(drives: Sequence[Drive]) -> NDArray[np.float64] | None:
+    """The weights of views, (plans, taps), of plans that differ in these alone and are more than taps; or None."""
+    first, cores = drives[0], [drive.plan.core for drive in drives]
+    core = cores[0]
+    if first.name != "numba" or not isinstance(core, Footprints) or len(drives) < core.weights.size:
+        return None
+    for drive in drives:
+        plan = drive.plan
+        same = (plan.before, plan.after, plan.views_between) == (first.plan.before, first.plan.after, None)
+        own = plan.core
+        if not (same and drive.is_one_block and isinstance(own, Footprints)):
+            return None
+        if own.weights.shape != core.weights.shape or replace(own, weights=core.weights) != core:
+            return None
+    return np.stack([one.weights.ravel() for one in cores if isinstance(one, Footprints)])
 
 
 class Drive:
@@ -255,6 +305,26 @@ class Drive:
                 "a smaller one"
             ) from None
         return self.finished(found)
+
+    @property
+    def is_one_block(self) -> bool:
+        """Whether all samples are there and go through one run, by rounds of a fixed number of rays."""
+        return self.in_memory and self.how.tolerance is None and len(list(self.blocks)) == 1
+
+    def of_one_view(self, tap: int) -> Drive:
+        """The same by footprints, of the light of one view tap alone, whole."""
+        assert isinstance(self.core, Footprints)
+        weights = np.zeros(self.core.weights.size)
+        weights[tap] = 1.0
+        made = copy(self)
+        made.core = replace(self.core, weights=weights.reshape(self.core.weights.shape))
+        return made
+
+    def rounds_by_one_thread(self) -> Partial:
+        """As `rounds`; the bytes are the same for any number of threads."""
+        alone = copy(self)
+        alone.threads = 1
+        return alone.rounds()
 
     def finished(self, found: Partial) -> Recorded:
         """The picture of a raster, and what is known about it."""

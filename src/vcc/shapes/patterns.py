@@ -12,6 +12,7 @@ import abc
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -357,8 +358,13 @@ class Cells(Value, Pattern):
 
     def _index(self, x: Array, y: Array) -> tuple[Array, Array]:
         """(row, column) counted from the array's top left corner, cells as units."""
-        place = self.frame.inverse()
+        place = self._place
         return y * place.matrix[1, 1] + place.offset[1] + 0.5, x * place.matrix[0, 0] + place.offset[0] + 0.5
+
+    @cached_property
+    def _place(self) -> Affine:
+        """Maps (x, y, 1) to (column, row, 1) of cells."""
+        return self.frame.inverse()
 
     def _overlaps(self, centres: Array, length: float, axis: int) -> Any:
         """Share of each interval that each cell along an axis fills: a sparse matrix (intervals, cells)."""

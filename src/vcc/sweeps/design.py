@@ -17,7 +17,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.camera import Camera
 from vcc.files.camera_reading import Beside
-from vcc.learn.parameters import place, replaced, takes_fractions
+from vcc.learn.parameters import Parameter, check_apart, place, takes_fractions, with_values
 from vcc.sweeps.values import Varied, range_of, taking, varied
 
 Kind = Literal["grid", "list", "random", "sobol"]
@@ -91,6 +91,7 @@ class Design(Brief):
             points = self._points(len(self.parameters))
             pairs = zip(self.parameters.items(), points.T, strict=True)
             return tuple(self._drawn(camera, name, given, shares) for (name, given), shares in pairs)
+        check_apart(self.parameters)
         found = tuple(varied(camera, name, given, Beside(self.folder)) for name, given in self.parameters.items())
         if self.kind == "list" and len({len(each) for each in found}) > 1:
             counts = ", ".join(f"{each.name} {len(each)}" for each in found)
@@ -229,7 +230,19 @@ class Cameras(Brief, Sequence[Camera]):
         pairs = zip(self.varied, self.places(number), strict=True)
         values = {each.name: each.values[place] for each, place in pairs}
         base: Camera = values.pop(CAMERA, self.base)
-        return replaced(base, values) if values else base
+        found = [(self._found(base, name, value), value) for name, value in values.items()]
+        return with_values(base, found) if found else base
+
+    def _found(self, base: Camera, name: str, value: Any) -> Parameter:
+        """Where a value is put; an array of cells may have another place than a pattern."""
+        key = id(base), name, type(value)
+        if key not in self._parameters:
+            self._parameters[key] = place(base, name, value)
+        return self._parameters[key]
+
+    @cached_property
+    def _parameters(self) -> dict[Any, Parameter]:
+        return {}
 
 
 def cameras_of(cameras: Camera | Sequence[Camera], parameters: Mapping[str, Any] | Design | None) -> Cameras:

@@ -207,7 +207,7 @@ class InMemory(Results):
     """
 
     def __init__(self, swept: Sweep, picture: tuple[int, ...]) -> None:
-        pictures = np.full((*swept.shape, *picture), np.nan, dtype=np.float32)
+        pictures = np.empty((*swept.shape, *picture), dtype=np.float32)
         super().__init__(replace(swept, pictures=pictures))
 
     def keep(self, place: tuple[int, ...], image: Image) -> None:

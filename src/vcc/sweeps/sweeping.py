@@ -26,9 +26,9 @@ from vcc.sweeps.result import InMemory, Results, Sweep
 
 BATCH_BYTES = 2**28
 """Of the pictures that are made together, about; each of them takes some more while it is made."""
-MOST_TOGETHER = 256
+MOST_TOGETHER = 1024
 """Pictures that are made together, at most: progress is told, and results are kept, after each batch."""
-BATCH_SAMPLES = 2 * 10**9
+BATCH_SAMPLES = 6 * 10**9
 """Samples that are gone through for pictures that are made together, about: some seconds' work."""
 
 

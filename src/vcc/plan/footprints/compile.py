@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.values import content
 from vcc.fields.grid import Grid, Sample
@@ -70,6 +71,30 @@ def blurs_or_why_not(train: Train, grid: Grid, how: How, decisions: Decisions = 
 
 
 def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisions = ANEW) -> Plan:
+    """The plan by which footprints make the picture that a train makes of a light field; see `compiled`."""
+    return compiled(train, grid, how, blurs, decisions).plan
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Compiled(Brief):
+    """A plan, and what masks at the views have to do with it.
+
+    Args:
+        plan: how to make the picture.
+        aperture: the masks at the views, as the plan's taps meet them.
+        shares: of the light of views, that these taps have.
+        tap: where their samples (0, 0) fall on the sensor, pixels.
+        alone: whether nothing else in the plan depends on what these masks let through.
+    """
+
+    plan: Plan
+    aperture: Aperture
+    shares: Array
+    tap: Array
+    alone: bool
+
+
+def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisions = ANEW) -> Compiled:
     """The plan by which footprints make the picture that an optical train makes of a light field.
 
     Args:
@@ -121,7 +146,7 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisio
         aperture.open_parts,
     )
     weights = row_share[:, None] * column_share[None, :] * parts.weights
-    used_rows, used_columns = _used(weights, decisions)
+    used_rows, used_columns = used_taps(weights, decisions)
     keep = np.ix_(used_rows, used_columns)
     index, shift, weights, off_middle = index[keep], shift[keep], weights[keep], parts.middle[keep]
 
@@ -169,7 +194,7 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisio
     decisions.note(by_view_planes(aperture, row_share[:, None] * column_share[None, :], keep, path_planes))
     decisions.note(by_masks_against_sensor(sensor, against_sensor, len(after) - 1, detail is not None, decisions))
     notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, fine, swapped)
-    return Plan(
+    plan = Plan(
         sensor_shape=sensor.shape,
         grid_shape=given.shape[:4],
         core=sharpened.core.guarded(guard),
@@ -180,6 +205,10 @@ def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisio
         expected_ghosting=between.gap_left,
         notes=notes + coarse_textures(lookups) + blurs.notes,
     )
+    as_met = replace(aperture, index=index, shift=shift)
+    # Gaps between views' pictures that are filled ask for parts of cells where a mask is fine.
+    alone = not path_planes and (how.refine != "auto" or max(between.gap_filled) <= 1)
+    return Compiled(plan, as_met, (row_share[:, None] * column_share[None, :])[keep], tap, alone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,7 +390,7 @@ def _at_views(
     return kept
 
 
-def _used(weights: Array, decisions: Decisions) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def used_taps(weights: Array, decisions: Decisions = ANEW) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows and columns of taps that give light; where decisions are kept, and one without on each side."""
     found = []
     for axis, along in enumerate(("rows", "columns")):

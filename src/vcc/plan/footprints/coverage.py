@@ -37,19 +37,31 @@ def _aperture_outside_views(planes: list[Plane], shape: tuple[int, ...]) -> floa
         return 0.0
     plane = min(bounded, key=lambda p: p.pattern.size[0] * p.pattern.size[1])
     points = (np.arange(128) + 0.5) / 128 - 0.5
-    x, y = np.meshgrid(points * plane.pattern.size[0], points * plane.pattern.size[1])
+    x, y = points * plane.pattern.size[0], points * plane.pattern.size[1]
+    if all(not (p.at_index[0, 1] or p.at_index[1, 0]) for p in planes):
+        x, y = x[None, :], y[:, None]  # a row and a column of places say it all
+    else:
+        x, y = np.meshgrid(x, y)
     to_view = np.linalg.inv(plane.at_index[:, :2])
     samples = (shape[2], shape[3])
-    view = (np.stack([x, y], axis=-1) - plane.middle_of_view(samples)) @ to_view.T
-    open_here = np.ones_like(x)
+    view = _through(to_view, x - plane.middle_of_view(samples)[0], y - plane.middle_of_view(samples)[1])
+    open_here = np.ones((128, 128))
     for other in planes:
-        here = view @ other.at_index[:, :2].T + other.middle_of_view(samples)
-        open_here = open_here * other.pattern(here[..., 0], here[..., 1])
+        across, down = _through(other.at_index[:, :2], *view)
+        middle = other.middle_of_view(samples)
+        open_here = open_here * other.pattern(across + middle[0], down + middle[1])
     # Half a raster step of grace: an aperture as wide as the grid misses nothing.
-    views = np.array([shape[1], shape[0]])
-    inside = (np.abs(view - (views - 1) / 2) <= views / 2).all(axis=-1)
+    inside = np.logical_and(
+        *(abs(v - (n - 1) / 2) <= n / 2 for v, n in zip(view, (shape[1], shape[0]), strict=True))
+    )
     total = open_here.sum()
     return float(1 - (open_here * inside).sum() / total) if total > 0 else 0.0
+
+
+def _through(matrix: NDArray[np.floating], x: Array, y: Array) -> tuple[Array, Array]:
+    """Places (x, y) mapped by a 2×2 matrix; without cross terms a row of x and a column of y stay such."""
+    (xx, xy), (yx, yy) = matrix
+    return x * xx + (y * xy if xy else 0.0), y * yy + (x * yx if yx else 0.0)
 
 
 def _sensor_outside_views(

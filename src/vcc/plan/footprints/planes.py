@@ -162,9 +162,15 @@ class Aperture(Brief):
         shares = _product(self.parts())
         light, lit = self._light(shares)
         middle[lit] = (shares[..., None] * self._inside).sum(axis=(2, 3))[lit] / light[lit][:, None]
+        return OpenParts(self._open_shares(shares), middle)
+
+    def open_shares(self) -> Array:
+        """The weights of `open_parts` alone."""
+        return self._open_shares(_product(self.parts()) if len(self.planes) > 1 else np.ones(1))
+
+    def _open_shares(self, shares: Array) -> Array:
         # Apart from each other: what several leave of a cell is not the product of their shares.
-        weights = shares.mean(axis=(2, 3)) if len(self.planes) > 1 else self.whole_cells()[0]
-        return OpenParts(weights, middle)
+        return shares.mean(axis=(2, 3)) if len(self.planes) > 1 else self.whole_cells()[0]
 
     def back(self, weights: OpenParts, cells: Cells) -> Array:
         """From weights of `open_parts` to weights of the cells of one of the planes, this very object."""
