@@ -1,5 +1,6 @@
 """Settings shared by all tests."""
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -10,6 +11,16 @@ from hypothesis import settings
 # Tests run side by side: libraries that start a thread for each core in each of them (OpenMP, BLAS) wait for one
 # another most of the time, and busily. Read when they are loaded; workers of pytest-xdist and commands inherit it.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# Modules and collected tests, a million objects, stay to the end: garbage is among what comes after them.
+gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage from now on, among what the tests make."""
+    gc.freeze()
+    gc.enable()
+
 
 # The same examples on every run, and no time limit for any of them: these machines can be slow.
 settings.register_profile("repeatable", derandomize=True, deadline=None)

@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.sigutils import normalize_signature
@@ -34,6 +35,18 @@ TURN = ".vcc.lock"
 """The file in a folder of code that says whose turn it is."""
 PATIENCE = 5.0
 """Seconds after which nobody waits for a turn any more: some network disks have no locks that work."""
+
+SAMPLES = tuple(map(np.dtype, ("uint8", "uint16", "int16", "float32")))
+"""Types of samples that loops read as they are: in which light fields are kept, and what is made of 8 bits."""
+
+
+def read_as(kind: np.dtype[Any]) -> np.dtype[Any]:
+    """The type in which compiled loops read samples of a type: float32 for all that are not among `SAMPLES`.
+
+    Half precision is unknown to them; of double precision and 32 bits they would keep no more digits, since they
+    add up in single precision, and each type takes seconds to compile.
+    """
+    return kind if kind in SAMPLES else np.dtype(np.float32)
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:

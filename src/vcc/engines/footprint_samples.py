@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
+from vcc.engines.compiled import read_as
 from vcc.engines.vector_sums import LANES, SHORTEST, room
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import REACH, TIE, Division
@@ -169,14 +170,14 @@ def blocks(
     taps = len(core.view_columns)
     n = ns * channels
     shortest = max(math.ceil(SHORTEST / channels), LANES)
-    if values.flags.c_contiguous and values.dtype != np.float16 and ns >= shortest:
+    kind = read_as(values.dtype)
+    if values.flags.c_contiguous and values.dtype == kind and ns >= shortest:
         view = nt * n
         flat = values.reshape(-1)
         samples = tables.Samples(flat, core.view_rows * (nu * view), core.view_columns * view, n, channels)
         for a in range(taps) if by_column else (0,):
             yield samples, (a, a + 1) if by_column else (0, taps)
         return
-    kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
     missing = max(shortest - ns, 0)
     for a in map(int, np.flatnonzero((core.weights != 0).any(axis=0))):
         column = values[:, core.view_columns[a]]

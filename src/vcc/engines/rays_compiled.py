@@ -12,6 +12,7 @@ from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
+from vcc.engines.compiled import read_as
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.windows import Aim, CellWindows, Window
@@ -62,8 +63,8 @@ def given(core: Rays, beside: int) -> tuple[tables.Sensor, tables.Points, tables
 
 def light_field(core: Rays, values: NDArray[Any], channels: int) -> tables.LightField:
     """Samples, and how the rays of a core look them up."""
-    kind = np.float32 if values.dtype == np.float16 else values.dtype  # no half precision in compiled code
-    return looked_up_as(core, np.ascontiguousarray(values, dtype=kind).reshape(-1), channels)
+    flat = np.ascontiguousarray(values, dtype=read_as(values.dtype)).reshape(-1)
+    return looked_up_as(core, flat, channels)
 
 
 def looked_up_as(core: Rays, values: Any, channels: int) -> tables.LightField:
