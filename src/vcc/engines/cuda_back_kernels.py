@@ -119,7 +119,7 @@ def rows_back(values_each: int, masked: bool, width: int) -> Any:
                             if through == 0:
                                 continue
                             if masked:
-                                for m in range(masks.rows.size):
+                                for m in range(masks.begin.shape[0]):
                                     through *= mask_at(masks, m, b, a, l, k)
                             for t in range(width):
                                 # Beyond the raster shares are zero.

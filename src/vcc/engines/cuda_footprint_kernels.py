@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cuda, float32, uint32
+from numba import cuda, float32, int32, uint32
 from numpy.typing import NDArray
 
 from vcc.engines.numba_kernels import farthest, share_at
@@ -22,6 +22,8 @@ from vcc.engines.splines import dark_outside, three_around
 
 ROWS = 4
 """Rows of the raster that a thread sums at once."""
+DARK = 3
+"""Dark lines beside a mask's: so many that none is asked for beyond them."""
 
 
 class Quads(NamedTuple):
@@ -30,7 +32,8 @@ class Quads(NamedTuple):
     Args:
         first: (rows of taps, raster rows / 4) int32, the first row of samples.
         counts: likewise, how many.
-        shares: (rows of taps, raster rows / 4, most, 4) float32, what each of the four takes of each of them.
+        shares: flat float32, in the order (rows of taps, raster rows / 4, most, 4), what each of the four takes of
+            each of them.
     """
 
     first: NDArray[np.int32]
@@ -58,18 +61,19 @@ class MaskRows(NamedTuple):
     """Masks where rows and columns part: rows of their textures at the columns of samples, and who takes which.
 
     Args:
-        lines: (lines, columns of samples) float32.
+        lines: flat float32, one line after the other, of each mask `DARK` dark ones before its rows and after.
+        width: values in a line: columns of samples.
         begin: (masks, rows of taps, columns of taps) int32: the line of the mask's row 0.
-        rows: (masks,) int32, how many a mask has.
-        row: (masks, rows of taps, columns of taps) float64, mask row of sample row 0.
-        step: (masks,) float64, mask rows from one row of samples to the next.
+        near: (masks, rows of taps, columns of taps, rows of samples) int32, the mask's row nearest to a sample's,
+            at most two outside.
+        off: likewise float32, how far the sample's is from there, in rows.
     """
 
     lines: NDArray[np.float32]
+    width: int
     begin: NDArray[np.int32]
-    rows: NDArray[np.int32]
-    row: NDArray[np.float64]
-    step: NDArray[np.float64]
+    near: NDArray[np.int32]
+    off: NDArray[np.float32]
 
 
 class Places(NamedTuple):
@@ -114,6 +118,8 @@ def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
         total = cuda.local.array((ROWS, values_each), float32)
         asked = cuda.local.array(batch, uint32)
         values = cuda.local.array((batch, values_each), float32)
+        pitch = uint32(source.pitch // 4 if words else source.pitch)
+        most = quads.shares.size // (quads.first.size * ROWS)
         for column in range(z, sums.shape[0], deep):
             a = start + column
             for quad in range(y, quads.first.shape[1], high):
@@ -125,15 +131,18 @@ def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
                         weight = weights[b, a]
                         if weight == 0:
                             continue
-                        begin = source.begin[b] + source.further[a] + k * values_each
+                        begin = np.uint64(source.begin[b] + source.further[a] + k * values_each)
+                        if words:
+                            begin = begin >> np.uint64(2)
                         first = quads.first[b, quad]
                         for t in range(0, quads.counts[b, quad], batch):
+                            shares = np.uint64(((b * quads.first.shape[1] + quad) * most + t) * ROWS)
                             for j in range(batch):
                                 # Beyond what is counted shares are zero, and any row will do.
-                                l = min(first + t + j, rows - 1)
-                                at = np.uint64(begin + l * source.pitch)
+                                l = uint32(min(first + t + j, rows - 1))
+                                at = begin + np.uint64(l * pitch)
                                 if words:
-                                    asked[j] = source.values[at >> np.uint64(2)]
+                                    asked[j] = source.values[at]
                                 else:
                                     for n in range(values_each):
                                         values[j, n] = float32(source.values[at + np.uint64(n)])
@@ -141,7 +150,7 @@ def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
                                 through = weight
                                 if masked:
                                     l = min(first + t + j, rows - 1)
-                                    for m in range(masks.rows.size):
+                                    for m in range(masks.begin.shape[0]):
                                         through *= mask_at(masks, m, b, a, l, k)
                                 for n in range(values_each):
                                     if words:
@@ -150,7 +159,7 @@ def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
                                         value = values[j, n]
                                     value = value * through
                                     for r in range(ROWS):
-                                        total[r, n] += quads.shares[b, quad, t + j, r] * value
+                                        total[r, n] += quads.shares[shares + np.uint64(ROWS * j + r)] * value
                     for r in range(ROWS):
                         for n in range(values_each):
                             sums[column, ROWS * quad + r, k * values_each + n] = total[r, n]
@@ -160,36 +169,55 @@ def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
 
 @cuda.jit(device=True)
 def mask_at(masks, m, b, a, l, k):  # type: ignore[no-untyped-def]
-    """What mask m lets pass at sample (k, l) of view tap (b, a)."""
-    begin, rows = masks.begin[m, b, a], masks.rows[m]
-    r, above, level, below = three_around(min(max(masks.row[m, b, a] + l * masks.step[m], -2.0), rows + 1.0))
-    last = rows - 1
-    # Without branches, so that all three are asked for at once.
-    through = (above if 0 < r <= rows else float32(0)) * masks.lines[begin + min(max(r - 1, 0), last), k]
-    through += (level if 0 <= r < rows else float32(0)) * masks.lines[begin + min(max(r, 0), last), k]
-    through += (below if -1 <= r < last else float32(0)) * masks.lines[begin + min(max(r + 1, 0), last), k]
-    return through
+    """What mask m lets pass at sample (k, l) of view tap (b, a); see `vcc.engines.splines.three_around`."""
+    width = uint32(masks.width)
+    line, off, half = uint32(masks.begin[m, b, a] + masks.near[m, b, a, l]), masks.off[m, b, a, l], float32(0.5)
+    at = np.uint64(line * width) + np.uint64(k)
+    through = half * (half - off) * (half - off) * masks.lines[at - np.uint64(width)]
+    through += (float32(0.75) - off * off) * masks.lines[at]
+    return through + half * (half + off) * (half + off) * masks.lines[at + np.uint64(width)]
 
 
 @cuda.jit
-def mask_lines(textures, m, rows, columns, column, step, lines):  # type: ignore[no-untyped-def]
-    """lines[r, k] = row r of a mask's texture at column + step · k, by quadratic B-splines, dark outside.
+def mask_places(row, step, rows, near, off):  # type: ignore[no-untyped-def]
+    """`MaskRows.near` and ``off`` of the mask rows of sample row 0, (masks, rows of taps, columns of taps).
 
-    textures: (masks, rows, columns), of which this one fills so many.
+    step: (masks,), mask rows from one row of samples to the next. rows: (masks,), how many a mask has.
+    """
+    x, y, z = cuda.grid(3)
+    wide, high, deep = cuda.gridsize(3)
+    masks, taps, columns, samples = near.shape
+    for tap in range(z, masks * taps, deep):
+        m, b = tap // taps, tap % taps
+        for a in range(y, columns, high):
+            for l in range(x, samples, wide):
+                place = min(max(row[m, b, a] + l * step[m], -2.0), rows[m] + 1.0)
+                middle = math.floor(place + 0.5)
+                near[m, b, a, l], off[m, b, a, l] = int32(middle), float32(place - middle)
+
+
+@cuda.jit
+def mask_lines(textures, m, rows, columns, column, step, width, begin, lines):  # type: ignore[no-untyped-def]
+    """Lines from ``begin`` on: rows of a mask's texture at column + step · k, by quadratic B-splines, dark
+    outside.
+
+    textures: (masks, rows, columns), of which this one fills so many. lines, width: see `MaskRows`.
     """
     x, y = cuda.grid(2)
     wide, high = cuda.gridsize(2)
-    for r in range(y, rows, high):
-        for k in range(x, lines.shape[1], wide):
+    for line in range(y, rows + 2 * DARK, high):
+        r = line - DARK
+        for k in range(x, width, wide):
             c, before, at, after = three_around(min(max(column + step * k, -2.0), columns + 1.0))
             found = float32(0)
-            if 0 < c <= columns:
-                found += before * textures[m, r, c - 1]
-            if 0 <= c < columns:
-                found += at * textures[m, r, c]
-            if -1 <= c < columns - 1:
-                found += after * textures[m, r, c + 1]
-            lines[r, k] = found
+            if 0 <= r < rows:
+                if 0 < c <= columns:
+                    found += before * textures[m, r, c - 1]
+                if 0 <= c < columns:
+                    found += at * textures[m, r, c]
+                if -1 <= c < columns - 1:
+                    found += after * textures[m, r, c + 1]
+            lines[(begin + line) * width + k] = found
 
 
 @cache

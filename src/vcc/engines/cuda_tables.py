@@ -150,48 +150,64 @@ def _quads(
     tap, row, t = np.nonzero(there)
     quad = row // kernels.ROWS
     made[tap, quad, first[tap, row] + t - top[tap, quad], row % kernels.ROWS] = shares[tap, row, t]
-    return top.astype(np.int32), number.astype(np.int32), made, batch
+    return top.astype(np.int32), number.astype(np.int32), made.reshape(-1), batch
 
 
 def mask_rows(tables: Tables, columns: tuple[int, ...], stream: Any) -> kernels.MaskRows:
     """The masks' textures at the columns of samples that some columns of view taps read."""
-    core, fine = tables.core, tables.fine
-    groups, total, where = tables.once(("masks", columns), lambda: _mask_groups(tables, columns))
-    lines = tables.room("lines", (max(total, 1), fine.columns if groups else 1))
+    core, width = tables.core, tables.fine.columns
+    near, off = tables.once("mask rows", lambda: _mask_places(tables))
+    groups, total, begin = tables.once(("masks", columns), lambda: _mask_groups(tables, columns))
+    lines = tables.room("lines", (max(total * width, 1),))
     for m, place, at in groups:
         high, wide = core.masks[m].texture.shape
-        part = lines[at : at + high]
-        across = core.masks[m].step[0, 0] / core.refine
-        given = tables.textures.values, m, high, wide, place, across, part
-        launch(kernels.mask_lines, (fine.columns, high), stream, *given)
-    return kernels.MaskRows(lines, *where)
+        given = (
+            tables.textures.values,
+            m,
+            high,
+            wide,
+            place,
+            core.masks[m].step[0, 0] / core.refine,
+            width,
+            at,
+            lines,
+        )
+        launch(kernels.mask_lines, (width, high + 2 * kernels.DARK), stream, *given)
+    return kernels.MaskRows(lines, width, begin, near, off)
 
 
-def _mask_groups(
-    tables: Tables, columns: tuple[int, ...]
-) -> tuple[list[tuple[int, float, int]], int, tuple[Any, ...]]:
-    """Which lines of masks columns of view taps need, how many that are, and `kernels.MaskRows` but for them.
-
-    Of each mask and place (mask, its column at the first sample, where its lines begin).
-
-    Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: lines are made once for
-    all taps that agree.
-    """
+def _mask_places(tables: Tables) -> tuple[Any, Any]:
+    """`kernels.MaskRows.near` and ``off``."""
     core, fine = tables.core, tables.fine
-    shape = (len(core.masks), *core.weights.shape)
-    begin, row = np.zeros(shape, np.int32), np.zeros(shape)
-    step = np.zeros(len(core.masks))
+    row, step = np.zeros((len(core.masks), *core.weights.shape)), np.zeros(len(core.masks))
+    for m, mask in enumerate(core.masks):
+        row[m], step[m] = mask.row + mask.step[1, 1] * fine.first_row, mask.step[1, 1] / core.refine
+    rows = np.array([len(mask.texture) for mask in core.masks], np.int32)
+    shape = (*row.shape, fine.rows)
+    near, off = cuda.device_array(shape, np.int32), cuda.device_array(shape, np.float32)
+    given = sent(row), sent(step), sent(rows), near, off
+    launch(kernels.mask_places, (shape[3], shape[2], shape[0] * shape[1]), 0, *given)
+    return near, off
+
+
+def _mask_groups(tables: Tables, columns: tuple[int, ...]) -> tuple[list[tuple[int, float, int]], int, Any]:
+    """Which lines of masks columns of view taps need, how many that are, and `kernels.MaskRows.begin`.
+
+    Of each mask and place (mask, its column at the first sample, where its lines begin). Most taps of a column
+    look a
+    mask up in the same columns, those of cut cells elsewhere: lines are made once for all taps that agree.
+    """
+    core = tables.core
+    begin = np.zeros((len(core.masks), *core.weights.shape), np.int32)
     used = np.zeros(core.weights.shape, dtype=bool)
     used[:, columns] = core.weights[:, columns] != 0
     groups: list[tuple[int, float, int]] = []
     total = 0
     for m, mask in enumerate(core.masks):
-        step[m] = mask.step[1, 1] / core.refine
-        row[m] = mask.row + mask.step[1, 1] * fine.first_row
+        high = len(mask.texture) + 2 * kernels.DARK
         places, which = np.unique(np.round(mask.column[used], 7), return_inverse=True)
-        begin[m][used] = total + which * len(mask.texture)
+        begin[m][used] = total + which * high + kernels.DARK
         for place in places:
-            groups.append((m, float(place + mask.step[0, 0] * fine.first_column), total))
-            total += len(mask.texture)
-    rows = np.array([len(mask.texture) for mask in core.masks], np.int32)
-    return groups, total, tuple(map(sent, (begin, rows, row, step)))
+            groups.append((m, float(place + mask.step[0, 0] * tables.fine.first_column), total))
+            total += high
+    return groups, total, sent(begin)
