@@ -125,7 +125,7 @@ def cases() -> list[Case]:
     lenslets = vcc.LensArray(pitch=0.6 * mm, focal_length=1.3 * mm, z=52 * mm, name="lenslets")
     sensor, behind = (vcc.Sensor(z, (500, 500), 48 * um) for z in (52 * mm, 53.3 * mm))
     alone, masked = vcc.Camera([lens], sensor), vcc.Camera([lens, code], sensor)
-    further = vcc.Camera([replace(lens, z=6 * mm)], vcc.Sensor(58 * mm, (500, 500), 48 * um))
+    further = vcc.Camera([replace(lens, z=10 * mm)], vcc.Sensor(62 * mm, (500, 500), 48 * um))
     plenoptic = vcc.Camera([lens, lenslets], behind)
     return [
         Case("lens; the sensor", 9, 500, alone, "sensor", 20),

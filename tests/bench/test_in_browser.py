@@ -325,6 +325,7 @@ def test_accessibility_has_no_serious_fault(browser, served, scheme, width):
     without_fault(page)
     wider = page.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
     assert wider <= 0  # nothing has to be scrolled sideways
+    page.page.get_by_role("tab", name="Parts").click()
     page.page.get_by_role("tab", name="light field").click()
     page.page.get_by_role("tab", name="Phase space").click()
     page.page.locator("#pane figure").first.wait_for()

@@ -32,12 +32,12 @@ from vcc.run.expose import Exposure
 
 Picture = NDArray[np.float32]
 
-IN_TIME = 0.03
+IN_TIME = 0.02
 """Seconds that a picture may take while something moves: a coarser one is made where a finer takes longer."""
-RECENT = 0.4
-"""How much the last picture counts in what the next is expected to take."""
-FORGOTTEN = 0.98
-"""Of what a finer picture took, with each coarser one: after some 35 it is thought to take half as long."""
+LONGER, SHORTER = 0.2, 0.6
+"""How much the last picture counts in what the next is expected to take: a busy machine makes some take longer."""
+FORGOTTEN = 0.99
+"""Of what a finer picture took, with each coarser one: after some 140 it is thought to take half as long."""
 MOST_KINDS = 50
 """Of cameras whose time is remembered."""
 FEWEST_RAYS = 2
@@ -71,7 +71,7 @@ class Fineness:
 
 
 WHOLE = Fineness(1, None)
-COARSER = (Fineness(2, 16), Fineness(2, 4), Fineness(4, 8))
+COARSER = (Fineness(2, 16), Fineness(2, 4), Fineness(4, 8), Fineness(8, 4))
 """What is made in time, finest first."""
 
 
@@ -128,9 +128,10 @@ class Pace:
             kept = _Kept(taken.plan.by_rays, {})
         share = fineness.share(kept.by_rays)
         before = kept.took.get(share, (taken.planning, taken.seconds))
+        recent = LONGER if taken.seconds > before[1] else SHORTER
         kept.took[share] = (
-            (1 - RECENT) * before[0] + RECENT * taken.planning,
-            (1 - RECENT) * before[1] + RECENT * taken.seconds,
+            (1 - recent) * before[0] + recent * taken.planning,
+            (1 - recent) * before[1] + recent * taken.seconds,
         )
         for other, (planning, seconds) in list(kept.took.items()):
             if other > share:
@@ -194,6 +195,11 @@ def coarser_sensor(train: Train, step: int) -> Train:
     rows, columns = (max(round(size / step), 1) for size in sensor.shape)
     pitch = sensor.size[0] / rows, sensor.size[1] / columns
     return Train(train.elements, replace(sensor, shape=(rows, columns), pitch=pitch, electronics=None))
+
+
+def out_of_focus(train: Train) -> Train:
+    """The camera with its sensor a twelfth further away, where most scenes are sharp nowhere."""
+    return Train(train.elements, replace(train.sensor, z=train.sensor.z * 13 / 12))
 
 
 def take(

@@ -12,7 +12,7 @@ import logging
 import math
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -29,14 +29,29 @@ from vcc.bench.aperture import drawn_aperture
 from vcc.bench.document import Document, History, shown
 from vcc.bench.focusing import distance_at
 from vcc.bench.offered import Offered
-from vcc.bench.picture import WHOLE, Fineness, Pace, Picture, Taken, codes, jpeg, pixel_at, psnr, take, white_of
-from vcc.bench.side import AXIS, side
+from vcc.bench.picture import (
+    COARSER,
+    WHOLE,
+    Fineness,
+    Pace,
+    Picture,
+    Taken,
+    codes,
+    jpeg,
+    out_of_focus,
+    pixel_at,
+    psnr,
+    take,
+    white_of,
+)
+from vcc.bench.side import AXIS, scene_distances, side
 from vcc.bench.sweep import Sweep, sweep_of
 from vcc.files.camera_reading import TrainAsWritten, tables_of_text
 from vcc.light_field import LightField
 from vcc.optics.focusing import focused_train
 from vcc.optics.train import touch
 from vcc.plan.parallax_rule import vergences
+from vcc.plot.fans import focused_distance
 
 Json = dict[str, Any]
 Send = Callable[[Json, Sequence[bytes]], None]
@@ -46,6 +61,8 @@ MOST_WAITING = 200
 """Messages that may wait: who sends more is not listened to any longer."""
 LINGER = 2.0
 """Seconds that the thread waits for more."""
+PAUSE = 0.1
+"""Seconds without anything to do after which pictures are rehearsed."""
 SLOW = 0.4
 """Seconds from which on a whole picture is shown coarsely first."""
 
@@ -102,6 +119,7 @@ class Session:
         self._closed = False
         self._wanted: Wanted | None = None
         self._pace = Pace()
+        self._rehearsed: set[Hashable] = set()
         self._taken: Taken | None = None
         self._shown_white = 1.0
         self._pinned: tuple[Picture, float] | None = None
@@ -174,13 +192,18 @@ class Session:
     def _work(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(self._has_to_do, LINGER)
-                if self._closed or not self._has_to_do():
+                idle = not self._changed.wait_for(self._has_to_do, PAUSE)
+                if idle and self._is_rehearsed() and not self._changed.wait_for(self._has_to_do, LINGER):
+                    self._thread = None
+                    return
+                if self._closed:
                     self._thread = None
                     return
                 message, buffers = self._next()
             try:
-                if message is None:
+                if message is None and self._wanted is None:
+                    self._rehearse()
+                elif message is None:
                     self._make_picture()
                 else:
                     self._answer(message, buffers)
@@ -437,7 +460,7 @@ class Session:
                 return
             self._tell_state(wanted.turn)
         fineness = WHOLE
-        kinds = (document.light_field, *(element.kind for element in self._described.elements))
+        kinds = self._kinds()
         if wanted.moving or (not wanted.coarse_shown and (self._pace.seconds(kinds) or math.inf) > SLOW):
             fineness = self._pace.fineness(kinds)
         try:
@@ -452,6 +475,35 @@ class Session:
         self._wanted = None if whole or wanted.moving else replace(wanted, coarse_shown=True)
         if whole and not wanted.moving:
             self._tell({"is": "notes", "turn": wanted.turn, "notes": self._notes(taken)})
+
+    def _kinds(self, described: TrainAsWritten | None = None) -> Hashable:
+        """What tells cameras apart whose pictures take about as long; None takes the present one.
+
+        Where nothing of the scene is sharp, the gaps between views are filled, which takes several times as long.
+        """
+        described, light_field = described or self._described, self._history.present.light_field
+        field = self.offered.field(light_field)
+        scene = scene_distances(field.whole().grid).values() if field.is_open else ()
+        focus = focused_distance(described.train)
+        sharp = not scene or (focus is not None and min(scene) <= focus <= max(scene))
+        return light_field, sharp, *(element.kind for element in described.elements)
+
+    def _is_rehearsed(self) -> bool:
+        """Whether nothing is left to be rehearsed: all is, or nobody sees a whole picture."""
+        return self._send is None or self._taken is None or self._taken.coarse or self._kinds() in self._rehearsed
+
+    def _rehearse(self) -> None:
+        """Make what the first places of a drag would wait for: coarser light fields, compiled code, the pace."""
+        self._rehearsed.add(self._kinds())
+        quick = (self._pace.seconds(self._kinds()) or math.inf) <= SLOW
+        for train in (out_of_focus(self._described.train), self._described.train):
+            described = replace(self._described, train=train)
+            for fineness in (WHOLE, *COARSER) if quick else COARSER:
+                try:
+                    taken = self._take(fineness, described=described)
+                except (InputError, MemoryError):
+                    break
+                self._pace.noted(self._kinds(described), fineness, taken)
 
     def _take(
         self, fineness: Fineness, document: Document | None = None, described: TrainAsWritten | None = None
