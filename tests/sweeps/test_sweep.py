@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -255,3 +256,17 @@ def test_more_masks_at_the_views_than_views_are_made_of_their_pictures(field, in
     swept = vcc.sweep(camera(), field, {"code.pattern": codes}, interpolation=interpolation)
     for n in (0, 7, 29):
         same_picture(swept[n], camera(codes[n]).capture(field, interpolation=interpolation))
+
+
+@pytest.mark.filterwarnings("ignore::vcc.ResultWarning")
+def test_executors_make_the_same_pictures(field, tmp_path):
+    values = {"sensor.z": "51mm:53mm:3", "code.pattern": "mura, circle"}
+    alone = vcc.sweep(camera(), field, values, metrics=["sharpness"])
+    stored = vcc.store.save_store(field, tmp_path / "field.zarr")
+    with ThreadPoolExecutor(2) as pool:
+        kept = {"metrics": ["sharpness"], "output": tmp_path / "a.zarr"}
+        swept = vcc.sweep(camera(), stored, values, executor=pool, **kept)
+        np.testing.assert_allclose(swept.pictures, alone.pictures, atol=1e-6 * float(alone.pictures.max()))
+        np.testing.assert_allclose(swept.table["sharpness"], alone.table["sharpness"], rtol=1e-4)
+        with pytest.raises(vcc.InputError, match=r"executor= is for light fields in stores.*save_store"):
+            vcc.sweep(camera(), field, values, executor=pool)

@@ -30,6 +30,11 @@ class Remarks:
             share = f"{count} of {total} {of}, one of them: " if total > 1 else ""
             warn_of_result(f"{share}{self._first[kind]}")
 
+    def add(self, other: Remarks) -> None:
+        """Take note of what was remarked elsewhere."""
+        self._kinds += other._kinds
+        self._first = {**other._first, **self._first}
+
     @contextmanager
     def gathered(self) -> Iterator[None]:
         """Take note of what is remarked within."""

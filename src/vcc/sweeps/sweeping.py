@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Unpack
 
@@ -18,6 +19,8 @@ from vcc.camera import Camera, captured_together
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.image import Image
 from vcc.plan.how import How, Options
+from vcc.run.executors import Work as Task
+from vcc.run.executors import crew
 from vcc.sweeps.design import Cameras, Design, cameras_of
 from vcc.sweeps.identity import identity
 from vcc.sweeps.keeping import InStore
@@ -41,6 +44,7 @@ def sweep(
     metrics: Mapping[str, Metric] | Iterable[str | Metric] = (),
     pictures: bool = True,
     output: str | PathLike[str] | None = None,
+    executor: Any = None,
     progress: Progress | None = None,
     **options: Unpack[Options],
 ) -> Sweep:
@@ -61,6 +65,9 @@ def sweep(
         pictures: whether pictures are kept; False keeps the table alone, and lets them differ in shape.
         output: a folder to keep the results in, a Zarr group that xarray opens: picture by picture as they are
             done. The same sweep goes on where it was stopped. None keeps them in memory.
+        executor: who makes the pictures, some cameras a task, each with one thread unless ``threads`` says how
+            many: any `concurrent.futures.Executor`, or a ``dask.distributed.Client``, which stay open. The
+            light field is then in a store. None makes them here.
         progress: called with (done, total) in pictures.
         options: as in `vcc.Camera.capture`.
 
@@ -83,7 +90,7 @@ def sweep(
         work.check_memory()
     listed.check()
     with work.results(pictures, output) as results:
-        work.run(results, progress)
+        work.run(results, executor, progress)
     return results.finished()
 
 
@@ -158,27 +165,72 @@ class Work(Brief):
             return InStore(output, swept, picture, known)
         return Results(swept) if picture is None else InMemory(swept, picture)
 
-    def run(self, results: Results, progress: Progress | None) -> None:
+    def run(self, results: Results, executor: Any, progress: Progress | None) -> None:
         """Make the pictures that are not there yet."""
         todo = results.left()
         done, total = len(self.cameras) - len(todo), len(self.cameras)
         remarks = Remarks()
-        for batch in self.batches(todo):
-            for number, image, row in self.made(batch, remarks):
+        for rows in self.made_here(todo, remarks) if executor is None else self.made_by(executor, todo, remarks):
+            for number, image, row in rows:
                 results.put(number, image, row)
             results.commit()
-            done += len(batch)
+            done += len(rows)
             tell(progress, done, total)
         remarks.say(total, "cameras")
 
-    def made(self, batch: Sequence[int], remarks: Remarks) -> Iterator[tuple[int, Image, dict[str, float]]]:
-        """The pictures of some cameras, with what is told of them.
+    def made_here(self, todo: Sequence[int], remarks: Remarks) -> Iterator[Rows]:
+        """The pictures of cameras, some at a time."""
+        for batch in self.batches(todo):
+            with remarks.gathered():
+                rows = rows_of(self, batch)
+            yield rows
+
+    def made_by(self, executor: Any, todo: Sequence[int], remarks: Remarks) -> Iterator[Rows]:
+        """The same by an executor, as they come.
 
         Raises:
-            InputError: what a camera or a metric refuses, with the camera's values.
+            InputError: a light field in memory; what `vcc.run.executors` refuses.
         """
-        with remarks.gathered():
-            images = captured_together([self.cameras[number] for number in batch], self.light_field, self.how)
-        for number, image in zip(batch, images, strict=True):
-            with checks.within(self.cameras.said(number)):
-                yield number, image, row_of(image, self.metrics)
+        if self.light_field.whole() is not None:
+            raise InputError(
+                "executor= is for light fields in stores, which each task reads for itself: save this one with "
+                "vcc.store.save_store(light_field, 'scene.zarr') and pass vcc.store.open_store('scene.zarr'); or "
+                "leave executor= out: all cores of this machine work on it anyway"
+            )
+        workers = crew(executor)
+        share = max(len(todo) // (4 * workers.places), 1)
+        batches = [batch[n : n + share] for batch in self.batches(todo) for n in range(0, len(batch), share)]
+        how = replace(self.how, threads=self.how.threads or 1)
+        alone = replace(self, how=how)
+        with remarks.gathered():  # by threads of this process
+            for _, (rows, elsewhere) in workers.each(Task(rows_elsewhere, (alone, os.getpid())), batches):
+                remarks.add(elsewhere)
+                yield rows
+
+
+Rows = list[tuple[int, Image, dict[str, float]]]
+"""Pictures of some cameras: the camera's number, the picture, and what is told of it."""
+
+
+def rows_of(work: Work, batch: Sequence[int]) -> Rows:
+    """The pictures of some cameras, with what is told of them.
+
+    Raises:
+        InputError: what a camera or a metric refuses, with the camera's values.
+    """
+    images = captured_together([work.cameras[number] for number in batch], work.light_field, work.how)
+    rows = []
+    for number, image in zip(batch, images, strict=True):
+        with checks.within(work.cameras.said(number)):
+            rows.append((number, image, row_of(image, work.metrics)))
+    return rows
+
+
+def rows_elsewhere(shared: tuple[Work, int], batch: Sequence[int]) -> tuple[Rows, Remarks]:
+    """The same as a task, and what is remarked, unless it is said in the process that asks."""
+    (work, asking), remarks = shared, Remarks()
+    if os.getpid() == asking:
+        return rows_of(work, batch), remarks
+    with remarks.gathered():
+        rows = rows_of(work, batch)
+    return rows, remarks
