@@ -50,6 +50,7 @@ class Sizes:
         samples: rays a pixel.
         runs: of a step before the clock is read.
         rounds: in which all steps take turns.
+        refine: as `vcc.How` has it.
     """
 
     views: int = 20
@@ -58,9 +59,10 @@ class Sizes:
     samples: int = 64
     runs: int = 10
     rounds: int = 7
+    refine: Any = "auto"
 
 
-TINY = Sizes(views=2, pixels=4, cells=2, samples=2, runs=1, rounds=1)
+TINY = Sizes(views=2, pixels=4, cells=2, samples=2, runs=1, rounds=1, refine=1)
 
 
 @dataclass(frozen=True)
@@ -263,7 +265,7 @@ def main() -> None:
     warnings.simplefilter("ignore", vcc.ResultWarning)
     lf = light_field(sizes)
     there, plain, masked, arrays = lf.on_gpu(), *cameras(sizes)
-    conventional, through_mask = (Case.of(camera, lf, there) for camera in (plain, masked))
+    conventional, through_mask = (Case.of(camera, lf, there, refine=sizes.refine) for camera in (plain, masked))
     rays, lenslets = (
         Case.of(camera, lf, there, method="rays", samples=sizes.samples) for camera in (masked, arrays)
     )
@@ -314,8 +316,8 @@ def main() -> None:
     print("\n| agreement with `reference`, of the brightest pixel | found | target | met |")
     print("|---|---|---|---|")
     for what, case, options in (
-        ("conventional", conventional, {}),
-        ("a mask in mid-path", through_mask, {}),
+        ("conventional", conventional, {"refine": sizes.refine}),
+        ("a mask in mid-path", through_mask, {"refine": sizes.refine}),
         ("rays through a mask", rays, {"method": "rays", "samples": 2}),
     ):
         error = agreement(case, lf, **options)
@@ -333,7 +335,7 @@ def captures(lf: vcc.LightField, there: vcc.LightField, plain: Case, masked: Cas
     print("|---|---|---|")
     steps: dict[str, Step] = {
         f"{name}, {number}": lambda field=field, case=case, kept=kept: case.camera.capture(  # type: ignore[misc]
-            field, engine="cuda", **({"plan": case.plan} if kept else {})
+            field, engine="cuda", **({"plan": case.plan} if kept else {"refine": sizes.refine})
         )
         for name, (field, kept) in given.items()
         for number, case in enumerate((plain, masked))
