@@ -79,14 +79,13 @@ def _sobol(dimensions: int, seed: int) -> Array:
     generator = np.random.default_rng(seed)
     points = np.empty((TABLE, dimensions))
     for column in range(dimensions):
-        number = plain[:, column]
-        scrambled = np.zeros(TABLE, dtype=np.int64)
+        scrambled = np.zeros(1, dtype=np.int64)  # of each number of so many digits
         for before in range(depth):
             flips = generator.integers(0, 2, 2**before)
-            digit = (number >> (depth - 1 - before)) & 1
-            scrambled = 2 * scrambled + (digit ^ flips[number >> (depth - before)])
+            scrambled = (2 * scrambled[:, None] + (np.arange(2) ^ flips[:, None])).ravel()
         rest = DIGITS - depth  # no two points share all digits so far
-        points[:, column] = (scrambled * 2**rest + generator.integers(0, 2**rest, TABLE)) * 2.0**-DIGITS
+        later = generator.integers(0, 2**rest, TABLE)
+        points[:, column] = (scrambled[plain[:, column]] * 2**rest + later) * 2.0**-DIGITS
     points.flags.writeable = False
     return points
 
