@@ -36,6 +36,8 @@ THUMBNAILS = {
     "plenoptic": ("raw", (0.52, 0.05, 0.98, 0.95)),
     "wavefront-coding": ("scene-coded", (0, 0.2, 0.5, 0.7)),
     "diffuser-depth-of-field": ("scene-coded", (0, 0.2, 0.5, 0.7)),
+    "focal-sweep": ("scene-restored", (0, 0.2, 0.5, 0.7)),
+    "coded-exposure": ("target", (0.68, 0.53, 1, 0.98)),
 }
 """Where the first picture has words on it: which one to take, and what part of it (left, top, right, bottom)."""
 DESK = HERE / "data" / "desk.zarr"

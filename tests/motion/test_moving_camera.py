@@ -160,6 +160,28 @@ def test_frames_in_between_are_mixed_exactly():
     np.testing.assert_allclose(held.values, truth, rtol=1e-6)
 
 
+def test_frames_may_be_stores(tmp_path):
+    frames = [wave_at(0.0), wave_at(4 * ms)]
+    stored = [vcc.store.save_store(frame, tmp_path / f"{n}.zarr") for n, frame in enumerate(frames)]
+    found = MovingCamera(PINHOLE).capture(LightFieldVideo(stored, [0, 4 * ms]), 4 * ms)
+    in_memory = MovingCamera(PINHOLE).capture(LightFieldVideo(frames, [0, 4 * ms]), 4 * ms)
+    np.testing.assert_allclose(found.values, in_memory.values, rtol=1e-6)
+
+
+@COARSE
+def test_errors_of_rays_even_out_over_moments(field):
+    """Each picture takes rays of its own: the error of the mean of two is that of both, over the root of two."""
+    codes = [mura(5), 1 - mura(5)]
+    moving = MovingCamera(CAMERA, {"code.pattern": Steps([0, 1 * ms], codes)})
+    found = moving.capture(field, 2 * ms, method="rays", samples=8)
+    alone = [moving.at(t).capture(field, method="rays", samples=8, seed=n) for n, t in enumerate([0, 1.5 * ms])]
+    mean = (alone[0].values.astype(np.float64) + alone[1].values) / 2
+    np.testing.assert_allclose(found.values, mean, rtol=1e-6)
+    assert found.sampling_error == pytest.approx(
+        math.hypot(*(each.sampling_error for each in alone)) / 2, rel=1e-6
+    )
+
+
 # --- a sweep through focus ---
 
 

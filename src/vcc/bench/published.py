@@ -85,6 +85,9 @@ LEFT_OUT: Mapping[str, str] = {
     "light-field-rendering": "it renders views between those of a light field, and has neither lens nor sensor",
     "diffuser-depth-of-field": "its diffusers are random rings by a formula of Python, which no camera file "
     "holds: open wavefront-coding, and give its plate another surface",
+    "focal-sweep": "its sensor moves during the exposure, which no camera file says: move the sensor on the "
+    "bench, or export a film of a sweep of sensor.z",
+    "coded-exposure": "its shutter flutters while the scene moves, and the bench has one moment only",
 }
 """Entries that are not on the bench, and why."""
 

@@ -20,6 +20,8 @@ ENTRIES = (
     "biprism-stereo",
     "wavefront-coding",
     "diffuser-depth-of-field",
+    "focal-sweep",
+    "coded-exposure",
 )
 """Names, in the gallery's order. ``a-name`` is the module ``vcc.gallery.a_name``, which holds an ``ENTRY``."""
 

@@ -129,7 +129,8 @@ class MovingCamera(Brief):
 
         Returns:
             Irradiance, radiance × steradian, in the frame of the camera as it was given. Its ``sampling_error`` is
-            the estimated error of rays and moments together.
+            the estimated error of rays and moments together. Where rays are traced, each picture takes others
+            (``seed``, ``seed`` + 1, …).
 
         Warns:
             ResultWarning: the tolerance was not reached; what `vcc.Camera.capture` warns of, once for each kind.
@@ -149,19 +150,27 @@ class MovingCamera(Brief):
 
 @dataclass(frozen=True, eq=False)
 class _Gathered:
-    """Irradiance and what is known of it, in double precision: what is added over time."""
+    """Irradiance and what is known of it, in double precision: what is added over time.
+
+    Args:
+        values: irradiance.
+        missing_rays: their share.
+        errors: of sampling, of each picture that it is made of, by its number: those of two are independent.
+    """
 
     values: NDArray[np.float64]
     missing_rays: float
-    sampling_error: float
+    errors: Mapping[int, float]
 
     def __add__(self, other: Self) -> Self:
+        errors = dict(self.errors)
+        for number, error in other.errors.items():
+            errors[number] = errors.get(number, 0.0) + error
         return replace(
             self,
             values=self.values + other.values,
             missing_rays=self.missing_rays + other.missing_rays,
-            # All moments take the same rays: their errors add up in the worst case.
-            sampling_error=self.sampling_error + other.sampling_error,
+            errors=errors,
         )
 
     def __mul__(self, factor: float) -> Self:
@@ -169,8 +178,13 @@ class _Gathered:
             self,
             values=self.values * factor,
             missing_rays=self.missing_rays * factor,
-            sampling_error=self.sampling_error * factor,
+            errors={number: error * factor for number, error in self.errors.items()},
         )
+
+    @property
+    def sampling_error(self) -> float:
+        """Of all pictures together."""
+        return math.hypot(*self.errors.values())
 
     def size(self) -> float:
         return float(self.values.mean())
@@ -236,7 +250,7 @@ class _Work:
     @cached_property
     def _dark(self) -> _Gathered:
         channels = next(iter(self._light.at(self._start)))[1]().grid.shape[4:]
-        return _Gathered(np.zeros((*self._moving.camera.sensor.shape, *channels)), 0.0, 0.0)
+        return _Gathered(np.zeros((*self._moving.camera.sensor.shape, *channels)), 0.0, {})
 
     def _picture(self, camera: Camera, key: Any, samples: Callable[[], Samples]) -> _Gathered:
         """The picture of a camera and a frame, made once while it is kept."""
@@ -245,15 +259,16 @@ class _Work:
             self._kept.move_to_end((camera, key))
             return known
         with self._remarks.gathered():
-            image = camera.capture(samples(), self._how)
+            # Other rays for each picture: their errors even out.
+            image = camera.capture(samples(), replace(self._how, seed=self._how.seed + self._made))
         if not isinstance(image.values, np.ndarray):
             raise InputError(
                 f"a moving camera takes samples of NumPy, not of {type(image.values).__module__.split('.')[0]}, "
                 "whose gradients would end here: sum pictures of camera.capture yourself"
             )
-        self._made += 1
-        made = _Gathered(image.values.astype(np.float64), image.missing_rays, image.sampling_error)
+        made = _Gathered(image.values.astype(np.float64), image.missing_rays, {self._made: image.sampling_error})
         self._kept[camera, key] = made
+        self._made += 1
         while len(self._kept) > max(2, KEPT // made.values.nbytes):
             self._kept.popitem(last=False)
         return made

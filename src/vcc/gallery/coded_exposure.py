@@ -1,0 +1,270 @@
+"""Coded exposure: a shutter that flutters by a code keeps what an open one loses of things that move.
+
+Raskar et al. 2006. The target moves sideways by one pixel in each part of the code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.affine import Affine
+from vcc.base.units import mm, ms
+from vcc.camera import Camera
+from vcc.gallery import flat_target
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.extended_depth import BORDER, psnr
+from vcc.light_field import LightField
+from vcc.motion import MovingCamera, coded
+from vcc.optics import Lens, Mask
+from vcc.optics.sensor import Sensor
+from vcc.recover import wiener
+from vcc.shapes.patterns import Circle
+from vcc.showcase import figures
+from vcc.showcase.bench import Bench
+from vcc.showcase.words import paragraphs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+CODE = "1010000111000001010000110011110111010111001001100111"
+"""The paper's, of 52 parts, of which half let light pass."""
+CHOP = 1 * ms
+"""How long each part lasts."""
+PUPIL = 2 * mm
+DISTANCE = 2.0
+"""Of the target, metres, which is in focus."""
+NOISE = 0.005
+"""Standard deviation, as a share of white of the shutter that stays open: that of the electronics."""
+TIME_TOLERANCE = 0.01
+MARGIN = 8
+"""Pixels of the target beyond those that the sensor sees at either end of the way."""
+LOST = 0.01
+"""Share of contrast below which a frequency counts as lost."""
+LEAST_GAIN = 3.0
+"""dB."""
+
+SHUTTERS = {"short": "1", "open": "1" * len(CODE), "coded": CODE}
+"""Exposures by name: of one part, of all, and by the code."""
+NAMES = {"short": "short exposure", "open": "shutter open", "coded": "shutter fluttering"}
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """What came of a shutter.
+
+    Args:
+        recorded: the target with noise, white 1, upright.
+        kernel: how light is spread along the way: of sum 1, found by a bright line that moves likewise.
+        restored: the target by a Wiener filter.
+        decibels: its PSNR.
+    """
+
+    recorded: Array
+    kernel: Array
+    restored: Array
+    decibels: float
+
+    @property
+    def contrast(self) -> Array:
+        """What is left of waves along the way, from 0 to half a cycle a pixel."""
+        return np.asarray(np.abs(np.fft.rfft(self.kernel, 1024)))
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A camera before a flat thing that moves sideways.
+
+    Args:
+        slope: what a pixel spans.
+        focal_length: of the lens, metres.
+    """
+
+    slope: float
+    focal_length: float
+
+    def camera(self, code: str, shape: tuple[int, int]) -> MovingCamera:
+        """A lens focused on the target, with a shutter."""
+        z = 1 / (1 / self.focal_length - 1 / DISTANCE)
+        sensor = Sensor(z, shape, self.slope * z)
+        still = Camera([Lens(self.focal_length), Mask(Circle(PUPIL))], sensor)
+        return MovingCamera(still, shutter=coded(code, len(code) * CHOP))
+
+    def scene(self, flat: Array) -> Callable[[float], LightField]:
+        """A flat thing that goes a pixel each `CHOP`: in the middle of a part of the code by whole pixels."""
+        views = np.ascontiguousarray(np.broadcast_to(flat.astype(np.float32), (2, 2, *flat.shape)))
+        field = LightField.from_views(views, 2 * PUPIL, self.slope, DISTANCE, disparity_range=(0.0, 0.0))
+
+        def at(time: float) -> LightField:
+            moved = (time / CHOP - 0.5 - len(CODE) // 2) * self.slope
+            return field.transformed(Affine.prism((-moved, 0.0)))
+
+        return at
+
+    def photographed(self, flat: Array, code: str, shape: tuple[int, int]) -> Array:
+        """The thing through a shutter, upright; radiance 1 all the time that the shutter is open is 1."""
+        camera = self.camera(code, shape)
+        start = (len(CODE) - len(code)) // 2 * CHOP
+        image = camera.capture(
+            self.scene(flat), len(code) * CHOP, start=start, time_tolerance=TIME_TOLERANCE, interpolation="linear"
+        )
+        white = np.pi / 4 * PUPIL**2 / camera.camera.sensor.z**2 * code.count("1") / len(code)
+        return np.asarray(image.upright().to_numpy().astype(np.float64) / white)
+
+    def taken(self, flat: Array, code: str) -> Taken:
+        """A flat target through a shutter, with noise, and restored."""
+        margin = len(CODE) // 2 + MARGIN
+        wide = np.pad(flat, ((MARGIN, MARGIN), (margin, margin)), mode="symmetric")
+        clean = self.photographed(wide, code, (flat.shape[0], flat.shape[1]))
+        noise = NOISE * len(CODE) / code.count("1")
+        recorded = clean + noise * np.random.default_rng(0).standard_normal(clean.shape)
+        kernel = self.kernel(code)
+        restored = wiener(recorded, kernel[None, :], noise).picture
+        return Taken(recorded, kernel, restored, psnr(restored, flat))
+
+    def kernel(self, code: str) -> Array:
+        """What a bright upright line becomes along the way, of sum 1, with its middle in the middle."""
+        columns = len(CODE) + 2 * MARGIN + 1
+        line = np.zeros((2 * MARGIN + 1, 2 * columns + 1))
+        line[:, columns] = 1
+        row = self.photographed(line, code, (1, columns))[0]
+        return np.asarray(row / row.sum())
+
+
+@dataclass(frozen=True)
+class Run:
+    """A target that moves, through a short exposure, an open shutter and one that flutters, each deblurred.
+
+    Args:
+        target: its largest side, pixels.
+    """
+
+    target: int = 240
+
+    def __call__(self, bench: Bench, progress: Progress) -> Result:
+        """Take the middle view of a light field as a target, and measure."""
+        advance = Steps(progress, len(SHUTTERS))
+        progress(0, advance.total)
+        flat = flat_target.grey_view(bench, self.target)
+        moving = Moving(abs(float(bench.light_field.frame.linear[2, 2])), bench.focal_length)
+        found = {}
+        for name, code in SHUTTERS.items():
+            found[name] = moving.taken(flat, code)
+            advance()
+        return Result(_text(moving), _pictures(found), _findings(found), bench.assumed)
+
+
+def _text(moving: Moving) -> str:
+    return paragraphs(
+        "gallery/prose/coded-exposure.txt",
+        moving=moving,
+        pupil=PUPIL,
+        distance=DISTANCE,
+        parts=len(CODE),
+        chop=CHOP,
+        light=CODE.count("1") / len(CODE),
+        noise=NOISE,
+    )
+
+
+def _pictures(found: dict[str, Taken]) -> tuple[tuple[Picture, ...], ...]:
+    figure = figures.new_figure(9.0, 6.4)
+    rows = [
+        [(NAMES[name], figures.grey_shown(_inner(each.recorded))) for name, each in found.items()],
+        [(f"{each.decibels:.1f} dB", figures.grey_shown(_inner(each.restored))) for each in found.values()],
+    ]
+    figures.fill(
+        figure.subplots(2, 3, squeeze=False), rows, ("as recorded", "deblurred"), cmap="gray", vmin=0, vmax=1
+    )
+    words = "All in the same light with the same noise of the electronics; brightness is made alike."
+    return (
+        (Picture("target", "A target that moves by 52 pixels", words, figure),),
+        (
+            Picture(
+                "contrast",
+                "What is left of waves along the way",
+                "From the picture of a bright line that moves. Each zero of the open shutter is a frequency that "
+                "no filter brings back.",
+                _contrast_figure(found),
+            ),
+        ),
+    )
+
+
+def _inner(picture: Array) -> Array:
+    rows, columns = (int(BORDER / 2 * side) for side in picture.shape)
+    return picture[rows : picture.shape[0] - rows, columns : picture.shape[1] - columns]
+
+
+def _contrast_figure(found: dict[str, Taken]) -> Figure:
+    figure = figures.new_figure(9.0, 3.4)
+    axes = figure.subplots()
+    for (name, each), colour in zip(found.items(), ("#9aa0a6", "#d95f02", "#1b6ca8"), strict=True):
+        contrast = np.maximum(each.contrast, 1e-4)
+        axes.semilogy(np.linspace(0, 0.5, len(contrast)), contrast, label=NAMES[name], color=colour, linewidth=1.3)
+    axes.set_xlabel("cycles per pixel", fontsize=figures.LABEL)
+    axes.set_ylabel("contrast", fontsize=figures.LABEL)
+    axes.set_xlim(0, 0.5)
+    axes.set_ylim(1e-3, 1.2)
+    axes.tick_params(labelsize=figures.LABEL - 1)
+    figure.legend(frameon=False, fontsize=figures.LABEL, loc="outside upper center", ncols=len(found))
+    return figure
+
+
+def _findings(found: dict[str, Taken]) -> tuple[Finding, ...]:
+    # Relative to a short exposure: what sampling and a pixel's way take from all three alike is left out.
+    lowest = {name: float((found[name].contrast / found["short"].contrast).min()) for name in ("coded", "open")}
+    over_open = found["coded"].decibels - found["open"].decibels
+    over_short = found["coded"].decibels - found["short"].decibels
+    coded_words = f"{found['coded'].decibels:.1f} dB against"
+    return (
+        Finding(
+            "lowest contrast over all frequencies, shutter fluttering",
+            f"no frequency is lost: above {LOST}",
+            lowest["coded"],
+            "",
+            lowest["coded"] > LOST,
+            "the code was searched for by the authors for this",
+        ),
+        Finding(
+            "the same, shutter open",
+            f"frequencies are lost: below {LOST}",
+            lowest["open"],
+            "",
+            lowest["open"] < LOST,
+            "a box has zeros",
+        ),
+        Finding(
+            "deblurred target: gain over the open shutter",
+            f"deblurring becomes well-posed: {LEAST_GAIN:g} dB or more",
+            over_open,
+            "dB",
+            over_open >= LEAST_GAIN,
+            f"{coded_words} {found['open'].decibels:.1f} dB, with half of the light",
+        ),
+        Finding(
+            "deblurred target: gain over a short exposure",
+            f"less noise than a short exposure: {LEAST_GAIN:g} dB or more",
+            over_short,
+            "dB",
+            over_short >= LEAST_GAIN,
+            f"{coded_words} {found['short'].decibels:.1f} dB, with {CODE.count('1')} times the light",
+        ),
+    )
+
+
+ENTRY = Entry(
+    "coded-exposure",
+    "Coded exposure: the fluttered shutter",
+    "R. Raskar, A. Agrawal and J. Tumblin, Coded exposure photography: motion deblurring using fluttered shutter, "
+    "ACM Transactions on Graphics 25 (SIGGRAPH 2006)",
+    "A shutter that opens and shuts by a code while things move keeps all spatial frequencies, so that motion "
+    "blur can be undone.",
+    Run(),
+)
