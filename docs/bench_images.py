@@ -32,6 +32,9 @@ from vcc.files.camera_reading import Beside
 HERE = Path(__file__).parent / "images" / "bench"
 WIDE, HIGH = 1280, 800
 NARROW = 390
+FILMED = 960, 600
+FRAMES, FRAME_MS = 24, 90
+"""Of the film, there and back."""
 
 LENS = {"kind": "lens", "name": "main", "z": "0 mm", "focal_length": "50 mm", "diameter": "18 mm"}
 SENSOR = {"z": "52.94 mm", "shape": [320, 480], "pitch": "55 um"}  # the desk, and sharp what is 0.9 m away
@@ -195,6 +198,8 @@ def main(folder: Path = HERE) -> None:
         for name, state in STATES.items():
             save(taken(browser, address, *state), folder / f"{name}.webp")
             print(name)
+        save_film(filmed(browser, address), folder / "film.webp")
+        print("film")
         browser.close()
     in_jupyterlab(folder)
 
@@ -227,6 +232,31 @@ def taken(
     data = bench.page.screenshot()
     context.close()
     return data
+
+
+def filmed(browser: Browser, address: str) -> list[bytes]:
+    """The sensor steps from where the nearest is sharp to where the farthest is: pictures of the page, PNG."""
+    context = browser.new_context(viewport={"width": WIDE, "height": HIGH}, color_scheme="light")
+    bench = Bench(context.new_page(), address, camera(z="57 mm"))
+    bench.page.locator('[data-part="sensor"]').focus()
+    shots = []
+    for _ in range(FRAMES):
+        shots.append(bench.page.screenshot())
+        for _ in range(3):
+            bench.page.keyboard.press("ArrowLeft")
+        bench.settle()
+    context.close()
+    return shots
+
+
+def save_film(shots: list[bytes], path: Path) -> None:
+    """Write them as a WebP that moves, there and back."""
+    size = FILMED
+    there = [
+        Pillow.open(io.BytesIO(each)).convert("RGB").resize(size, Pillow.Resampling.LANCZOS) for each in shots
+    ]
+    first, *others = there + there[-2:0:-1]
+    first.save(path, save_all=True, append_images=others, duration=FRAME_MS, loop=0, quality=70, method=6)
 
 
 def save(data: bytes, path: Path) -> None:
