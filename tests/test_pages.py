@@ -9,9 +9,11 @@ import contextlib
 import re
 import shlex
 import shutil
+import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import imagecodecs
 import numpy as np
@@ -19,11 +21,13 @@ import OpenEXR
 import pytest
 import scipy.io
 import tifffile
+import torch
 
 import vcc
 from tests.command_line import CAMERA, run
 from vcc.camera_file import ELEMENT_KINDS
 from vcc.cli.synth.rendering import ViewsAndPixels
+from vcc.engines import array_api
 from vcc.gallery.entry import Entry, Result
 from vcc.sources import CameraArray
 
@@ -91,6 +95,17 @@ LENS = """# a doublet with a stop: radius, thickness, index, diameter in mm
 -90 40 1 16
 """
 PIXELS = (72, 96)
+
+
+class Trials:
+    """A stand-in for Optuna, which tries one number."""
+
+    samplers = SimpleNamespace(TPESampler=lambda seed: None)
+
+    @staticmethod
+    def create_study(direction, sampler):
+        trial = SimpleNamespace(suggest_float=lambda name, low, high: (low + high) / 2)
+        return SimpleNamespace(optimize=lambda objective, n_trials: objective(trial))
 
 
 def write_views(folder, shape=(5, 5)):
@@ -169,7 +184,8 @@ def write_given():
     write_views(Path("cotton"))
     for row, column in [(0, 1), (1, 0), (3, 4)]:
         Path(f"cotton/view_{row}_{column}.png").unlink()
-    Path("camera.toml").write_text(CAMERA)
+    for name in ("camera.toml", "other.toml"):
+        Path(name).write_text(CAMERA)
     write_depths()
     write_raw()
 
@@ -240,6 +256,11 @@ def quick(monkeypatch):
     for executor in ("concurrent.futures.ProcessPoolExecutor", "distributed.Client"):
         monkeypatch.setattr(executor, lambda *_, **__: ThreadPoolExecutor(1))
     monkeypatch.setattr("vcc.cli.executing._processes", lambda: ThreadPoolExecutor(1))
+    monkeypatch.setitem(sys.modules, "optuna", Trials)
+    # What a GPU does is tested in a simulator, at a few samples: here any array's engine stands in for its own.
+    monkeypatch.setitem(sys.modules, "vcc.engines.cuda", array_api)
+    monkeypatch.setattr(vcc.LightField, "on_gpu", lambda self: self)
+    monkeypatch.setattr(torch.Tensor, "cuda", lambda self: self)
 
 
 # --- the run ---
