@@ -44,7 +44,6 @@ def test_threads_make_the_same_picture(files, tmp_path):
 )
 @pytest.mark.parametrize("command", ["capture", "expose"])
 def test_what_is_no_executor_is_refused(files, tmp_path, monkeypatch, command, executor, words):
-    pytest.importorskip("distributed")
     monkeypatch.setattr(executing, "CONNECTING", 0.1)
     (tmp_path / "camera.toml").write_text(CAMERA + "[sensor.electronics]\n")
     output = tmp_path / "picture.tif"

@@ -11,14 +11,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import distributed
 import pytest
 
 import vcc
 from tests.run.test_executors import CAMERAS, in_blocks, light_field, stored  # noqa: F401  # fixtures
 from vcc.run import executors
 from vcc.run.executors import Tree, Work, crew
-
-distributed = pytest.importorskip("distributed")
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning"),

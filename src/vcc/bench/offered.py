@@ -60,7 +60,7 @@ class Field:
         """The light field with pixels so many times as large each way, means over those that they cover.
 
         Args:
-            step: 1 or more; as many as a view has, where that is less.
+            step: a power of two; as many as a view has, where that is less.
             progress: called while it is opened.
 
         Raises:
@@ -70,8 +70,9 @@ class Field:
             if 1 not in self._by_step:
                 opened = self._opened
                 self._by_step[1] = opened if isinstance(opened, LightField) else opened(progress)
-            if step not in self._by_step:
-                self._by_step[step] = _binned(self._by_step[1], step)
+            for coarser in [2**n for n in range(1, step.bit_length())]:  # each of the one before: quicker
+                if coarser not in self._by_step:
+                    self._by_step[coarser] = _halved(self._by_step[coarser // 2])
             return self._by_step[step]
 
 
@@ -155,9 +156,9 @@ class Offered:
         return self.fields[name]
 
 
-def _binned(light_field: LightField, step: int) -> LightField:
-    """Means over so many pixels each way; a border that does not fill a pixel is left out."""
-    rows, columns = (min(step, size) for size in light_field.shape[2:4])
+def _halved(light_field: LightField) -> LightField:
+    """Means over two pixels each way, where there are two; a border that does not fill a pixel is left out."""
+    rows, columns = (min(2, size) for size in light_field.shape[2:4])
     values = to_numpy(light_field.values)
     nv, nu, nt, ns = values.shape[:4]
     whole = values[:, :, : nt // rows * rows, : ns // columns * columns]
