@@ -19,6 +19,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
 
 import vcc
+from tests.bench.hostile import ASKED
 from tests.bench.on_bench import CAMERA, NOWHERE, PIXELS, START, Client, noise, offered
 from vcc.bench import offered as offered_there
 from vcc.bench import session as session_there
@@ -757,29 +758,12 @@ JUNK = some.recursive(
     lambda inner: some.lists(inner, max_size=3) | some.dictionaries(some.sampled_from(["name", "kind"]), inner),
     max_leaves=5,
 )
-FIELDS = [
-    "where",
-    "value",
-    "kind",
-    "z",
-    "element",
-    "by",
-    "what",
-    "x",
-    "y",
-    "on",
-    "document",
-    "toml",
-    "gallery",
-    "name",
-]
-FIELDS += ["from", "to", "frames", "format", "distance", "moving"]
 
 
 @given(
     some.lists(
         some.tuples(
-            some.sampled_from(CHANGES + QUESTIONS), some.dictionaries(some.sampled_from(FIELDS), JUNK, max_size=4)
+            some.sampled_from(CHANGES + QUESTIONS), some.dictionaries(some.sampled_from(ASKED), JUNK, max_size=4)
         ),
         min_size=1,
         max_size=8,

@@ -66,6 +66,9 @@ class Field:
         Raises:
             InputError: it cannot be opened.
         """
+        found = self._by_step.get(step)
+        if found is not None:
+            return found  # without waiting for who makes another
         with self._lock:
             if 1 not in self._by_step:
                 opened = self._opened
