@@ -5,6 +5,7 @@ Raskar et al. 2006. The target moves sideways by one pixel in each part of the c
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ from vcc.base.units import mm, ms
 from vcc.camera import Camera
 from vcc.gallery import flat_target
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
-from vcc.gallery.extended_depth import BORDER, psnr
+from vcc.gallery.extended_depth import BORDER, inner, psnr
 from vcc.light_field import LightField
 from vcc.motion import MovingCamera, coded
 from vcc.optics import Lens, Mask
@@ -176,8 +177,14 @@ def _text(moving: Moving) -> str:
 def _pictures(found: dict[str, Taken]) -> tuple[tuple[Picture, ...], ...]:
     figure = figures.new_figure(9.0, 6.4)
     rows = [
-        [(NAMES[name], figures.grey_shown(_inner(each.recorded))) for name, each in found.items()],
-        [(f"{each.decibels:.1f} dB", figures.grey_shown(_inner(each.restored))) for each in found.values()],
+        [
+            (NAMES[name], figures.grey_shown(inner(each.recorded, 0.5 * BORDER, math.floor)))
+            for name, each in found.items()
+        ],
+        [
+            (f"{each.decibels:.1f} dB", figures.grey_shown(inner(each.restored, 0.5 * BORDER, math.floor)))
+            for each in found.values()
+        ],
     ]
     figures.fill(
         figure.subplots(2, 3, squeeze=False), rows, ("as recorded", "deblurred"), cmap="gray", vmin=0, vmax=1
@@ -195,11 +202,6 @@ def _pictures(found: dict[str, Taken]) -> tuple[tuple[Picture, ...], ...]:
             ),
         ),
     )
-
-
-def _inner(picture: Array) -> Array:
-    rows, columns = (int(BORDER / 2 * side) for side in picture.shape)
-    return picture[rows : picture.shape[0] - rows, columns : picture.shape[1] - columns]
 
 
 def _contrast_figure(found: dict[str, Taken]) -> Figure:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.gallery import extended_depth
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
-from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Sizes
+from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Seen, Sizes
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.shapes.patterns import Circle
 from vcc.shapes.surfaces import Surface
@@ -142,9 +142,8 @@ class Run:
         cameras = {"no diffuser": kinds.plain, "random-phase": kinds.random, "radial": kinds.radial}
         found = {words: comparison.measured(elements, kinds.plain, advance) for words, elements in cameras.items()}
         scene = extended_depth.scene_pictures(
-            comparison,
-            ("No diffuser", kinds.plain),
-            ("Radial diffuser", kinds.radial),
+            Seen("plain", "No diffuser", comparison, kinds.plain),
+            Seen("coded", "Radial diffuser", comparison, kinds.radial),
             found["radial"].spreads,
             advance,
         )

@@ -206,13 +206,26 @@ class Comparison:
                 camera itself, a recording stays as it is where no filter is better.
             advance: called after each depth.
         """
-        spreads = self.spreads(elements)
         sharp, _ = self.recorded(plain, self.focus, noise=0)
+        return self.restored(elements, sharp, advance, or_as_recorded=elements is plain)
+
+    def restored(
+        self, elements: Elements, sharp: Array, advance: Callable[[], None], or_as_recorded: bool = False
+    ) -> Measured:
+        """The same, beside a true picture.
+
+        Args:
+            elements: of the camera.
+            sharp: the truth.
+            advance: called after each depth.
+            or_as_recorded: whether a recording stays as it is where no filter is better.
+        """
+        spreads = self.spreads(elements)
         restored, decibels = [], []
         for depth in self.depths:
             taken, noise = self.recorded(elements, depth)
             candidates = [wiener(taken, spreads, noise).picture]
-            if elements is plain:
+            if or_as_recorded:
                 candidates.append(taken)
             best = max(candidates, key=lambda each: psnr(each, sharp))
             restored.append(best)
@@ -223,10 +236,10 @@ class Comparison:
 
 def psnr(picture: Array, truth: Array) -> float:
     """Decibels, white 1, without the borders."""
-    return measures.psnr(_inner(picture, BORDER), _inner(truth, BORDER), peak=1.0)
+    return measures.psnr(inner(picture, BORDER), inner(truth, BORDER), peak=1.0)
 
 
-def _inner(picture: Array, border: float, whole: Callable[[float], int] = round) -> Array:
+def inner(picture: Array, border: float, whole: Callable[[float], int] = round) -> Array:
     """A picture without a share of it at each side, in whole pixels."""
     rows, columns = (whole(border * n) for n in picture.shape)
     return picture[rows : picture.shape[0] - rows, columns : picture.shape[1] - columns]
@@ -267,7 +280,7 @@ def target_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Fig
         [
             (
                 f"{words}, {away(depths[place])}: {each.decibels[place]:.1f} dB",
-                figures.grey_shown(_inner(each.restored[place], 0.5 * BORDER, math.floor)),
+                figures.grey_shown(inner(each.restored[place], 0.5 * BORDER, math.floor)),
             )
             for place in (0, len(depths) // 2, -1)
         ]
@@ -277,32 +290,43 @@ def target_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Fig
     return figure
 
 
-def scene_pictures(
-    comparison: Comparison,
-    plain: tuple[str, Elements],
-    coded: tuple[str, Elements],
-    spreads: Array,
-    advance: Callable[[], None],
-) -> tuple[Picture, ...]:
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A camera that takes the scene.
+
+    Args:
+        name: of the pictures' files.
+        words: above them.
+        comparison: by which they are taken.
+        elements: of the camera.
+    """
+
+    name: str
+    words: str
+    comparison: Comparison
+    elements: Elements
+
+
+def scene_pictures(plain: Seen, coded: Seen, spreads: Array, advance: Callable[[], None]) -> tuple[Picture, ...]:
     """The light field itself through both cameras, and the coded recording restored by the one filter.
 
     Args:
-        comparison: whose light field.
-        plain: the words above the picture, and the elements.
-        coded: likewise.
+        plain: the camera without an element.
+        coded: the one with it.
         spreads: PSFs of the coded camera.
         advance: called after each picture.
     """
-    field = comparison.bench.light_field
+    bench = plain.comparison.bench
+    field = bench.light_field
     rows, columns = (int(0.94 * n) for n in field.shape[2:4])
-    without, _ = comparison.photographed(plain[1], field, (rows, columns))
+    without, _ = plain.comparison.photographed(plain.elements, field, (rows, columns))
     advance()
-    recorded, noise = comparison.photographed(coded[1], field, (rows, columns))
+    recorded, noise = coded.comparison.photographed(coded.elements, field, (rows, columns))
     advance()
-    white = float(np.percentile(without, 99.5)) if comparison.bench.scene is None else 1.0
+    white = float(np.percentile(without, 99.5)) if bench.scene is None else 1.0
     whole = {
-        "plain": (plain[0], without),
-        "coded": (f"{coded[0]}, as recorded", recorded),
+        plain.name: (plain.words, without),
+        coded.name: (f"{coded.words}, as recorded", recorded),
         "restored": ("Restored by the one filter", wiener(recorded, spreads, noise).picture),
     }
     return tuple(

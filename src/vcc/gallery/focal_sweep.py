@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 from vcc.camera import Camera
 from vcc.gallery import extended_depth
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
-from vcc.gallery.extended_depth import ALIKE, NOISE, PUPIL, Comparison, Elements, Measured, Sizes, psnr
+from vcc.gallery.extended_depth import ALIKE, NOISE, PUPIL, Comparison, Elements, Measured, Seen, Sizes
 from vcc.light_field import LightField
 from vcc.motion import Lines, MovingCamera
 from vcc.optics import Lens, Mask
 from vcc.optics.sensor import Sensor
-from vcc.recover import wiener
 from vcc.shapes.patterns import Circle
-from vcc.showcase import figures
 from vcc.showcase.bench import Bench
 from vcc.showcase.words import away, paragraphs
 
@@ -125,12 +123,16 @@ class Run:
         progress(0, advance.total)
         elements = still.elements
         plain = still.measured(elements, elements, advance)  # one thing: it may stay as it is recorded
-        moved = _restored(still, swept, advance)
+        sharp, _ = still.recorded(elements, still.focus, noise=0)
+        moved = swept.restored(elements, sharp, advance)
+        scene = extended_depth.scene_pictures(
+            Seen("plain", "Sensor at rest", still, elements),
+            Seen("swept", "Sensor sweeping", swept, elements),
+            moved.spreads,
+            advance,
+        )
         return Result(
-            _text(swept),
-            (*_figures(plain, moved, depths), _scene(still, swept, moved.spreads, advance)),
-            _findings(plain, moved, depths),
-            bench.assumed,
+            _text(swept), (*_figures(plain, moved, depths), scene), _findings(plain, moved, depths), bench.assumed
         )
 
 
@@ -142,37 +144,6 @@ def designed(bench: Bench, sizes: Sizes = FULL) -> tuple[Sweeping, Sweeping]:
     """
     still = Sweeping(bench, round=True, sizes=sizes)
     return still, replace(still, travel=2 * MARGIN * still.reach * bench.focal_length**2)
-
-
-def _restored(still: Sweeping, swept: Sweeping, advance: Callable[[], None]) -> Measured:
-    """The flat target of the camera that sweeps, restored by one filter for all depths."""
-    spreads = swept.spreads(swept.elements)
-    sharp, _ = still.recorded(still.elements, still.focus, noise=0)
-    restored = []
-    for depth in swept.depths:
-        taken, noise = swept.recorded(swept.elements, depth)
-        restored.append(wiener(taken, spreads, noise).picture)
-        advance()
-    return Measured(spreads, tuple(restored), tuple(psnr(each, sharp) for each in restored))
-
-
-def _scene(still: Sweeping, swept: Sweeping, spreads: Array, advance: Callable[[], None]) -> tuple[Picture, ...]:
-    field = still.bench.light_field
-    shape = (int(0.94 * field.shape[2]), int(0.94 * field.shape[3]))
-    without, _ = still.photographed(still.elements, field, shape)
-    advance()
-    recorded, noise = swept.photographed(swept.elements, field, shape)
-    advance()
-    white = float(np.percentile(without, 99.5)) if still.bench.scene is None else 1.0
-    whole = {
-        "plain": ("Sensor at rest", without),
-        "swept": ("Sensor sweeping, as recorded", recorded),
-        "restored": ("Restored by the one filter", wiener(recorded, spreads, noise).picture),
-    }
-    return tuple(
-        Picture(f"scene-{name}", title, "", figures.values_shown(picture, white))
-        for name, (title, picture) in whole.items()
-    )
 
 
 def _text(swept: Sweeping) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from vcc.gallery import extended_depth
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
-from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Sizes
+from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Seen, Sizes
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.shapes.patterns import Open
 from vcc.shapes.surfaces import Cubic
@@ -52,9 +52,9 @@ class Run:
         progress(0, advance.total)
         plain = comparison.measured(pair.plain, pair.plain, advance)
         coded = comparison.measured(pair.coded, pair.plain, advance)
-        scene = extended_depth.scene_pictures(
-            comparison, ("No plate", pair.plain), ("With the plate", pair.coded), coded.spreads, advance
-        )
+        without = Seen("plain", "No plate", comparison, pair.plain)
+        plated = Seen("coded", "With the plate", comparison, pair.coded)
+        scene = extended_depth.scene_pictures(without, plated, coded.spreads, advance)
         return Result(
             _text(pair), (*_figures(plain, coded, depths), scene), _findings(plain, coded, depths), bench.assumed
         )
