@@ -118,15 +118,8 @@ def prepared(before: Sequence[operators.Before], values: Any, threads: int) -> A
     return values
 
 
-def prepared_back(
-    before: Sequence[operators.Before],
-    values: NDArray[np.floating],
-    threads: int,
-    *,
-    written_over: bool = False,
-) -> NDArray[np.floating]:
-    """The transpose of `prepared`, float32; see `vcc.plan.protocol.Engine.prepared_back`."""
-    return numba_cpu.prepared_back(before, values, threads, written_over=written_over)
+prepared_back = numba_cpu.prepared_back
+"""The transpose of `prepared`, float32; see `vcc.plan.protocol.Engine.prepared_back`."""
 
 
 def finished(after: Sequence[operators.After], raster: Any, threads: int) -> Any:

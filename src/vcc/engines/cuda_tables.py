@@ -16,9 +16,8 @@ from vcc.base.describe import Brief
 from vcc.engines import cuda_footprint_kernels as kernels
 from vcc.engines import footprint_tables as tables
 from vcc.engines.cuda_arrays import LastUsed, launch, sent
-from vcc.engines.footprint_samples import FineGrid, on_raster, textures
+from vcc.engines.footprint_samples import FineGrid, on_raster, taps_along, textures
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import taps
 
 AT_ONCE = 6
 """Rows of samples that a thread asks for at once, at most: memory answers after some hundred instructions. Where
@@ -113,12 +112,7 @@ _last_used = LastUsed(_made)
 
 def _along(core: Footprints, fine: FineGrid) -> tuple[tuple[kernels.Quads, int], tuple[Any, Any]]:
     """How rows of the raster gather rows of samples, by fours, and columns columns."""
-    rows, columns = core.raster_shape
-    start_y = core.y[:, 0] + core.row_step * fine.first_row
-    start_x = core.x[0] + core.column_step * fine.first_column
-    row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
-    down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
-    across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
+    down, across = taps_along(core, fine)
     *quads, batch = _quads(down.first, down.weights)
     return (kernels.Quads(*map(sent, quads)), batch), (sent(across.first.astype(np.int32)), sent(across.weights))
 

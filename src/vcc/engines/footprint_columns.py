@@ -13,10 +13,9 @@ from vcc.base.progress import Progress
 from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
-from vcc.engines.footprint_samples import FineGrid, MaskColumns, blocks
+from vcc.engines.footprint_samples import FineGrid, MaskColumns, blocks, taps_along
 from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import taps
 
 BAND = 64
 """Rows of the picture that a thread works on at once, at most."""
@@ -40,14 +39,11 @@ class ByColumns:
     def __init__(self, core: Footprints, channels: int, pool: Workers) -> None:
         self.core, self.channels, self.pool = core, channels, pool
         self.fine = fine = FineGrid(core)
-        rows, columns = core.raster_shape
-        start_y = core.y[:, 0] + core.row_step * fine.first_row
-        start_x = core.x[0] + core.column_step * fine.first_column
+        down, across = taps_along(core, fine)
         row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
-        down = taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening)
-        across = taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening)
         # How many rows of samples four rows of the raster gather, and how many the next four need anew.
-        ends = np.pad(down.first, [(0, 0), (0, -rows % ROWS)], mode="edge").reshape(len(start_y), -1, ROWS)
+        count, rows = down.first.shape
+        ends = np.pad(down.first, [(0, 0), (0, -rows % ROWS)], mode="edge").reshape(count, -1, ROWS)
         reach = int(np.ptp(ends, axis=2).max(initial=0)) + down.weights.shape[2]
         advance = min(math.ceil(ROWS / abs(row_step)), reach) if core.refine == 1 else 0
         self.mirrored = column_step < 0

@@ -16,7 +16,7 @@ from vcc.engines import numba_kernels as kernels
 from vcc.engines.compiled import read_as
 from vcc.engines.vector_sums import LANES, SHORTEST, room
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.shares import REACH, TIE, Division
+from vcc.plan.footprints.shares import REACH, TIE, Division, Taps, taps
 
 MASK_LINES = 64
 """Lines of a mask that a thread samples at once."""
@@ -60,6 +60,18 @@ class FineGrid:
         down, across = self.matrices
         fine = np.einsum("at,bs,tsc->abc", down, across, view.astype(np.float32), optimize=True)
         return np.ascontiguousarray(fine, dtype=np.float32)
+
+
+def taps_along(core: Footprints, fine: FineGrid) -> tuple[Taps, Taps]:
+    """Which rows of samples each row of the raster gathers, and which columns each column, where these part."""
+    rows, columns = core.raster_shape
+    start_y = core.y[:, 0] + core.row_step * fine.first_row
+    start_x = core.x[0] + core.column_step * fine.first_column
+    row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
+    return (
+        taps(core.interpolation, start_y, row_step, fine.rows, rows, core.opening),
+        taps(core.interpolation, start_x, column_step, fine.columns, columns, core.opening),
+    )
 
 
 class MaskPiece(NamedTuple):
