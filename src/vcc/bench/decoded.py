@@ -32,9 +32,9 @@ from vcc.base.showing import spread
 from vcc.bench.picture import Picture, Taken, jpeg, white_of
 from vcc.bench.side import scene_distances
 from vcc.camera import Camera
+from vcc.files.pictures import averaged
 from vcc.image import Image
 from vcc.light_field import LightField
-from vcc.notebook.pictures import averaged
 from vcc.optics.train import Train
 from vcc.plot.fans import focused_distance
 from vcc.recover import Decoder, refocused

@@ -46,6 +46,7 @@ from vcc.bench.picture import (
 )
 from vcc.bench.side import AXIS, scene_distances, side
 from vcc.bench.sweep import Sweep, sweep_of
+from vcc.fields.grid import Grid
 from vcc.files.camera_reading import TrainAsWritten, tables_of_text
 from vcc.light_field import LightField
 from vcc.optics.focusing import focused_train
@@ -419,16 +420,23 @@ class Session:
         whole = self.offered.field(document.light_field).whole(self._progress)
         return document.aperture.placed(whole if document.views is None else whole[document.views.slices])
 
+    @property
+    def _grid(self) -> Grid | None:
+        """Of the whole light field, as it stands before the camera; None until it is open."""
+        document = self._history.present
+        field = self.offered.field(document.light_field)
+        return field.whole().grid.moved(document.aperture.rays) if field.is_open else None
+
     # --- what is told ---
 
     def _tell_state(self, turn: int) -> None:
         document = self._history.present
         field = self.offered.field(document.light_field)
-        grid, seen, aperture, train = None, None, None, self._described.train
+        grid, seen, aperture, train = self._grid, None, None, self._described.train
         if field.is_open:
-            whole, rays = field.whole(), document.aperture.rays
+            whole = field.whole()
             views = whole if document.views is None else whole[document.views.slices]
-            grid, seen = whole.grid.moved(rays), views.transformed(rays)
+            seen = views.transformed(document.aperture.rays)
             aperture = drawn_aperture(document.aperture, views, train, AXIS)
         self._tell(
             {
@@ -481,12 +489,11 @@ class Session:
 
         Where nothing of the scene is sharp, the gaps between views are filled, which takes several times as long.
         """
-        described, light_field = described or self._described, self._history.present.light_field
-        field = self.offered.field(light_field)
-        scene = scene_distances(field.whole().grid).values() if field.is_open else ()
+        described, grid = described or self._described, self._grid
+        scene = () if grid is None else scene_distances(grid).values()
         focus = focused_distance(described.train)
         sharp = not scene or (focus is not None and min(scene) <= focus <= max(scene))
-        return light_field, sharp, *(element.kind for element in described.elements)
+        return self._history.present.light_field, sharp, *(element.kind for element in described.elements)
 
     def _is_rehearsed(self) -> bool:
         """Whether nothing is left to be rehearsed: all is, or nobody sees a whole picture."""

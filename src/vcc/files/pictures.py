@@ -237,6 +237,19 @@ def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
     return 1.0 / bright if bright > 0 else 1.0
 
 
+def averaged(values: NDArray[Any], factor: int) -> NDArray[np.float32]:
+    """A picture of 1 pixel for each factor×factor; what is left over at the right and below is left out.
+
+    Along an axis that has no more pixels than the factor all become one.
+    """
+    if factor == 1:
+        return np.asarray(values, dtype=np.float32)
+    (down, rows), (across, columns) = ((min(factor, size), max(size // factor, 1)) for size in values.shape[:2])
+    cut = np.asarray(values[: rows * down, : columns * across], dtype=np.float32)
+    parts = cut.reshape(rows, down, columns, across, *cut.shape[2:])
+    return np.asarray(parts.mean(axis=(1, 3)), dtype=np.float32)
+
+
 def write_codes(
     codes: NDArray[Any], path: Path, ending: str, statement: Statement, *, png_level: int | None = None
 ) -> None:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from vcc.base.showing import spread
 from vcc.base.units import short
-from vcc.files.pictures import auto_exposure
+from vcc.files.pictures import auto_exposure, averaged
 from vcc.light_field import LightField
 from vcc.notebook.html import Panel
-from vcc.notebook.pictures import GAP, MOST_BYTES, averaged, encoded, in_colour, sheet, sized
+from vcc.notebook.pictures import GAP, MOST_BYTES, encoded, in_colour, sheet, sized
 from vcc.recover import FocalStack
 from vcc.store import StoredLightField
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.files.pictures import auto_exposure
+from vcc.files.pictures import auto_exposure, averaged
 from vcc.files.transfer import encode
 from vcc.notebook.html import Panel
 from vcc.plot import style
@@ -30,19 +30,6 @@ DOTS = 160
 SHOWN_DOTS = 80
 
 Array = NDArray[Any]
-
-
-def averaged(values: Array, factor: int) -> NDArray[np.float32]:
-    """A picture of 1 pixel for each factor×factor; what is left over at the right and below is left out.
-
-    Along an axis that has no more pixels than the factor all become one.
-    """
-    if factor == 1:
-        return np.asarray(values, dtype=np.float32)
-    (down, rows), (across, columns) = ((min(factor, size), max(size // factor, 1)) for size in values.shape[:2])
-    cut = np.asarray(values[: rows * down, : columns * across], dtype=np.float32)
-    parts = cut.reshape(rows, down, columns, across, *cut.shape[2:])
-    return np.asarray(parts.mean(axis=(1, 3)), dtype=np.float32)
 
 
 def in_colour(values: Array) -> tuple[NDArray[np.float32], str]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.showing import spread
-from vcc.files.pictures import auto_exposure
+from vcc.files.pictures import auto_exposure, averaged
 from vcc.files.transfer import encode
 from vcc.plot.style import INK, QUIET, SMALL, TEXT, new_axes
 from vcc.sweeps.result import Sweep
@@ -90,10 +90,7 @@ def _small(swept: Sweep, place: Place) -> NDArray[np.float32]:
     values = swept[place].upright().to_numpy()
     if values.ndim == 3 and values.shape[2] != 3:
         values = values.mean(axis=2)
-    factor = max(values.shape[1] // round(INCHES * DOTS), 1)
-    rows, columns = (size // factor * factor for size in values.shape[:2])
-    parts = values[:rows, :columns].reshape(rows // factor, factor, columns // factor, factor, *values.shape[2:])
-    return np.asarray(parts.mean(axis=(1, 3)), dtype=np.float32)
+    return averaged(values, max(values.shape[1] // round(INCHES * DOTS), 1))
 
 
 def _draw(axes: Any, picture: NDArray[np.float32] | None, exposure: float) -> None:
