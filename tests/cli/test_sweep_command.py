@@ -10,6 +10,7 @@ import pytest
 
 import vcc
 from tests.command_line import CAMERA, KNOWN, refused, run, write_views
+from vcc.run import sent
 from vcc.sweeps import open_sweep
 
 MASK = """
@@ -70,6 +71,29 @@ def test_a_table_alone_of_a_drawn_design_against_a_target(folder):
     assert not (folder / "some.zarr").exists()
 
 
+def test_an_executor_makes_the_same_pictures(folder, monkeypatch):
+    values = ["--set", "sensor.z=51mm:53mm:3", "--set", "code.pattern=mura, circle"]
+    assert run(*sweep(*values, "-o", "here.zarr")).exit_code == 0
+    result = run(*sweep(*values, "-o", "there.zarr", "--executor", "threads"))
+    assert result.exit_code == 0, result.output
+    assert "6 of 6 cameras, one of them: " in result.stderr
+    here, there = (np.asarray(open_sweep(name).pictures) for name in ("here.zarr", "there.zarr"))
+    np.testing.assert_allclose(there, here, rtol=0, atol=1e-6 * here.max())
+    monkeypatch.setattr(sent, "SENT", 1000)
+    said = refused(*sweep(*values, "-o", "more.zarr", "--executor", "threads"))
+    assert "views is read into memory, and is too large to be sent" in said
+    assert "vcc convert views scene.zarr makes a store" in said
+
+
+def test_a_metric_is_added_to_a_finished_sweep(folder):
+    values = ["--set", "sensor.z=51mm:53mm:3", "-o", "all.zarr"]
+    run(*sweep(*values))
+    result = run(*sweep(*values, "--sharpness", "--table", "all.csv"))
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert (folder / "all.csv").read_text().splitlines()[0].endswith("sampling_error,sharpness")
+    assert open_sweep("all.zarr").table["sharpness"].min() > 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -81,6 +105,10 @@ def test_a_table_alone_of_a_drawn_design_against_a_target(folder):
         (["--set", "sensor.z=51mm", "-o", "a.csv", "--sheet", "a.png"], "a table alone keeps none"),
         (["--set", "sensor.z=51mm", "--count", "3", "-o", "a.zarr"], "count is for random and Sobol' designs"),
         (["--set", "code.pattern=hexagon", "-o", "a.zarr"], '"hexagon", which is no file in '),
+        (
+            ["--set", "sensor.z=51mm", "-o", "a.zarr", "--executor", "cluster"],
+            "--executor is processes, threads or",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_named_before_the_work(folder, arguments, said):

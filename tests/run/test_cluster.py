@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import distributed
+import numpy as np
 import pytest
 
 import vcc
-from tests.run.test_executors import CAMERAS, in_blocks, light_field, stored  # noqa: F401  # fixtures
+from tests.run.test_executors import CAMERAS, FOCUS, in_blocks, light_field, stored  # noqa: F401  # fixtures
 from vcc.run import executors
 from vcc.run.executors import Tree, Work, crew
+from vcc.units import mm
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning"),
@@ -95,6 +97,36 @@ def test_a_cluster_makes_the_same_picture_though_a_worker_is_killed(client, stor
     assert set(client.nthreads()) != before
 
 
+PARAMETERS = {"sensor.z": [0.98 * FOCUS, FOCUS, 1.02 * FOCUS], "lens.diameter": [5 * mm, 7 * mm]}
+
+
+@dataclass(frozen=True)
+class OnceDeadly:
+    """A metric that kills who computes it, the first time.
+
+    Args:
+        mark: a file that says that it did.
+    """
+
+    mark: Path
+
+    def __call__(self, image):
+        if not self.mark.exists():
+            self.mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return image.values.max()
+
+
+def test_a_sweep_loses_nothing_though_a_worker_is_killed(client, tmp_path):
+    camera, field = CAMERAS["fine mask"][0], light_field()
+    deadly = OnceDeadly(tmp_path / "mark")
+    found = vcc.sweep(camera, field, PARAMETERS, metrics={"brightest": deadly}, executor=client)
+    assert deadly.mark.exists()
+    alone = vcc.sweep(camera, field, PARAMETERS)
+    np.testing.assert_allclose(found.pictures, alone.pictures, rtol=0, atol=1e-6 * alone.pictures.max())
+    assert found.table["brightest"].tolist() == found.pictures.max(axis=(2, 3, 4)).ravel().tolist()
+
+
 def test_sums_are_those_of_the_tree_and_results_come_with_their_numbers(client):
     tree = Tree(70, joined)
     for number in range(70):
@@ -155,6 +187,30 @@ def test_work_whose_scheduler_is_lost_ends_with_an_error_and_ctrl_c_cancels(ends
             crew(client).summed(Work(sleep, None), range(100), joined, told)
     with pytest.raises(vcc.InputError, match="connect anew"):
         crew(client)
+
+
+def test_a_sweep_whose_scheduler_is_lost_says_what_is_kept_and_goes_on(stored, tmp_path, monkeypatch):  # noqa: F811
+    monkeypatch.setattr(executors, "LOOK", 0.05)
+    given = CAMERAS["fine mask"][0], stored, PARAMETERS
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster.scheduler_address, set_as_default=False, timeout=0.1) as client,
+    ):
+
+        def progress(done, total):
+            if done == 2:
+                cluster.close()
+
+        said = (
+            r"connection to the Dask .* was lost.*\. 2 of 6 pictures are kept in .*a.zarr: the same sweep goes on"
+        )
+        with pytest.raises(vcc.InputError, match=said):
+            vcc.sweep(*given, output=tmp_path / "a.zarr", executor=client, progress=progress)
+    assert vcc.sweeps.open_sweep(tmp_path / "a.zarr").done.sum() == 2
+    whole, alone = vcc.sweep(*given, output=tmp_path / "a.zarr"), vcc.sweep(*given)
+    np.testing.assert_allclose(whole.pictures, alone.pictures, rtol=0, atol=1e-6 * alone.pictures.max())
 
 
 def sleep(_, item):

@@ -268,5 +268,10 @@ def test_executors_make_the_same_pictures(field, tmp_path):
         swept = vcc.sweep(camera(), stored, values, executor=pool, **kept)
         np.testing.assert_allclose(swept.pictures, alone.pictures, atol=1e-6 * float(alone.pictures.max()))
         np.testing.assert_allclose(swept.table["sharpness"], alone.table["sharpness"], rtol=1e-4)
-        with pytest.raises(vcc.InputError, match=r"executor= is for light fields in stores.*save_store"):
-            vcc.sweep(camera(), field, values, executor=pool)
+        piece = field[1:, :-1]  # in memory, and sent; of disparities measured in the whole
+        sent = vcc.sweep(camera(), piece, values, executor=pool)
+        here = vcc.sweep(camera(), piece, values)
+        np.testing.assert_allclose(sent.pictures, here.pictures, atol=1e-6 * float(alone.pictures.max()))
+        large = vcc.LightField.of(np.broadcast_to(np.float32(0), (5, 5, 900, 1000, 1)), field.grid)
+        with pytest.raises(vcc.InputError, match=r"takes 90 MB of memory.* at most 67 MB are\. Save it with"):
+            vcc.sweep(camera(), large, values, executor=pool)

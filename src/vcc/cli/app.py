@@ -241,8 +241,8 @@ def run(arguments: Sequence[str]) -> int:
             return _refuse(str(error))
         except CycloptsError as error:
             return _refuse(_in_words(error), _help_on(error))
-        except KeyboardInterrupt:
-            say("Aborted.", "bold red", "")
+        except KeyboardInterrupt as interrupt:
+            say("Aborted.", "bold red", str(interrupt))
             return INTERRUPTED
         except BrokenPipeError:  # who reads has seen enough; nothing more is to be written when Python ends
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -23,6 +23,9 @@ CONNECTING = 10.0
 """Seconds in which a scheduler answers."""
 
 
+Who = Annotated[str | None, Parameter(metavar="EXECUTOR")]
+
+
 @Parameter(name="*", group=MAKING)
 @dataclass(frozen=True, kw_only=True)
 class Executing:
@@ -34,7 +37,16 @@ class Executing:
             thread and a memory limit of its own. Default: one block after the other, each by all cores.
     """
 
-    executor: str | None = None
+    executor: Who = None
+
+    def check_name(self) -> None:
+        """Refuse an executor that there is not.
+
+        Raises:
+            InputError: there is none of that name.
+        """
+        if self.executor not in (None, "processes", "threads") and not self.executor.startswith(DASK):
+            raise InputError(f'--executor is processes, threads or "{DASK}host:8786", not {self.executor!r}')
 
     def check(self, light_field: Path) -> None:
         """Refuse what does not go together, before the light field is read.
@@ -42,11 +54,8 @@ class Executing:
         Raises:
             InputError: no such executor, or a light field that is not in a store.
         """
-        if self.executor is None:
-            return
-        if self.executor not in ("processes", "threads") and not self.executor.startswith(DASK):
-            raise InputError(f'--executor is processes, threads or "{DASK}host:8786", not {self.executor!r}')
-        if not is_store(light_field):
+        self.check_name()
+        if self.executor is not None and not is_store(light_field):
             raise InputError(
                 f"--executor is for light fields in stores, whose blocks each reads for itself, and {light_field} "
                 f"is none: vcc convert {light_field} scene.zarr makes one; or leave --executor out"

@@ -9,7 +9,9 @@ from cyclopts import Group, Parameter
 from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
 from vcc.cli.console import DRAWINGS, check_output, progress, save_figure, show
+from vcc.cli.executing import Executing, Who
 from vcc.cli.options import (
+    MAKING,
     CameraFile,
     Given,
     Length,
@@ -21,7 +23,9 @@ from vcc.cli.options import (
     above_zero,
     quantity,
 )
+from vcc.fields.samples import Samples
 from vcc.image import load_image
+from vcc.run.sent import check_may_be_sent
 from vcc.sweeps import PSNR, DeblurringError, Design, contact_sheet, sharpness
 from vcc.sweeps import sweep as swept_by
 from vcc.sweeps.design import Kind
@@ -66,6 +70,36 @@ class Told(Given):
         return found
 
 
+@Parameter(name="*", group=MAKING)
+@dataclass(frozen=True, kw_only=True)
+class MakingMany(Executing):
+    """Who makes the pictures.
+
+    Args:
+        executor: Who makes the pictures, some cameras a task: `processes` or `threads`, one for each core of this
+            machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task takes one thread and a
+            memory limit of its own. The light field is in a store, or takes at most 64 MiB. Default: cameras one
+            after the other, by all cores.
+    """
+
+    executor: Who = None
+
+    def check_sent(self, light_field: Samples, path: Path) -> None:
+        """Refuse a light field in memory that is too large to be sent.
+
+        Raises:
+            InputError: it is.
+        """
+        try:
+            if self.executor is not None:
+                check_may_be_sent(light_field)
+        except InputError as error:
+            raise InputError(
+                f"{path} is read into memory, and is too large to be sent to all that work: vcc convert {path} "
+                "scene.zarr makes a store, which each reads for itself; or leave --executor out"
+            ) from error
+
+
 def sweep(
     camera: CameraFile,
     light_field: LightFieldFile,
@@ -80,6 +114,7 @@ def sweep(
     sheet: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     told: Told = Told(),
     how: Making = Making(),
+    executing: MakingMany = MakingMany(),
     reading: Reading = Reading(),
 ) -> None:
     """Make the pictures of many cameras: a camera file whose parameters change.
@@ -105,13 +140,15 @@ def sweep(
     sheet = None if sheet is None else check_output(sheet, DRAWINGS)
     if sheet is not None and not stored:
         raise InputError("--sheet shows pictures, and a table alone keeps none: let --output end in .zarr")
+    executing.check_name()
     optics = load_camera(camera)
     asked = Design(dict(set), design, count, seed, camera.parent)
     asked.of(optics)  # refused before the light field is read
     field, metrics = reading.light_field(light_field), told.metrics
-    with progress("Sweeping") as advance:
-        kept = {"output": output} if stored else {"pictures": False}
-        swept = swept_by(optics, field, asked, how, metrics=metrics, progress=advance, **kept)
+    executing.check_sent(field, light_field)
+    kept = {"output": output} if stored else {"pictures": False}
+    with executing.opened() as executor, progress("Sweeping") as advance:
+        swept = swept_by(optics, field, asked, how, metrics=metrics, executor=executor, progress=advance, **kept)
     if stored:
         sizes = "×".join(map(str, swept.pictures.shape[len(swept.shape) :]))
         show(f"{output}: {len(swept)} pictures of {sizes}, {' × '.join(swept.axes)}")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -142,6 +142,10 @@ class Disparities:
         state = "known with the whole" if self.known else "not looked for yet"
         return f"Disparities({state}: .range() and .maps() tell)"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What is known, and the range; other processes find maps that are not in the samples that they get."""
+        return _told, (self.maps() if self.known else None, self.range())
+
     @property
     def known(self) -> bool:
         """Whether the maps are there without further work."""
@@ -177,6 +181,14 @@ class Disparities:
             return None if whole is None else scaled(whole, factor)
 
         return Disparities(find=lambda progress: self.maps(progress).piece(ranges), measure=measured, whole=self)
+
+
+def _told(maps: DisparityMaps | None, ends: tuple[float, float] | None) -> Disparities:
+    return Disparities(maps, measure=partial(_same, ends))
+
+
+def _same(ends: tuple[float, float] | None) -> tuple[float, float] | None:
+    return ends
 
 
 def scaled(ends: tuple[float, float], factor: float) -> tuple[float, float]:

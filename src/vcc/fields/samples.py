@@ -127,6 +127,10 @@ class InMemory(OnGrid):
         check_samples(self.values)
         self._complete()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Its samples and its grid: other processes do not look at them again."""
+        return type(self).of, (self.values, self.grid)
+
     def _complete(self) -> None:
         """What was left out, filled in."""
         if self.extent is None:

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from vcc.base import late
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
-from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.progress import Progress
 from vcc.base.workers import Workers
 from vcc.engines import chosen, engine
@@ -34,15 +33,13 @@ from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
 from vcc.run.blocks import Blocks, Need, cut, cut_for_many
-from vcc.run.executors import Tree, Work, crew
+from vcc.run.executors import Tree, Work, crew, memory_of_task
 from vcc.run.sent import Carried, Sent
 
 HELD = 0.25
 """Share of the memory that views and maps, kept to be used again, may take where views in between are made."""
 IN_MEMORY = 2**28
 """Bytes of denser views that are there at a time, of a light field in memory."""
-LEAST_ROOM = 2**26
-"""Bytes for a task without which nobody need begin."""
 MUCH_UNSEEN = 0.01
 """Share of the samples between views that no view shows, from which on a warning says it."""
 
@@ -200,7 +197,7 @@ class Drive:
         self.given, self.samples = samples, samples
         self.name = chosen(how.engine, samples.whole())
         self.engine, self.threads = engine(self.name), how.workers
-        self.limit: float = self._memory_limit()
+        self.limit: float = memory_of_task(how.memory_limit, self.crew)
         if plan.views_between is not None:
             self._look_between(plan.views_between)
         kind = to_dtype(samples.whole()) if self.in_memory else self.samples.grid.kind
@@ -236,24 +233,6 @@ class Drive:
             )
         return cls(plan, samples, how, executor)
 
-    def _memory_limit(self) -> float:
-        """Bytes that a block, the picture and the engine may take; with an executor, of each task.
-
-        Raises:
-            InputError: more than the executor's workers have.
-        """
-        asked, room = self.how.memory_limit, None if self.crew is None else self.crew.room
-        if room is None:
-            return MEMORY_LIMIT // 4 if asked is None else asked
-        if room < LEAST_ROOM or (asked is not None and asked > room):
-            needed = LEAST_ROOM if asked is None else asked
-            raise InputError(
-                f"the least of the executor's workers has {max(room, 0) / 1e6:.0f} MB for each task, beside "
-                f"Python and its libraries, and {needed / 1e6:.0f} MB are asked for: give workers more memory, or "
-                "fewer threads each" + ("" if asked is None else ", or pass a smaller limit")
-            )
-        return min(MEMORY_LIMIT // 4, room) if asked is None else asked
-
     @property
     def in_memory(self) -> bool:
         """Whether all samples are there already."""
@@ -276,7 +255,11 @@ class Drive:
     def sent(self) -> Sent:
         """What goes to those that run the blocks elsewhere."""
         assert isinstance(self.given, Carried)
-        how = replace(self.how, threads=self.how.threads or 1, memory_limit=math.ceil(self._memory_limit()))
+        how = replace(
+            self.how,
+            threads=self.how.threads or 1,
+            memory_limit=math.ceil(memory_of_task(self.how.memory_limit, self.crew)),
+        )
         return Sent.of(self.plan, self.given, how)
 
     @cached_property

@@ -21,6 +21,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Protocol
 
 from vcc.base.errors import InputError, warn_of_result
+from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.version import VERSION
 
 Function = Callable[[Any, Any], Any]
@@ -34,6 +35,8 @@ RETRIES = 3
 """How often a cluster does a task again that failed."""
 LOOK = 1.0
 """Seconds after which somebody looks whether a crew that says nothing is still there."""
+LEAST_ROOM = 2**26
+"""Bytes for a task without which nobody need begin."""
 TAKEN, LIBRARIES = 0.7, 4e8
 """Of a Dask worker's memory, the share that it may take before it spills to disk; and bytes that Python, its
 libraries and compiled code take of that."""
@@ -116,6 +119,29 @@ def crew(executor: Any) -> Crew:
         f"executor is a concurrent.futures.Executor or a dask.distributed.Client, not {executor!r}: on one "
         "machine concurrent.futures.ProcessPoolExecutor(), for a cluster distributed.Client('tcp://host:8786')"
     )
+
+
+def memory_of_task(asked: int | None, workers: Crew | None) -> float:
+    """Bytes that one task may take, or what is run here.
+
+    Args:
+        asked: by a user; None takes a quarter of `vcc.base.memory.MEMORY_LIMIT`, or what workers have.
+        workers: who does it; None is here.
+
+    Raises:
+        InputError: more than the workers have.
+    """
+    room = None if workers is None else workers.room
+    if room is None:
+        return MEMORY_LIMIT // 4 if asked is None else asked
+    if room < LEAST_ROOM or (asked is not None and asked > room):
+        needed = LEAST_ROOM if asked is None else asked
+        raise InputError(
+            f"the least of the executor's workers has {max(room, 0) / 1e6:.0f} MB for each task, beside "
+            f"Python and its libraries, and {needed / 1e6:.0f} MB are asked for: give workers more memory, or "
+            "fewer threads each" + ("" if asked is None else ", or pass a smaller limit")
+        )
+    return min(MEMORY_LIMIT // 4, room) if asked is None else asked
 
 
 # --- tasks ---

@@ -20,6 +20,31 @@ SENT = 2**26
 """Bytes of samples in memory that are sent with the plan; more are to be read by each where they are stored."""
 
 
+def check_may_be_sent(samples: Samples) -> None:
+    """Refuse samples that others cannot be sent: they are to be read by each where they are stored.
+
+    Raises:
+        InputError: so many in memory that each would wait for them, or an array of another library.
+    """
+    whole = samples.whole()
+    if whole is None:
+        return
+    if not isinstance(whole, np.ndarray):
+        raise InputError(
+            f"executor= takes light fields in NumPy arrays or in stores, not in those of "
+            f"{type(whole).__module__.split('.')[0]}: leave it out, or pass "
+            "light_field.replaced(numpy.asarray(values))"
+        )
+    size = math.prod(whole.shape) * whole.dtype.itemsize
+    if size > SENT:
+        raise InputError(
+            f"this light field takes {size / 1e6:.0f} MB of memory, and with executor= it would be sent "
+            f"to all that work: at most {SENT / 1e6:.0f} MB are. Save it with vcc.store.save_store("
+            "light_field, 'scene.zarr') and pass vcc.store.open_store('scene.zarr'), which each reads for "
+            "itself; or leave executor= out: all cores of this machine work on it anyway"
+        )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Carried(Brief):
     """Samples as they go to others: the address of stored ones, or a small array.
@@ -39,24 +64,10 @@ class Carried(Brief):
         """Samples that may be sent.
 
         Raises:
-            InputError: so many in memory that each would wait for them, or an array of another library.
+            InputError: as `check_may_be_sent`.
         """
+        check_may_be_sent(samples)
         whole = samples.whole()
-        if whole is not None:
-            if not isinstance(whole, np.ndarray):
-                raise InputError(
-                    f"executor= takes light fields in NumPy arrays or in stores, not in those of "
-                    f"{type(whole).__module__.split('.')[0]}: leave it out, or pass "
-                    "light_field.replaced(numpy.asarray(values))"
-                )
-            size = math.prod(whole.shape) * whole.dtype.itemsize
-            if size > SENT:
-                raise InputError(
-                    f"this light field takes {size / 1e6:.0f} MB of memory, and with executor= it would be sent "
-                    f"to all that work: at most {SENT / 1e6:.0f} MB are. Save it with vcc.store.save_store("
-                    "light_field, 'scene.zarr') and pass vcc.store.open_store('scene.zarr'), which each reads for "
-                    "itself; or leave executor= out: all cores of this machine work on it anyway"
-                )
         grid = replace(samples.grid, disparities=Disparities())
         return cls(grid, samples if whole is None else whole)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -21,16 +20,13 @@ RESULTS_DIFFER = ("tolerance", "engine")
 """What is chosen for a run and changes its results."""
 
 
-def identity(
-    cameras: Cameras, light_field: Samples, how: How, metrics: Mapping[str, Any]
-) -> dict[str, Any] | None:
-    """All that results depend on, as JSON holds it; None where that is, in part, a function of Python.
+def identity(cameras: Cameras, light_field: Samples, how: How) -> dict[str, Any] | None:
+    """All that pictures depend on, as JSON holds it; None where that is, in part, a function of Python.
 
     Args:
         cameras: of the sweep.
         light_field: of which they make pictures.
         how: they do.
-        metrics: by name; what functions of a user's do is theirs to know.
     """
     try:
         parameters = {
@@ -51,7 +47,6 @@ def identity(
             if (field.name not in OF_THE_RUN or field.name in RESULTS_DIFFER)
             and getattr(how, field.name) != field.default
         },
-        "metrics": list(metrics),
     }
 
 

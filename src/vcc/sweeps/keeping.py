@@ -25,8 +25,8 @@ from vcc.base.version import VERSION
 from vcc.files.atomic import refusal
 from vcc.files.parts import clear_leftovers, part_of
 from vcc.files.writer_lock import WriterLock
-from vcc.image import Image
 from vcc.store.attributes import difference, plain, same
+from vcc.sweeps.metrics import KNOWN
 from vcc.sweeps.result import PIXEL_AXES, Results, Sweep
 from vcc.sweeps.values import Varied
 
@@ -48,11 +48,13 @@ class InStore(Results):
         path: folder of the store; made, or there and of the same sweep, which is gone on with.
         swept: the sweep, nothing of which is done.
         picture: the shape of all pictures; None where none are kept.
-        description: all that results depend on (`vcc.sweeps.identity`).
+        description: all that pictures depend on (`vcc.sweeps.identity`).
+        metrics: those that are asked for, in a word each (`vcc.sweeps.metrics.metrics_in_words`). Others that
+            are there stay; what one of the same name told that was another is forgotten.
 
     Raises:
-        InputError: the path is something else, or another sweep (what differs is named); another process writes
-            it; the disk refuses.
+        InputError: the path is something else, or another sweep (what differs is named); new metrics of pictures
+            that were not kept; another process writes it; the disk refuses.
     """
 
     def __init__(
@@ -61,6 +63,7 @@ class InStore(Results):
         swept: Sweep,
         picture: tuple[int, ...] | None,
         description: dict[str, Any] | None,
+        metrics: dict[str, str | None],
     ) -> None:
         super().__init__(swept)
         self.path = Path(path).expanduser()
@@ -74,13 +77,12 @@ class InStore(Results):
         try:
             clear_leftovers(self.path, self._lock.patience)
             if not there:
-                _make(self.path, swept, picture, stated)
+                _make(self.path, swept, picture, stated, metrics)
             for left in self.path.rglob("*.partial"):  # of a run that was killed
                 left.unlink(missing_ok=True)
             self._group = _opened(self.path, "r+")
-            self._pictures = None if picture is None else self._group[PICTURES]
-            for name, values in (*swept.numbers.items(), (DONE, swept.done)):
-                values[...] = self._group[name][...]
+            self._pictures: Any = None if picture is None else self._group[PICTURES]
+            self._take_over(metrics)
         except BaseException:
             self._lock.give_back()
             raise
@@ -89,7 +91,7 @@ class InStore(Results):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """What is done is noted, whatever ended the work; then others may write."""
+        """What is done is noted, whatever ended the work, and said; then others may write."""
         try:
             self._note()
         except InputError:
@@ -97,16 +99,25 @@ class InStore(Results):
                 raise
         finally:
             self._lock.give_back()
+        if isinstance(error, InputError):
+            raise InputError(f"{error}. {self.kept}") from error.__cause__
+        if isinstance(error, KeyboardInterrupt):
+            raise KeyboardInterrupt(self.kept) from None
 
-    def keep(self, place: tuple[int, ...], image: Image) -> None:
+    @property
+    def kept(self) -> str:
+        """How much is there, in words."""
+        done = self.swept.done
+        return f"{done.sum()} of {done.size} pictures are kept in {self.path}: the same sweep goes on from there"
+
+    def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
         """See `Results`.
 
         Raises:
             InputError: the disk refuses; all that was done before is kept.
         """
-        if self._pictures is not None:
-            with self._disk(f"the picture of {self.swept.labels(place)}"):
-                self._pictures[place] = image.to_numpy()
+        with self._disk(f"the picture of {self.swept.labels(place)}"):
+            self._pictures[place] = values
 
     def commit(self) -> None:
         """Note what is done, unless that was a moment ago."""
@@ -116,6 +127,27 @@ class InStore(Results):
     def finished(self) -> Sweep:
         """See `Results`."""
         return replace(self.swept, pictures=self._pictures)
+
+    def _take_over(self, metrics: dict[str, str | None]) -> None:
+        """What is there of the same sweep; room is made for metrics that are not there, or were others."""
+        there = _stated(self.path)["metrics"]
+        self.swept.done[...] = self._group[DONE][...]
+        wanted = {name: metric for name, metric in metrics.items() if there.get(name, "") != metric}
+        if wanted and self._pictures is None and self.swept.done.any():
+            raise InputError(
+                f"{self.path} keeps no pictures, of which {', '.join(wanted)} could be told: leave that out, or "
+                "choose another name for the sweep"
+            )
+        with self._disk("what is told of pictures"):
+            for name in wanted:
+                if name in self._group:
+                    self._group[name][...] = np.nan
+                else:
+                    _number(self._group, self.swept, name, self.swept.numbers[name])
+            # After them: who is killed before finds them wanting again.
+            self._group.attrs[KEY] = {**self._group.attrs[KEY], "metrics": {**there, **metrics}}
+        numbers = {name: self._group[name][...] for name in (*KNOWN, *there, *wanted)}
+        self.swept = replace(self.swept, numbers=numbers)
 
     def _note(self) -> None:
         with self._disk("what is told of pictures"):
@@ -130,11 +162,7 @@ class InStore(Results):
         try:
             yield
         except OSError as error:
-            done = self.swept.done
-            raise InputError(
-                f"{what} could not be written to {self.path}: {refusal(error, self.path)}. {int(done.sum())} of "
-                f"{done.size} pictures are kept: the same sweep goes on from there"
-            ) from error
+            raise InputError(f"{what} could not be written to {self.path}: {refusal(error, self.path)}") from error
 
 
 def open_sweep(path: str | PathLike[str]) -> Sweep:
@@ -158,7 +186,7 @@ def open_sweep(path: str | PathLike[str]) -> Sweep:
         return Sweep(
             axes,
             coordinates,
-            {name: group[name][...] for name in stated["numbers"]},
+            {name: group[name][...] for name in (*KNOWN, *stated["metrics"])},
             group.get(PICTURES),
             group[FRAME][...],
             group[DONE][...],
@@ -182,7 +210,9 @@ def save_sweep(swept: Sweep, path: str | PathLike[str]) -> None:
         raise InputError(f"{folder} is there already: choose another name")
     picture = None if swept.pictures is None else swept.pictures.shape[len(swept.shape) :]
     clear_leftovers(folder)
-    _make(folder, swept, picture, None, swept.pictures)
+    _make(
+        folder, swept, picture, None, {name: None for name in swept.numbers if name not in KNOWN}, swept.pictures
+    )
 
 
 def _stated(folder: Path) -> dict[str, Any]:
@@ -203,6 +233,8 @@ def _stated(folder: Path) -> dict[str, Any]:
             f"{folder} has format_version {found['format_version']}, and this vcc reads up to {FORMAT_VERSION}: "
             "use a newer vcc"
         )
+    if not isinstance(found.get("metrics"), dict):
+        raise InputError(f"{folder} cannot be used as a sweep: it does not state its metrics")
     return found
 
 
@@ -236,6 +268,7 @@ def _make(
     swept: Sweep,
     picture: tuple[int, ...] | None,
     description: dict[str, Any] | None,
+    metrics: dict[str, str | None],
     values: Any = None,
 ) -> None:
     """Make the group and its arrays under a temporary name and rename it: it is there or it is not."""
@@ -243,18 +276,18 @@ def _make(
 
     part = part_of(folder)
     try:
-        group = zarr.create_group(zarr.storage.LocalStore(part), attributes={KEY: _statement(swept, description)})
-        remark = {"coordinates": " ".join(each.name for each in swept.coordinates)} if swept.together else {}
+        group = zarr.create_group(
+            zarr.storage.LocalStore(part), attributes={KEY: _statement(swept, description, metrics)}
+        )
         for each in swept.coordinates:
             axes = swept.axes if swept.together else (each.name,)
             _array(group, each.name, each.coordinates, axes, {"units": each.unit} if each.unit else {})
         for name, numbers in swept.numbers.items():
-            words = {"long_name": IN_WORDS[name]} if name in IN_WORDS else {}
-            _array(group, name, numbers, swept.axes, remark | words)
-        _array(group, DONE, swept.done, swept.axes, remark)
+            _number(group, swept, name, numbers)
+        _array(group, DONE, swept.done, swept.axes, _remark(swept))
         _array(group, FRAME, swept.frames, (*(swept.axes if swept.frames.ndim > 2 else ()), "to", "from"), {})
         if picture is not None:
-            made = _make_pictures(group, swept, picture, remark)
+            made = _make_pictures(group, swept, picture)
         if picture is not None and values is not None:
             for place in np.ndindex(*swept.shape):
                 made[place] = values[place]
@@ -265,7 +298,7 @@ def _make(
         shutil.rmtree(part, ignore_errors=True)
 
 
-def _statement(swept: Sweep, description: dict[str, Any] | None) -> dict[str, Any]:
+def _statement(swept: Sweep, description: dict[str, Any] | None, metrics: dict[str, str | None]) -> dict[str, Any]:
     return {
         "format_version": FORMAT_VERSION,
         "written_by": f"vcc {VERSION}",
@@ -273,9 +306,20 @@ def _statement(swept: Sweep, description: dict[str, Any] | None) -> dict[str, An
         "parameters": [
             {"name": each.name, "unit": each.unit, "labels": list(each.labels)} for each in swept.coordinates
         ],
-        "numbers": list(swept.numbers),
+        "metrics": metrics,
         "description": description,
     }
+
+
+def _remark(swept: Sweep) -> dict[str, str]:
+    """What xarray is told of arrays along one axis of several parameters."""
+    return {"coordinates": " ".join(each.name for each in swept.coordinates)} if swept.together else {}
+
+
+def _number(group: Any, swept: Sweep, name: str, values: NDArray[np.float64]) -> None:
+    """The array of what is told of each picture by one name."""
+    words = {"long_name": IN_WORDS[name]} if name in IN_WORDS else {}
+    _array(group, name, values, swept.axes, _remark(swept) | words)
 
 
 def _array(group: Any, name: str, values: NDArray[Any], axes: tuple[str, ...], attributes: dict[str, Any]) -> None:
@@ -293,10 +337,11 @@ def _array(group: Any, name: str, values: NDArray[Any], axes: tuple[str, ...], a
     made[...] = values
 
 
-def _make_pictures(group: Any, swept: Sweep, picture: tuple[int, ...], remark: dict[str, Any]) -> Any:
+def _make_pictures(group: Any, swept: Sweep, picture: tuple[int, ...]) -> Any:
     """The array of pictures, one in a piece, and where on the sensor pixels are, if that is one place for all."""
     from zarr.codecs import BloscCodec, Crc32cCodec
 
+    remark = _remark(swept)
     if swept.frames.ndim == 2:
         for n, axis in enumerate(PIXEL_AXES[:2]):
             places = swept.frames[1 - n, 1 - n] * np.arange(picture[n]) + swept.frames[1 - n, 2]

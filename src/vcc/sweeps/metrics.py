@@ -16,6 +16,7 @@ from vcc.analysis.point_spread import psf
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.fingerprint import Untold, fingerprint
 from vcc.base.measures import psnr
 from vcc.camera import Camera
 from vcc.image import Image
@@ -169,23 +170,44 @@ KNOWN = ("mean", "missing_rays", "sampling_error")
 """What is told of every picture."""
 
 
+def metrics_in_words(metrics: Mapping[str, Metric]) -> dict[str, str | None]:
+    """What metrics are, in a word each; None of functions, of which nobody can tell whether they are the same."""
+    found: dict[str, str | None] = {}
+    for name, metric in metrics.items():
+        try:
+            found[name] = fingerprint(metric)
+        except Untold:
+            found[name] = None
+    return found
+
+
 def row_of(image: Image, metrics: Mapping[str, Metric]) -> dict[str, float]:
     """All that is told of a picture, by name.
 
     Raises:
         InputError: a metric that gives no number.
     """
-    row = {
+    return {
         "mean": float(image.to_numpy().mean(dtype=np.float64)),
         "missing_rays": float(image.missing_rays),
         "sampling_error": float(image.sampling_error),
+        **numbers_of(image, metrics),
     }
+
+
+def numbers_of(image: Image, metrics: Mapping[str, Metric]) -> dict[str, float]:
+    """What metrics give of a picture, by name.
+
+    Raises:
+        InputError: a metric that gives no number.
+    """
+    found = {}
     for name, metric in metrics.items():
         value = metric(image)
         try:
-            row[name] = float(value)
+            found[name] = float(value)
         except (TypeError, ValueError):
             raise InputError(
                 f"the metric {name} gives {value!r}, and a table holds one number for each picture"
             ) from None
-    return row
+    return found

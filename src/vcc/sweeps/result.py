@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import TracebackType
@@ -179,15 +179,34 @@ class Results:
         """The numbers of the cameras whose pictures are not there."""
         return [int(n) for n in np.flatnonzero(~self.swept.done)]
 
-    def put(self, number: int, image: Image, row: Mapping[str, float]) -> None:
-        """A picture, and what is told of it."""
-        place = tuple(int(n) for n in np.unravel_index(number, self.swept.shape))
-        self.keep(place, image)
-        for name, value in row.items():
-            self.swept.numbers[name][place] = value
-        self.swept.done[place] = True
+    def untold(self, names: Iterable[str]) -> list[int]:
+        """The numbers of the cameras whose pictures are there, and not all that these metrics tell of them."""
+        lacking = np.zeros(self.swept.shape, dtype=bool)
+        for name in names:
+            lacking |= np.isnan(self.swept.numbers[name])
+        return [int(n) for n in np.flatnonzero(lacking & self.swept.done)]
 
-    def keep(self, place: tuple[int, ...], image: Image) -> None:
+    def picture(self, number: int) -> Image:
+        """A picture that is there."""
+        return self.finished()[self.place(number)]
+
+    def put(self, number: int, values: NDArray[np.float32] | None, row: Mapping[str, float]) -> None:
+        """A picture, where pictures are kept, and what is told of it."""
+        if values is not None:
+            self.keep(self.place(number), values)
+        self.tell(number, row)
+        self.swept.done[self.place(number)] = True
+
+    def tell(self, number: int, row: Mapping[str, float]) -> None:
+        """What is told of a picture."""
+        for name, value in row.items():
+            self.swept.numbers[name][self.place(number)] = value
+
+    def place(self, number: int) -> tuple[int, ...]:
+        """Where a camera stands along each axis."""
+        return tuple(int(n) for n in np.unravel_index(number, self.swept.shape))
+
+    def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
         """Keep a picture."""
 
     def commit(self) -> None:
@@ -210,6 +229,6 @@ class InMemory(Results):
         pictures = np.empty((*swept.shape, *picture), dtype=np.float32)
         super().__init__(replace(swept, pictures=pictures))
 
-    def keep(self, place: tuple[int, ...], image: Image) -> None:
+    def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
         """See `Results`."""
-        self.swept.pictures[place] = image.to_numpy()
+        self.swept.pictures[place] = values

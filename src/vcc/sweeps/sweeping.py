@@ -6,8 +6,12 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from os import PathLike
 from typing import Any, Unpack
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.describe import Brief
@@ -17,14 +21,14 @@ from vcc.base.progress import Progress, tell
 from vcc.base.remarks import Remarks
 from vcc.camera import Camera, captured_together
 from vcc.fields.samples import Samples, check_is_light_field
-from vcc.image import Image
 from vcc.plan.how import How, Options
 from vcc.run.executors import Work as Task
-from vcc.run.executors import crew
+from vcc.run.executors import crew, memory_of_task
+from vcc.run.sent import check_may_be_sent
 from vcc.sweeps.design import Cameras, Design, cameras_of
 from vcc.sweeps.identity import identity
 from vcc.sweeps.keeping import InStore
-from vcc.sweeps.metrics import KNOWN, Metric, metrics_of, row_of
+from vcc.sweeps.metrics import KNOWN, Metric, metrics_in_words, metrics_of, numbers_of, row_of
 from vcc.sweeps.result import InMemory, Results, Sweep
 
 BATCH_BYTES = 2**28
@@ -64,10 +68,11 @@ def sweep(
             `vcc.sweeps.PSNR`, `vcc.sweeps.DeblurringError`.
         pictures: whether pictures are kept; False keeps the table alone, and lets them differ in shape.
         output: a folder to keep the results in, a Zarr group that xarray opens: picture by picture as they are
-            done. The same sweep goes on where it was stopped. None keeps them in memory.
+            done. The same sweep goes on where it was stopped; metrics that are new are told of the pictures that
+            are there. None keeps them in memory.
         executor: who makes the pictures, some cameras a task, each with one thread unless ``threads`` says how
             many: any `concurrent.futures.Executor`, or a ``dask.distributed.Client``, which stay open. The
-            light field is then in a store. None makes them here.
+            light field is then in a store, or at most 64 MiB of a NumPy array. None makes them here.
         progress: called with (done, total) in pictures.
         options: as in `vcc.Camera.capture`.
 
@@ -85,11 +90,11 @@ def sweep(
     """
     check_is_light_field(light_field)
     listed = cameras_of(cameras, parameters)
-    work = Work(listed, light_field, How.of(how, options), metrics_of(metrics))
+    work = Work(listed, light_field, How.of(how, options), metrics_of(metrics), pictures)
     if pictures and output is None:
         work.check_memory()
     listed.check()
-    with work.results(pictures, output) as results:
+    with work.results(output) as results:
         work.run(results, executor, progress)
     return results.finished()
 
@@ -103,12 +108,14 @@ class Work(Brief):
         light_field: of which they make pictures.
         how: they do.
         metrics: told of each picture.
+        pictures: whether they are kept.
     """
 
     cameras: Cameras
     light_field: Samples
     how: How
     metrics: Mapping[str, Metric]
+    pictures: bool
 
     def picture_shape(self) -> tuple[int, ...]:
         """The shape of all pictures.
@@ -137,13 +144,24 @@ class Work(Brief):
         way_out = "keep only the table (pictures=False), or fewer cameras"
         check_memory(4 * len(self.cameras) * math.prod(shape), None, what, way_out)
 
-    def batches(self, numbers: Sequence[int]) -> Iterator[list[int]]:
-        """Cameras that are made together, in an order in which as many as can share their work."""
-        wanted = set(numbers)
-        ordered = [number for number in self.cameras.alike() if number in wanted]
-        count = self.together() if ordered else 1
+    def batches(self, todo: Sequence[int], places: int = 0) -> Iterator[list[int]]:
+        """Cameras that are made together, in an order in which as many as can share their work.
+
+        All of those with any that is to be made: made with others, a picture may differ by rounding, and a sweep
+        that was stopped is to be the same as one that was not.
+
+        Args:
+            todo: the numbers of the cameras whose pictures are to be made.
+            places: where batches are made side by side; 0 for one after the other.
+        """
+        wanted, ordered = set(todo), self.cameras.alike()
+        count = self.together() if wanted else 1
+        if places:
+            count = min(count, max(len(ordered) // (4 * places), 1))
         for first in range(0, len(ordered), count):
-            yield ordered[first : first + count]
+            batch = ordered[first : first + count]
+            if not wanted.isdisjoint(batch):
+                yield batch
 
     def together(self) -> int:
         """How many cameras are made together: as many as there is memory for, and a few seconds' work."""
@@ -152,31 +170,44 @@ class Work(Brief):
         samples = camera.compile(self.light_field, self.how).samples_touched * channels
         return int(max(1, min(MOST_TOGETHER, BATCH_BYTES // (4 * pixels), BATCH_SAMPLES // max(samples, 1))))
 
-    def results(self, pictures: bool, output: str | PathLike[str] | None) -> Results:
+    def results(self, output: str | PathLike[str] | None) -> Results:
         """Where results go; what is there already of the same sweep is kept.
 
         Raises:
             InputError: pictures of different shapes; what `vcc.sweeps.keeping.InStore` refuses.
         """
         swept = Sweep.empty(self.cameras, (*KNOWN, *self.metrics))
-        picture = self.picture_shape() if pictures else None
+        picture = self.picture_shape() if self.pictures else None
         if output is not None:
-            known = identity(self.cameras, self.light_field, self.how, self.metrics)
-            return InStore(output, swept, picture, known)
+            known = identity(self.cameras, self.light_field, self.how)
+            return InStore(output, swept, picture, known, metrics_in_words(self.metrics))
         return Results(swept) if picture is None else InMemory(swept, picture)
 
     def run(self, results: Results, executor: Any, progress: Progress | None) -> None:
-        """Make the pictures that are not there yet."""
-        todo = results.left()
-        done, total = len(self.cameras) - len(todo), len(self.cameras)
-        remarks = Remarks()
-        for rows in self.made_here(todo, remarks) if executor is None else self.made_by(executor, todo, remarks):
-            for number, image, row in rows:
-                results.put(number, image, row)
+        """Make the pictures that are not there yet, and tell what is not told of those that are."""
+        todo, untold, remarks = results.left(), results.untold(self.metrics), Remarks()
+        done, total = len(self.cameras) - len(todo) - len(untold), len(self.cameras)
+        made = self.made_here(todo, remarks) if executor is None else self.made_by(executor, todo, remarks)
+        for count in chain(self.told(results, untold), self.put(results, set(todo), made)):
             results.commit()
-            done += len(rows)
+            done += count
             tell(progress, done, total)
         remarks.say(total, "cameras")
+
+    def told(self, results: Results, untold: Sequence[int]) -> Iterator[int]:
+        """What metrics give of pictures that are there, put; how many each time."""
+        for number in untold:
+            with checks.within(self.cameras.said(number)):
+                results.tell(number, numbers_of(results.picture(number), self.metrics))
+            yield 1
+
+    def put(self, results: Results, todo: set[int], made: Iterable[Rows]) -> Iterator[int]:
+        """Pictures that are made, put; how many each time."""
+        for rows in made:
+            lacking = [row for row in rows if row[0] in todo]
+            for number, values, numbers in lacking:
+                results.put(number, values, numbers)
+            yield len(lacking)
 
     def made_here(self, todo: Sequence[int], remarks: Remarks) -> Iterator[Rows]:
         """The pictures of cameras, some at a time."""
@@ -189,27 +220,23 @@ class Work(Brief):
         """The same by an executor, as they come.
 
         Raises:
-            InputError: a light field in memory; what `vcc.run.executors` refuses.
+            InputError: a light field in memory that is too large to be sent; what `vcc.run.executors` refuses.
         """
-        if self.light_field.whole() is not None:
-            raise InputError(
-                "executor= is for light fields in stores, which each task reads for itself: save this one with "
-                "vcc.store.save_store(light_field, 'scene.zarr') and pass vcc.store.open_store('scene.zarr'); or "
-                "leave executor= out: all cores of this machine work on it anyway"
-            )
+        check_may_be_sent(self.light_field)
         workers = crew(executor)
-        share = max(len(todo) // (4 * workers.places), 1)
-        batches = [batch[n : n + share] for batch in self.batches(todo) for n in range(0, len(batch), share)]
-        how = replace(self.how, threads=self.how.threads or 1)
-        alone = replace(self, how=how)
+        if self.how.between_views == "depth":
+            self.light_field.grid.disparities.maps()  # found once, and sent
+        batches = list(self.batches(todo, workers.places))
+        limit = math.ceil(memory_of_task(self.how.memory_limit, workers))
+        alone = replace(self, how=replace(self.how, threads=self.how.threads or 1, memory_limit=limit))
         with remarks.gathered():  # by threads of this process
             for _, (rows, elsewhere) in workers.each(Task(rows_elsewhere, (alone, os.getpid())), batches):
                 remarks.add(elsewhere)
                 yield rows
 
 
-Rows = list[tuple[int, Image, dict[str, float]]]
-"""Pictures of some cameras: the camera's number, the picture, and what is told of it."""
+Rows = list[tuple[int, NDArray[np.float32] | None, dict[str, float]]]
+"""Of some cameras: the camera's number, its picture where pictures are kept, and what is told of it."""
 
 
 def rows_of(work: Work, batch: Sequence[int]) -> Rows:
@@ -219,10 +246,10 @@ def rows_of(work: Work, batch: Sequence[int]) -> Rows:
         InputError: what a camera or a metric refuses, with the camera's values.
     """
     images = captured_together([work.cameras[number] for number in batch], work.light_field, work.how)
-    rows = []
+    rows: Rows = []
     for number, image in zip(batch, images, strict=True):
         with checks.within(work.cameras.said(number)):
-            rows.append((number, image, row_of(image, work.metrics)))
+            rows.append((number, image.to_numpy() if work.pictures else None, row_of(image, work.metrics)))
     return rows
 
 
