@@ -236,10 +236,9 @@ def sparse(folder: Path) -> None:
             compression=Lossless("lz4", 0),
         ) as writer:  # fmt: skip
             writer.write_view(0, 0, np.random.default_rng(0).random((*PIXELS, 3)).astype(np.float32))
-            first = path / "samples/c/0/0/0/0/0"
+            first = path / "samples/c.0.0.0.0.0"
             for row, column in writer.missing():
-                file = path / f"samples/c/{row}/{column}/0/0/0"
-                file.parent.mkdir(parents=True, exist_ok=True)
+                file = path / f"samples/c.{row}.{column}.0.0.0"
                 os.link(first, file)
             writer.finish()
         start = time.perf_counter()

@@ -15,6 +15,9 @@ from vcc.store.attributes import PICTURES
 CHUNK_BYTES = 2**17
 """About how many bytes of samples an inner chunk holds: some rows of pixels of one view."""
 
+FLAT = {"name": "default", "separator": "."}
+"""All views are files of one folder, c.2.3.0.0: five folders for each take longer to write, settle and remove."""
+
 
 @dataclass(frozen=True)
 class Lossless:
@@ -131,7 +134,7 @@ def layout(
         view = (1, 1, *shape[2:])
         know_pictures()
         codec = {"name": PICTURES, "configuration": asdict(compression)}
-        return {"chunks": view, "serializer": codec, "compressors": [Crc32cCodec()]}
+        return {"chunks": view, "chunk_key_encoding": FLAT, "serializer": codec, "compressors": [Crc32cCodec()]}
     inner = chunk_rows(rows, math.prod(shape[3:]) * kind.itemsize, chunks)
     blosc = BloscCodec(
         cname=compression.codec,
@@ -142,5 +145,6 @@ def layout(
     return {
         "chunks": (1, 1, inner, *shape[3:]),
         "shards": (1, 1, math.ceil(rows / inner) * inner, *shape[3:]),
+        "chunk_key_encoding": FLAT,
         "compressors": [blosc, Crc32cCodec()],  # packed bytes that rot are found out
     }
