@@ -17,7 +17,7 @@ from vcc.formats import read_ground_truth, read_lytro
 from vcc.sources.meshes import loaded
 from vcc.sources.mitsuba.renderer import _contents
 from vcc.sources.pbrt import PbrtScene
-from vcc.store import open_store
+from vcc.store import open_store, open_video
 
 Read = dict[str, Any]
 """``digest`` of all that was read, and whether it is ``sane``: no radiance is NaN, infinite or negative."""
@@ -34,6 +34,12 @@ def store(path: Path) -> Read:
     stored.check_complete()
     values = np.asarray(stored.read().values)
     return _read(values, sane=_is_light(values))
+
+
+def light_field_video(path: Path) -> Read:
+    frames = open_video(path)
+    values = [np.asarray(frame.read().values) for frame in frames]
+    return _read(frames.times, frames.between, *values, sane=all(map(_is_light, values)))
 
 
 def lytro(path: Path) -> Read:

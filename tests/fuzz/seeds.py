@@ -21,7 +21,7 @@ from scipy.io import savemat
 
 import vcc
 from tests.fuzz.texts import CAMERA, HCI_CAMERA, LENS, MITSUBA_SCENE, PBRT_SCENE
-from vcc.store import Lossy, save_store
+from vcc.store import Lossy, create_video, save_store
 
 Maker = Callable[[Path], Any]
 """Fills a folder."""
@@ -248,6 +248,12 @@ def store(lossy: str | None = None, kind: Any = np.uint8) -> Maker:
         save_store(light_field(kind=kind), folder / "s.zarr", **how)
 
     return make
+
+
+def light_field_video(folder: Path) -> None:
+    with create_video(folder / "v.zarr", between="held") as frames:
+        for n in range(3):
+            frames.append(light_field(), n / 24)
 
 
 def camera(ending: str) -> Maker:

@@ -246,6 +246,11 @@ def check_is_light_field(given: Any) -> None:
     if hasattr(given, "grid") and hasattr(given, "read"):
         return
     name = type(given).__name__
+    if hasattr(given, "times"):
+        raise InputError(
+            f"light_field is a vcc.LightField, not a {name}: take one of its frames, or "
+            "vcc.MovingCamera(camera).capture(video, exposure, start=…)"
+        )
     if isinstance(given, str | PathLike):
         store = str(given).endswith(".zarr")
         opened = f"vcc.{'store.open_store' if store else 'open_light_field'}({str(given)!r})"

@@ -53,6 +53,48 @@ def clear_leftovers(target: Path, patience: float = DAY) -> None:
             _remove(left)
 
 
+def clear_folder(folder: Path, patience: float) -> int:
+    """Remove the parts of all targets in a folder whose writers are dead; see `clear_leftovers`.
+
+    Returns:
+        How many there were.
+    """
+    found = list(_parts(folder, r".+", "part", r"(\.[^.]*)?", patience))
+    for left in found:
+        _remove(left)
+    return sum(left.suffix != ".lock" for left in found)
+
+
+def settle(folder: Path) -> None:
+    """Have the disk hold a folder and all that is in it: what is renamed then is whole after a power cut, too.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    for root, _, names in os.walk(folder):
+        for name in names:
+            _settle(os.path.join(root, name), os.O_RDWR)  # noqa: PTH118  (of many)
+        settle_names(Path(root))
+
+
+def settle_names(folder: Path) -> None:
+    """Have the disk hold the names in a folder.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    if os.name == "posix":  # elsewhere folders cannot be opened
+        _settle(folder, os.O_RDONLY)
+
+
+def _settle(path: str | Path, how: int) -> None:
+    opened = os.open(path, how)
+    try:
+        os.fsync(opened)
+    finally:
+        os.close(opened)
+
+
 def put_in_place(part: Path, target: Path, replace: bool) -> None:
     """Give a finished folder its name; what stood there is then gone.
 
@@ -122,15 +164,18 @@ def put_back(target: Path) -> bool:
 
 def _left(target: Path, state: str, patience: float) -> Iterator[Path]:
     """What writers that are dead left of a target."""
-    pattern = re.compile(
-        rf"\.?\.{re.escape(target.stem)}\.([0-9a-f]{{8}})-(\d+)-[0-9a-f]{{8}}\.{state}{re.escape(target.suffix)}(\.lock)?"
-    )
+    return _parts(target.parent, re.escape(target.stem), state, re.escape(target.suffix), patience)
+
+
+def _parts(folder: Path, stem: str, state: str, suffix: str, patience: float) -> Iterator[Path]:
+    """What writers that are dead left of targets of such names, as regular expressions."""
+    pattern = re.compile(rf"\.?\.{stem}\.([0-9a-f]{{8}})-(\d+)-[0-9a-f]{{8}}\.{state}{suffix}(\.lock)?")
     try:
-        names = os.listdir(target.parent)  # noqa: PTH208  (of thousands of names, paths are made of few)
+        names = os.listdir(folder)  # noqa: PTH208  (of thousands of names, paths are made of few)
     except OSError:  # what is written next says so, where that cannot be written either
         return
     for name in names:
-        match, path = pattern.fullmatch(name), target.parent / name
+        match, path = pattern.fullmatch(name), folder / name
         if match and _dead(match[1], int(match[2]), path, patience):
             yield path
 

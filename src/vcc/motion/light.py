@@ -12,6 +12,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.motion.video import LightFieldVideo
+from vcc.store.video_reading import StoredVideo
 
 Part = tuple[Any, Callable[[], Any], float]
 """What tells it from others, how to have it, and its share."""
@@ -92,6 +93,8 @@ def light_of(given: Any) -> Light:
     Raises:
         InputError: what is none.
     """
+    if isinstance(given, StoredVideo):
+        return _Frames(LightFieldVideo(given, given.times, given.between))
     if isinstance(given, LightFieldVideo):
         return _Frames(given)
     if callable(given):

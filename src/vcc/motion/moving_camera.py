@@ -26,6 +26,7 @@ from vcc.motion.light import Light, light_of
 from vcc.motion.quadrature import MOST, Mean, mean_over
 from vcc.motion.video import LightFieldVideo
 from vcc.plan.how import How, Options
+from vcc.store.video_reading import StoredVideo
 
 TOLERANCE = 2e-3
 """Of a picture's mean: half of what a step of 8 bits is of white."""
@@ -97,7 +98,7 @@ class MovingCamera(Brief):
 
     def capture(
         self,
-        light_field: Samples | LightFieldVideo | Callable[[float], Samples],
+        light_field: Samples | LightFieldVideo | StoredVideo | Callable[[float], Samples],
         exposure: float,
         how: How | None = None,
         *,

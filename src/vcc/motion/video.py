@@ -5,14 +5,13 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.samples import Samples
-
-Between = Literal["linear", "held"]
+from vcc.store.video_layout import Between
 
 
 @dataclass(frozen=True, eq=False, repr=False)

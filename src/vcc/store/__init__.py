@@ -1,8 +1,10 @@
-"""Light fields on disk: a Zarr v3 group that is written view by view and read in pieces (docs/store.md)."""
+"""Light fields and their videos on disk: Zarr v3 groups, written view by view, read in pieces (docs/store.md)."""
 
 from vcc.store.compression import Lossless, Lossy
 from vcc.store.converting import convert
 from vcc.store.reading import StoredLightField, is_store, open_store
+from vcc.store.video_reading import StoredVideo, is_video, open_video
+from vcc.store.video_writing import VideoWriter, create_video
 from vcc.store.writing import StoreWriter, create_store, save_store
 
 __all__ = [
@@ -10,9 +12,14 @@ __all__ = [
     "Lossy",
     "StoreWriter",
     "StoredLightField",
+    "StoredVideo",
+    "VideoWriter",
     "convert",
     "create_store",
+    "create_video",
     "is_store",
+    "is_video",
     "open_store",
+    "open_video",
     "save_store",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from os import PathLike
 from typing import Any
@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.base.version import VERSION
 from vcc.fields.arrays import one_view
+from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
 from vcc.files.transfer import decode, encode
 from vcc.store.attributes import DTYPES, Transfer
@@ -55,6 +57,46 @@ def convert(
         InputError: another type; samples that it cannot hold, brighter than 1 as integers (named by view); a store
             that is not complete; what `vcc.store.save_store` refuses.
     """
+    kept = as_kept(source, transfer, dtype)
+    return write_views(
+        path,
+        kept.grid,
+        kept.view,
+        overwrite=overwrite,
+        progress=progress,
+        provenance=kept.provenance if provenance is None else provenance,
+        transfer=kept.transfer,
+        channel_names=kept.channel_names,
+        chunks=chunks,
+        compression=compression,
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Kept(Brief):
+    """A light field as a store is to keep it.
+
+    Args:
+        grid: with the type that is stored.
+        view: the samples of view (row, column), as they are stored.
+        transfer: how they stand for light.
+        channel_names: where stated.
+        provenance: where it comes from.
+    """
+
+    grid: Grid
+    view: View
+    transfer: Transfer
+    channel_names: tuple[str, ...] | None
+    provenance: dict[str, Any]
+
+
+def as_kept(source: Samples, transfer: Transfer, dtype: DTypeLike | None) -> Kept:
+    """A light field as a store is to keep it; for the arguments see `convert`.
+
+    Raises:
+        InputError: another type than stores have, or a store that is not complete.
+    """
     grid = source.grid
     view: View = partial(one_view, source)
     kind, names, made = grid.kind, None, {"written_by": f"vcc {VERSION}"}
@@ -66,18 +108,11 @@ def convert(
     if wanted.name not in DTYPES:
         raise InputError(f"samples are stored as {', '.join(DTYPES)}, not {wanted}")
     recoded, now = _recoding(kind, transfer, wanted)
-    return write_views(
-        path,
-        replace(grid, kind=wanted),
-        lambda row, column: recoded(view(row, column), f"view ({row}, {column})"),
-        overwrite=overwrite,
-        progress=progress,
-        provenance=made if provenance is None else provenance,
-        transfer=now,
-        channel_names=names,
-        chunks=chunks,
-        compression=compression,
-    )
+
+    def stored(row: int, column: int) -> NDArray[Any]:
+        return recoded(view(row, column), f"view ({row}, {column})")
+
+    return Kept(replace(grid, kind=wanted), stored, now, names, made)
 
 
 def _recoding(

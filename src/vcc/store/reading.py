@@ -42,6 +42,7 @@ from vcc.light_field import LightField
 from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer, same
 from vcc.store.compression import know_pictures
 from vcc.store.disparity_maps import keep_maps, read_maps
+from vcc.store.video_layout import VIDEO, places
 
 MEASURED_BYTES = 2**26
 """Views from which disparities are measured are cut to a band of rows if they take more than this as stored."""
@@ -489,6 +490,8 @@ def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
             f"{folder / 'zarr.json'}: zarr_format {stated.get('zarr_format')!r}, node_type "
             f"{stated.get('node_type')!r}; a light field is a group of version 3"
         )
+    if stated_at(stated, "attributes", VIDEO) is not None:
+        raise InputError(f"{folder} is a video of light fields: {_choice(folder)}")
     attributes = Attributes.from_json(stated_at(stated, "attributes", KEY), folder)
     where = folder / ARRAY / "zarr.json"
     if not where.is_file():
@@ -506,6 +509,18 @@ def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
     except Exception as error:
         raise InputError(f"{where} cannot be used: {in_words(error)}") from error
     return array, attributes
+
+
+def _choice(folder: Path) -> str:
+    """How one frame of a video is taken, in words."""
+    frames = places(folder)
+    if not frames:
+        return "it has no frame yet"
+    first, last = frames[0], frames[-1]
+    return (
+        f"take one of its frames, {folder / first.name} ({first.time:g} s) to {last.name} ({last.time:g} s); "
+        "vcc.store.open_video opens all"
+    )
 
 
 def _sharding(array: Any) -> dict[str, Any]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from os import PathLike
@@ -345,29 +346,64 @@ def write_views(
     restored(folder)
     if os.path.lexists(folder):
         _check_replaceable(folder, overwrite)
-    lock, part = WriterLock(folder), part_of(folder)
+    lock = WriterLock(folder)
     try:
         clear_leftovers(folder, lock.patience)
         stated |= {"disparity_range": grid.disparity_range, "sample": grid.sample}
-        with create_store(part, grid.frame, grid.shape, grid.kind, **stated) as writer:
-            total = grid.shape[0] * grid.shape[1]
-            for done, (j, i) in enumerate(np.ndindex(*grid.shape[:2]), start=1):
-                writer.write_view(j, i, view(j, i))
-                tell(progress, done, total)
+        part = part_of(folder)
+        begin = partial(create_store, part, grid.frame, grid.shape, grid.kind, **stated)
+        with in_one_piece(folder, part, begin, partial(_put_in_place, part, folder, overwrite)) as writer:
+            write_all(writer, view, progress, disparity)
+    finally:
+        lock.give_back()
+    return open_store(folder)
+
+
+@contextmanager
+def in_one_piece(
+    folder: Path, part: Path, begin: Callable[[], StoreWriter], put: Callable[[], None]
+) -> Iterator[StoreWriter]:
+    """A store that appears at the end of the block, or not at all.
+
+    Args:
+        folder: of the store.
+        part: where it is written.
+        begin: makes the store there.
+        put: gives it its name when it is finished.
+
+    Raises:
+        InputError: as raised within, of the store by its own name; the disk refuses; views are missing.
+    """
+    try:
+        with begin() as writer:
+            yield writer
             writer.finish()
-            if disparity is not None:
-                _keep(part, disparity)
-        _put_in_place(part, folder, overwrite)
+        put()
     except InputError as error:
-        if str(part) not in str(error) or not isinstance(error.__cause__, OSError):
+        if str(part) not in str(error):
+            raise
+        if not isinstance(error.__cause__, OSError):
             raise InputError(str(error).replace(str(part), str(folder))) from error.__cause__
         stays = "the store that was there stays" if folder.exists() else "nothing of it is kept"
         reason = refusal(error.__cause__, part)
         raise InputError(f"{folder} could not be written: {reason}. It is written as a whole: {stays}") from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
-        lock.give_back()
-    return open_store(folder)
+
+
+def write_all(
+    writer: StoreWriter,
+    view: Callable[[int, int], NDArray[Any]],
+    progress: Progress | None,
+    disparity: DisparityMaps | None,
+) -> None:
+    """Write all views of a store, and maps of disparities beside them where they are known; see `write_views`."""
+    total = writer.shape[0] * writer.shape[1]
+    for done, (j, i) in enumerate(np.ndindex(*writer.shape[:2]), start=1):
+        writer.write_view(j, i, view(j, i))
+        tell(progress, done, total)
+    if disparity is not None:
+        _keep(writer.path, disparity)
 
 
 def _keep(part: Path, disparity: DisparityMaps) -> None:

@@ -34,6 +34,33 @@ def _store(make: Maker) -> Bomb:
     return Bomb(make, "s.zarr", readers.store)
 
 
+def _states(**grid: Any) -> Maker:
+    """What a video states of its frames changed."""
+
+    def make(folder: Path) -> None:
+        seeds.light_field_video(folder)
+        tree = json.loads((folder / VIDEO).read_text())
+        tree["attributes"]["light_field_video"]["grid"] |= grid
+        (folder / VIDEO).write_text(json.dumps(tree))
+
+    return make
+
+
+def _with_frame(name: str) -> Maker:
+    """A frame of another name."""
+
+    def make(folder: Path) -> None:
+        seeds.light_field_video(folder)
+        (folder / "v.zarr" / name).mkdir()
+
+    return make
+
+
+def _video(make: Maker) -> Bomb:
+    return Bomb(make, "v.zarr", readers.light_field_video)
+
+
+VIDEO = "v.zarr/zarr.json"
 BILLION = [10**5, 10**4, 24, 32, 3]
 UPWARDS = {"name": "default", "configuration": {"separator": "/../"}}
 LIST = b'{"zarr_format": 3, "node_type": "group", "attributes": [1]}'
@@ -52,5 +79,11 @@ BOMBS = {
     "zarr deep samples": _store(changed(seeds.store(), SAMPLES, b'{"a":' * 200000)),
     "zarr not utf-8": _store(changed(seeds.store(), SAMPLES, b"\xff\xfe\x00")),
     "zarr attributes list": _store(changed(seeds.store(), "s.zarr/zarr.json", LIST)),
+    "video shape 1e12": _video(_states(shape=[10**3, 10**3, 10**3, 10**3, 3])),
+    "video shape long": _video(_states(shape=[1] * 10**6)),
+    "video frame 1e9": _video(_with_frame("999999999_1.0")),
+    "video frame 1e200": _video(_with_frame(f"{'9' * 200}_1.0")),
+    "video time 1e999": _video(_with_frame("000003_1e999")),
+    "video deep json": _video(changed(seeds.light_field_video, VIDEO, b"[" * 200000)),
     "zarr lossy not utf-8": _store(changed(seeds.store("jpegxl"), SAMPLES, b"\xff\xfe\x00")),
 }

@@ -1,0 +1,340 @@
+"""Making a video of light fields: frame after frame, each there as a whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, get_args
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from vcc.base import checks
+from vcc.base.affine import Affine
+from vcc.base.describe import Brief
+from vcc.base.errors import InputError, warn_of_result
+from vcc.base.progress import Progress
+from vcc.base.reading import expanded
+from vcc.base.version import VERSION
+from vcc.fields.grid import Sample
+from vcc.fields.samples import Samples, check_is_light_field
+from vcc.files.atomic import atomic_path
+from vcc.files.parts import clear_folder, clear_leftovers, part_of, settle, settle_names
+from vcc.files.writer_lock import WriterLock
+from vcc.store.attributes import Transfer, plain
+from vcc.store.compression import Compression
+from vcc.store.converting import as_kept
+from vcc.store.reading import restored
+from vcc.store.video_layout import UNFINISHED, VIDEO, Between, Common, Place, VideoAttributes
+from vcc.store.video_reading import is_video, open_video
+from vcc.store.writing import Framed, StoreWriter, create_store, in_one_piece, write_all
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Packing(Brief):
+    """How a writer keeps frames; see `create_video`."""
+
+    transfer: Transfer = "linear"
+    dtype: np.dtype[Any] | None = None
+    channel_names: tuple[str, ...] | None = None
+    chunks: int | None = None
+    compression: Compression | None = None
+
+
+@dataclass
+class VideoWriter:
+    """Appends frames to a video; use it in a ``with`` block or plainly.
+
+    A frame is written under a temporary name, settled on the disk and renamed: whatever stops the writer, it is
+    there as a whole or not at all, and those before it stay. Readers may open the video meanwhile. It has one
+    writer at a time: until the ``with`` block is over or the process ends, other processes are refused; a later
+    writer of the same process takes its place. Made by `create_video`.
+    """
+
+    path: Path
+    attributes: VideoAttributes
+    packing: Packing
+    _lock: WriterLock
+    _times: list[float] = field(default_factory=list)
+    _busy: bool = False
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Of the frames that are there, seconds: what is to be done next after a stop."""
+        return tuple(self._times)
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    def append(self, light_field: Samples, time: float, *, progress: Progress | None = None) -> None:
+        """Write a frame; it is there when this returns.
+
+        Args:
+            light_field: in memory, or in a store, which is read view by view.
+            time: of the frame, seconds, after all that are there.
+            progress: called with (done, total) in views.
+
+        Raises:
+            InputError: no light field; a time that does not go on; another grid than the frames before it have,
+                by what differs; what `vcc.store.convert` refuses; this writer has ended; the disk refuses. The
+                frames before it stay.
+        """
+        check_is_light_field(light_field)
+        kept = as_kept(light_field, self.packing.transfer, self.packing.dtype)
+        grid = kept.grid
+        common = Common(
+            grid.shape,
+            grid.kind,
+            grid.frame,
+            kept.transfer,
+            grid.sample,
+            kept.channel_names or self.packing.channel_names,
+        )
+        stated = {"disparity_range": grid.disparity_range, "provenance": kept.provenance}
+        maps = grid.disparities.maps() if grid.disparities.known else None
+        with self._frame(common, time, stated) as writer:
+            write_all(writer, kept.view, progress, maps)
+
+    @contextmanager
+    def frame(
+        self,
+        time: float,
+        cameras_or_frame: Framed | Affine,
+        shape: tuple[int, ...],
+        dtype: DTypeLike,
+        *,
+        sample: Sample = "mean",
+        disparity_range: tuple[float, float] | None = None,
+        provenance: Mapping[str, Any] | None = None,
+    ) -> Iterator[StoreWriter]:
+        """A frame to write view by view, which need not fit into memory; it is there when the block is over.
+
+        ::
+
+            with video.frame(0.04, cameras, (*cameras.shape, 3), "float16") as frame:
+                for row, column in frame.missing():
+                    frame.write_view(row, column, rendered(row, column))
+
+        Args:
+            time: see `append`.
+            cameras_or_frame: see `create_store`, as for all that follows.
+            shape: see there.
+            dtype: see there.
+            sample: see there.
+            disparity_range: see there.
+            provenance: see there.
+
+        Raises:
+            InputError: as `append`; or views are missing when the block is over.
+        """
+        frame = cameras_or_frame if isinstance(cameras_or_frame, Affine) else cameras_or_frame.frame
+        sizes = tuple(int(size) for size in shape)
+        how = self.packing
+        common = Common(sizes, np.dtype(dtype), frame, how.transfer, sample, how.channel_names)
+        made = {"written_by": f"vcc {VERSION}"} if provenance is None else dict(provenance)
+        with self._frame(common, time, {"disparity_range": disparity_range, "provenance": made}) as writer:
+            yield writer
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Others may write."""
+        self._lock.give_back()
+
+    @contextmanager
+    def _frame(self, common: Common, time: float, stated: Mapping[str, Any]) -> Iterator[StoreWriter]:
+        self._check_may_write()
+        place = Place.of(len(self), self._following(time))
+        self._check_fits(common, place)
+        folder = self.path / UNFINISHED
+        _made(folder)
+        part = part_of(folder / place.name)
+        begin = partial(
+            create_store,
+            part,
+            common.frame,
+            common.shape,
+            common.kind,
+            transfer=common.transfer,
+            channel_names=common.channel_names,
+            sample=common.sample,
+            chunks=self.packing.chunks,
+            compression=self.packing.compression,
+            **stated,
+        )
+        put = partial(self._put, part, common, place)
+        self._busy = True
+        try:
+            with in_one_piece(self.path / place.name, part, begin, put) as writer:
+                yield writer
+        finally:
+            self._busy = False
+            with suppress(OSError):  # another frame is in it
+                folder.rmdir()
+
+    def _put(self, part: Path, common: Common, place: Place) -> None:
+        """Give a finished frame its name."""
+        self._check_may_write(ending=True)
+        try:
+            settle(part)
+            if self.attributes.common is None:
+                self.attributes = replace(self.attributes, common=common)
+                _write_attributes(self.path, self.attributes)
+            part.rename(self.path / place.name)
+            self._times.append(place.time)
+            settle_names(self.path)
+        except OSError as error:
+            raise InputError(f"{part} could not be settled: {error.strerror or error}") from error
+
+    def _following(self, time: float) -> float:
+        """A time after all that are there.
+
+        Raises:
+            InputError: another.
+        """
+        checked = checks.finite("the time of a frame", time, "seconds") + 0.0  # -0 is 0
+        if self._times and not self._times[-1] < checked:
+            raise InputError(
+                f"times of frames ascend, and frame {len(self) - 1} of {self.path} is at {self._times[-1]!r} s: "
+                f"{checked!r} s is not after it"
+            )
+        return checked
+
+    def _check_fits(self, common: Common, place: Place) -> None:
+        """Refuse another grid than that of the frames that are there.
+
+        Raises:
+            InputError: what differs.
+        """
+        difference = "" if self.attributes.common is None else common.difference(self.attributes.common)
+        if difference:
+            raise InputError(
+                f"{place.words}, has another grid than the frames of {self.path}: {difference}. All frames of a "
+                "video have one grid: write another video"
+            )
+
+    def _check_may_write(self, ending: bool = False) -> None:
+        if not self._lock.held:
+            raise InputError(
+                f"this writer of {self.path} has ended: its with block is over, or another was made since. Use "
+                "that, or make one by create_video"
+            )
+        if self._busy and not ending:
+            raise InputError(
+                f"a frame of {self.path} is being written: one follows the other, end its block first"
+            )
+
+
+def create_video(
+    path: str | PathLike[str],
+    *,
+    between: Between | None = None,
+    transfer: Transfer = "linear",
+    dtype: DTypeLike | None = None,
+    channel_names: tuple[str, ...] | None = None,
+    provenance: dict[str, Any] | None = None,
+    chunks: int | None = None,
+    compression: Compression | None = None,
+) -> VideoWriter:
+    """A video to append frames to: a new one, or one that is there and goes on.
+
+    ::
+
+        with vcc.store.create_video("scene.zarr") as video:
+            for n in range(len(video), 240):
+                video.append(rendered(n / 24), n / 24)
+
+    All frames have the grid of the first one: shape, type, frame, transfer, names of channels.
+
+    Args:
+        path: folder of the video; made, or there and empty, or there and a video.
+        between: what there is between two frames, ``"linear"`` or ``"held"``, see `vcc.motion.LightFieldVideo`;
+            None is what the video states, and ``"linear"`` of a new one.
+        transfer: of light fields in memory: ``"srgb"`` if their integers are sRGB codes. Those on disk say it
+            themselves.
+        dtype: of the stored samples, see `vcc.store.convert`; None keeps them bit for bit.
+        channel_names: one for each channel.
+        provenance: where a new video comes from, as JSON can hold it.
+        chunks: see `vcc.store.create_store`.
+        compression: of the frames that this writer appends, see there.
+
+    Warns:
+        ResultWarning: a writer before this one was stopped in a frame, of which nothing is kept.
+
+    Raises:
+        InputError: a path that is something else; another word; a video that states otherwise what is between
+            frames, or that is damaged; another process writes it (named); the disk refuses.
+    """
+    folder = expanded(path)
+    if between is not None:
+        checks.one_of("between", between, get_args(Between))
+    checks.one_of("transfer", transfer, get_args(Transfer))
+    plain(provenance or {}, "provenance")
+    names = None if channel_names is None else tuple(channel_names)
+    packing = Packing(transfer, None if dtype is None else np.dtype(dtype), names, chunks, compression)
+    restored(folder)
+    there = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
+    if there and not is_video(folder):
+        raise InputError(f"{folder} is there already, and is no video of light fields: choose another name")
+    lock = WriterLock(folder)
+    try:
+        clear_leftovers(folder, lock.patience)
+        if not there:
+            made = {"written_by": f"vcc {VERSION}"} if provenance is None else provenance
+            _begin(folder, VideoAttributes(between or "linear", None, made))
+        video = open_video(folder)
+        if between not in (None, video.between):
+            raise InputError(
+                f'{folder} states that it is "{video.between}" between frames, not "{between}": leave between out'
+            )
+        lost = clear_folder(folder / UNFINISHED, lock.patience)
+        if lost:
+            last = f"it goes on after {video.places[-1].words}" if video else "it has no frame yet"
+            warn_of_result(f"{folder}: a writer was stopped in a frame, of which nothing is kept: {last}")
+        attributes = video.attributes if video else replace(video.attributes, common=None)
+        return VideoWriter(folder, attributes, packing, lock, list(video.times))
+    except BaseException:
+        lock.give_back()
+        raise
+
+
+def _begin(folder: Path, attributes: VideoAttributes) -> None:
+    """Make the group under a temporary name and rename it."""
+    if not folder.parent.is_dir():
+        raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
+    part = part_of(folder)
+    try:
+        part.mkdir()
+        _write_attributes(part, attributes)
+        part.replace(folder)
+        settle_names(folder.parent)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be made: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _made(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder.parent} cannot be written to: {error.strerror or error}") from error
+
+
+def _write_attributes(folder: Path, attributes: VideoAttributes) -> None:
+    group = {"zarr_format": 3, "node_type": "group", "attributes": {VIDEO: attributes.as_json()}}
+    with atomic_path(folder / "zarr.json") as temporary, temporary.open("w", encoding="utf-8") as stream:
+        json.dump(group, stream, indent=2)
+        stream.flush()
+        os.fsync(stream.fileno())
