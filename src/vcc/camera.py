@@ -388,7 +388,12 @@ class Camera(Train):
 
 
 def captured_together(
-    cameras: Sequence[Camera], light_field: Samples, how: How, progress: Progress | None = None
+    cameras: Sequence[Camera],
+    light_field: Samples,
+    how: How,
+    progress: Progress | None = None,
+    *,
+    seeds: Sequence[int] | None = None,
 ) -> list[Image]:
     """What `Camera.capture` gives of one light field for several cameras, which share what they can of the work.
 
@@ -399,6 +404,7 @@ def captured_together(
         light_field: as in `Camera.capture`.
         how: likewise.
         progress: likewise.
+        seeds: of rays, one for each camera; None takes that of ``how`` for all.
 
     Warns:
         ResultWarning: as `Camera.capture`, for each camera.
@@ -411,7 +417,7 @@ def captured_together(
     if how.between_views == "depth":
         return [camera.capture(light_field, how, progress=progress) for camera in cameras]
     absurd = [camera._absurd(light_field) for camera in cameras]
-    plans = compile_several(cameras, light_field.grid, how)
+    plans = compile_several(cameras, light_field.grid, how, seeds)
     for caution in (caution for plan in plans for caution in plan.cautions):
         warn_of_result(caution)
     drives = [Drive(plan, light_field, how) for plan in plans]

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
+
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.values import Value
 
 
 @runtime_checkable
@@ -56,7 +59,7 @@ class Function(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Steps(Brief):
+class Steps(Brief, Value):
     """One value after the other: each from its time on until the next one's.
 
     Args:
@@ -86,38 +89,44 @@ class Steps(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Lines(Brief):
+class Lines(Brief, Value):
     """Numbers that go evenly from each time's to the next one's, and stay as they are before and after.
 
     Args:
         times: seconds, ascending.
-        values: as many numbers.
+        values: as many numbers, or pairs of numbers such as ``(0, 2 * mm)`` for what has an x and a y.
 
     Raises:
-        InputError: times that do not ascend, as many values as there are not times, or values that are no numbers.
+        InputError: times that do not ascend, as many values as there are not times, values that are no numbers, or
+            some that are pairs and some that are not.
     """
 
     times: Sequence[float]
-    values: Sequence[float]
+    values: Sequence[float | tuple[float, ...]]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times", _times(self.times))
-        object.__setattr__(self, "values", tuple(checks.finite("a value of Lines", each) for each in self.values))
+        object.__setattr__(self, "values", tuple(map(_numbers, self.values)))
         _check_as_many(self.times, self.values)
+        if len(set(map(np.shape, self.values))) > 1:
+            raise InputError("some values of Lines are one number and some are several: give as many at each time")
 
     @property
     def breaks(self) -> tuple[float, ...]:
         """All times."""
         return tuple(self.times)
 
-    def __call__(self, time: float) -> float:
-        """The number of a time, seconds."""
+    def __call__(self, time: float) -> float | tuple[float, ...]:
+        """The number of a time, seconds, or the numbers."""
         after = bisect_right(self.times, time)
         if after in (0, len(self.times)):
-            return float(self.values[0 if after == 0 else -1])
-        before = after - 1
-        share = (time - self.times[before]) / (self.times[after] - self.times[before])
-        return float((1 - share) * self.values[before] + share * self.values[after])
+            return self.values[0 if after == 0 else -1]
+        begin, end = self.times[after - 1], self.times[after]
+        share = (time - begin) / (end - begin)
+        one, other = self.values[after - 1], self.values[after]
+        if isinstance(one, tuple) and isinstance(other, tuple):
+            return tuple((1 - share) * a + share * b for a, b in zip(one, other, strict=True))
+        return (1 - share) * one + share * other  # type: ignore[operator]
 
 
 def coded(code: str | Iterable[float], exposure: float) -> Steps:
@@ -164,6 +173,13 @@ def _times(given: Iterable[float]) -> tuple[float, ...]:
         if not before < after:
             raise InputError(f"times ascend, and {after:g} s comes after {before:g} s: sort them")
     return times
+
+
+def _numbers(given: Any) -> float | tuple[float, ...]:
+    """A number as it is, several as a tuple."""
+    if isinstance(given, str) or np.ndim(given) == 0:
+        return float(checks.finite("a value of Lines", given))
+    return tuple(float(checks.finite("a number of a value of Lines", each)) for each in given)
 
 
 def _check_as_many(times: Sequence[float], values: Sequence[Any]) -> None:

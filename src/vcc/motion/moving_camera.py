@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self, Unpack
@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
+from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.progress import Progress, tell
 from vcc.base.remarks import Remarks
-from vcc.camera import Camera
-from vcc.fields.samples import Samples
+from vcc.camera import Camera, captured_together
+from vcc.fields.grid import Block
+from vcc.fields.samples import InMemory, Samples
 from vcc.image import Image
 from vcc.learn.parameters import replaced
 from vcc.motion.courses import Course, course, pieces
@@ -31,7 +33,11 @@ from vcc.store.video_reading import StoredVideo
 TOLERANCE = 2e-3
 """Of a picture's mean: half of what a step of 8 bits is of white."""
 KEPT = 2**28
-"""Bytes of pictures that are kept, in case the same light falls through the same camera again."""
+"""Bytes of pictures that are kept, in case the same light falls through the same camera again; half as many are
+made together."""
+
+State = tuple[Camera, Any]
+"""A camera, and what tells the light field before it from others."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -104,6 +110,7 @@ class MovingCamera(Brief):
         *,
         start: float = 0.0,
         time_tolerance: float = TOLERANCE,
+        executor: Any = None,
         progress: Progress | None = None,
         **options: Unpack[Options],
     ) -> Image:
@@ -116,7 +123,8 @@ class MovingCamera(Brief):
 
         The integral is cut where something switches, bends or a frame ends, and refined in each part until its
         estimated error is small enough (`vcc.motion.quadrature.mean_over`). Pictures of the same camera before the
-        same frame are made once; what switches in steps costs one for each state.
+        same frame are made once; what switches in steps costs one for each state. Others before the same light
+        field are made together, as those of a sweep (`vcc.sweep`): what they can share is done once.
 
         Args:
             light_field: one that stays, a video, or a function from seconds to a light field; all of one shape.
@@ -125,6 +133,9 @@ class MovingCamera(Brief):
             start: when the exposure begins, in the time of the video or function, seconds.
             time_tolerance: refine until the estimated error of the mean over time, root mean square over the
                 pixels, is at most this share of the picture's mean, with up to 729 moments of each part.
+            executor: as in `vcc.Camera.capture`: who runs the blocks of a stored light field, for one moment after
+                the other. None makes the pictures here; light fields on disk that take at most half of
+                ``memory_limit`` are then read once for all moments that are made together.
             progress: called with (done, total) in parts of the exposure.
             options: as in `vcc.Camera.capture`.
 
@@ -145,7 +156,7 @@ class MovingCamera(Brief):
         tolerance = checks.above_zero("time_tolerance", time_tolerance, "a share of the picture's mean")
         light = light_of(light_field)
         light.check_lasts(begun, begun + length)
-        work = _Work(self, light, begun, How.of(how, options))
+        work = _Work(self, light, begun, How.of(how, options), executor)
         return work.gathered(length, tolerance, progress)
 
 
@@ -175,6 +186,8 @@ class _Gathered:
         )
 
     def __mul__(self, factor: float) -> Self:
+        if factor == 1:
+            return self
         return replace(
             self,
             values=self.values * factor,
@@ -197,10 +210,11 @@ class _Gathered:
 class _Work:
     """One exposure: pictures of moments, those of the last states kept."""
 
-    def __init__(self, moving: MovingCamera, light: Light, start: float, how: How) -> None:
+    def __init__(self, moving: MovingCamera, light: Light, start: float, how: How, executor: Any) -> None:
         self._moving, self._light, self._start, self._how = moving, light, start, how
-        self._kept: OrderedDict[tuple[Camera, Any], _Gathered] = OrderedDict()
-        self._remarks, self._made = Remarks(), 0
+        self._executor = executor
+        self._kept: OrderedDict[State, _Gathered] = OrderedDict()
+        self._remarks, self._made, self._at_once = Remarks(), 0, 1
 
     def gathered(self, exposure: float, tolerance: float, progress: Progress | None) -> Image:
         breaks = (*self._moving.breaks, *(time - self._start for time in self._light.breaks))
@@ -208,7 +222,7 @@ class _Work:
         total, error, reached, passed = None, 0.0, True, 0.0
         for done, (begin, end) in enumerate(parts, start=1):
             share = (end - begin) / exposure
-            found: Mean[_Gathered] = mean_over(begin, end, self._moment, tolerance, MOST)
+            found: Mean[_Gathered] = mean_over(begin, end, self._moments, tolerance, MOST)
             part = found.value * share
             total = part if total is None else total + part
             error, reached = error + share * found.error, reached and found.reached
@@ -234,11 +248,22 @@ class _Work:
             camera=camera,
         )
 
-    def _moment(self, time: float) -> _Gathered:
-        """What falls on the sensor at a time after the exposure began."""
+    def _moments(self, times: Sequence[float]) -> Iterator[_Gathered]:
+        """What falls on the sensor at times after the exposure began, some of them made together."""
+        done = 0
+        while done < len(times):
+            asked = [self._parts(time) for time in times[done : done + self._at_once]]
+            done += len(asked)
+            wanted = {state: samples for parts in asked for state, samples, _ in parts}
+            made = self._pictures(wanted)
+            for parts in asked:
+                yield _sum([made[state] * share for state, _, share in parts]) if parts else self._dark
+
+    def _parts(self, time: float) -> list[tuple[State, Callable[[], Samples], float]]:
+        """The cameras and light fields of a time, and their shares; none while the shutter is shut."""
         through = self._moving.open_at(time)
         if through == 0:
-            return self._dark
+            return []
         camera, pixels = self._moving.at(time), self._moving.camera.sensor.shape
         if camera.sensor.shape != pixels:
             raise InputError(
@@ -246,33 +271,66 @@ class _Work:
                 "light all the time, and stay as many"
             )
         frames = self._light.at(self._start + time)
-        return _sum([self._picture(camera, key, samples) * (share * through) for key, samples, share in frames])
+        return [((camera, key), samples, share * through) for key, samples, share in frames]
 
     @cached_property
     def _dark(self) -> _Gathered:
         channels = next(iter(self._light.at(self._start)))[1]().grid.shape[4:]
         return _Gathered(np.zeros((*self._moving.camera.sensor.shape, *channels)), 0.0, {})
 
-    def _picture(self, camera: Camera, key: Any, samples: Callable[[], Samples]) -> _Gathered:
-        """The picture of a camera and a frame, made once while it is kept."""
-        known = self._kept.get((camera, key))
-        if known is not None:
-            self._kept.move_to_end((camera, key))
-            return known
-        with self._remarks.gathered():
-            # Other rays for each picture: their errors even out.
-            image = camera.capture(samples(), replace(self._how, seed=self._how.seed + self._made))
-        if not isinstance(image.values, np.ndarray):
-            raise InputError(
-                f"a moving camera takes samples of NumPy, not of {type(image.values).__module__.split('.')[0]}, "
-                "whose gradients would end here: sum pictures of camera.capture yourself"
-            )
-        made = _Gathered(image.values.astype(np.float64), image.missing_rays, {self._made: image.sampling_error})
-        self._kept[camera, key] = made
-        self._made += 1
-        while len(self._kept) > max(2, KEPT // made.values.nbytes):
-            self._kept.popitem(last=False)
-        return made
+    def _pictures(self, wanted: Mapping[State, Callable[[], Samples]]) -> dict[State, _Gathered]:
+        """The pictures of cameras and light fields, each made once while it is kept."""
+        there = {state: self._kept[state] for state in wanted if state in self._kept}
+        for state in there:
+            self._kept.move_to_end(state)
+        # Other rays for each picture: their errors even out.
+        numbers = {state: self._made + n for n, state in enumerate(each for each in wanted if each not in there)}
+        for light in dict.fromkeys(light for _, light in numbers):
+            states = [state for state in numbers if state[1] == light]
+            with self._remarks.gathered():
+                images = self._captured(states, wanted[states[0]](), [numbers[state] for state in states])
+            for state, image in zip(states, images, strict=True):
+                there[state] = self._kept[state] = _gathered(image, numbers[state])
+        self._made += len(numbers)
+        self._forget()
+        return there
+
+    def _captured(self, states: Sequence[State], samples: Samples, numbers: Sequence[int]) -> list[Image]:
+        """The pictures of cameras before one light field, by rays of their own numbers."""
+        cameras, seeds = [camera for camera, _ in states], [self._how.seed + number for number in numbers]
+        if self._executor is None and len(cameras) > 1:
+            return captured_together(cameras, self._read(samples), self._how, seeds=seeds)
+        return [
+            camera.capture(samples, replace(self._how, seed=seed), executor=self._executor)
+            for camera, seed in zip(cameras, seeds, strict=True)
+        ]
+
+    def _read(self, samples: Samples) -> Samples:
+        """Samples that several cameras look at, read where there is room for them."""
+        room = MEMORY_LIMIT // 4 if self._how.memory_limit is None else self._how.memory_limit
+        grid = samples.grid
+        if samples.whole() is not None or 2 * math.prod(grid.shape) * grid.kind.itemsize > room:
+            return samples
+        samples.check_complete()
+        return InMemory.of(samples.read(Block.all_of(grid.shape)), grid)
+
+    def _forget(self) -> None:
+        """Let go of the pictures that were wanted least lately, and see how many are made together."""
+        if self._kept:
+            most = KEPT // next(iter(self._kept.values())).values.nbytes
+            self._at_once = max(most // 2, 1)
+            while len(self._kept) > max(most, 2):
+                self._kept.popitem(last=False)
+
+
+def _gathered(image: Image, number: int) -> _Gathered:
+    """A picture as it is added to others; its number tells its error from theirs."""
+    if not isinstance(image.values, np.ndarray):
+        raise InputError(
+            f"a moving camera takes samples of NumPy, not of {type(image.values).__module__.split('.')[0]}, "
+            "whose gradients would end here: sum pictures of camera.capture yourself"
+        )
+    return _Gathered(image.values.astype(np.float64), image.missing_rays, {number: image.sampling_error})
 
 
 def _sum(parts: list[_Gathered]) -> _Gathered:

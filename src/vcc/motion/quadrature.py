@@ -7,14 +7,15 @@ never at the ends, where something may just switch, and all weigh the same, so t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Generic, Protocol, Self, TypeVar
 
 from vcc.base.describe import Brief
 
-MOST = 729
-"""Moments of an interval, at most."""
+LEAST, MOST = 9, 729
+"""Moments of an interval: a change tells of the error when there are two of them."""
 
 
 class Summand(Protocol):
@@ -54,7 +55,11 @@ class Mean(Brief, Generic[Picture]):
 
 
 def mean_over(
-    start: float, stop: float, at: Callable[[float], Picture], tolerance: float, most: int = MOST
+    start: float,
+    stop: float,
+    at: Callable[[Sequence[float]], Iterable[Picture]],
+    tolerance: float,
+    most: int = MOST,
 ) -> Mean[Picture]:
     """The mean of pictures over an interval, by 9, 27, 81, … moments.
 
@@ -65,22 +70,24 @@ def mean_over(
     Args:
         start: seconds.
         stop: seconds.
-        at: the picture of a moment.
+        at: the pictures of some moments, in their order; it is asked for all of a step at once, so that they can
+            be made together.
         tolerance: the error that is good enough, as a share of the mean.
-        most: moments.
+        most: moments, 9 or more.
     """
 
-    def moment(number: int, count: int) -> Picture:
-        return at(start + (number + 0.5) / count * (stop - start))
+    def new(count: int) -> list[float]:
+        """Those of so many moments that the step before has not."""
+        numbers = (number for number in range(count) if count == 1 or number % 3 != 1)
+        return [start + (number + 0.5) / count * (stop - start) for number in numbers]
 
-    count = 1
-    total = moment(0, 1)
-    changed = math.inf
+    beginning = iter(at([*new(1), *new(3), *new(LEAST)]))
+    count, total, changed = 1, next(beginning), math.inf
     while True:
         before, count = total * (1 / count), 3 * count
-        for number in range(count):
-            if number % 3 != 1:  # which was a moment of the step before
-                total = total + moment(number, count)
+        times = new(count)
+        for picture in islice(beginning, len(times)) if count <= LEAST else at(times):
+            total = total + picture
         mean = total * (1 / count)
         earlier, changed = changed, mean.distance(before)
         error = max(changed / 2, earlier / 6)

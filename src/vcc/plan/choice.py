@@ -39,8 +39,16 @@ def compile_best(train: Train, grid: Grid, how: How | None = None, decisions: De
     return replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame))
 
 
-def compile_several(trains: Sequence[Train], grid: Grid, how: How) -> list[Plan]:
+def compile_several(
+    trains: Sequence[Train], grid: Grid, how: How, seeds: Sequence[int] | None = None
+) -> list[Plan]:
     """The plans of several trains, as `compile_best` makes each of them; what they share is made once.
+
+    Args:
+        trains: one at least.
+        grid: of the light field.
+        how: what was chosen.
+        seeds: of rays, one for each train; None takes that of ``how`` for all.
 
     Raises:
         InputError: as `compile_best`.
@@ -49,7 +57,8 @@ def compile_several(trains: Sequence[Train], grid: Grid, how: How) -> list[Plan]
     codes = None if alone or len(trains) < 2 else Codes.of(trains)
     plans = None if codes is None else codes.plans(grid, how)
     if plans is None:
-        return [compile_best(train, grid, how) for train in trains]
+        hows = [how] * len(trains) if seeds is None else [replace(how, seed=seed) for seed in seeds]
+        return [compile_best(train, grid, each) for train, each in zip(trains, hows, strict=True)]
     made = zip(trains, plans, strict=True)
     return [replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame)) for train, plan in made]
 
