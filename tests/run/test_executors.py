@@ -121,8 +121,7 @@ def in_blocks(monkeypatch):
         spans = [(int(places[0]), int(places[-1]) + 1) for places in looked_at]
         return Blocks(*spans, *grid.shape[2:4], -(-grid.shape[0] // 5), -(-grid.shape[1] // 3), grid.shape[2])
 
-    monkeypatch.setattr(drive, "cut", cut)
-    monkeypatch.setattr(drive, "cut_for_many", cut)
+    monkeypatch.setattr(drive, "cut_evenly", cut)
 
 
 # --- the picture ---

@@ -7,6 +7,7 @@ tests/physics/test_chunks.py: float32 sums in another order take about 1e-6 (mea
 from __future__ import annotations
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -70,7 +71,7 @@ def cut_as(monkeypatch, each):
         spans = [(int(places[0]), int(places[-1]) + 1) for places in looked_at]
         return Blocks(*spans, *SHAPE[2:], *each)
 
-    monkeypatch.setattr(drive, "cut", cut)
+    monkeypatch.setattr(drive, "cut_evenly", cut)
 
 
 @pytest.mark.parametrize("name", list(CAMERAS))
@@ -189,7 +190,14 @@ def test_blocks_keep_to_the_limit(tmp_path, method):
         )  # fmt: skip
         samples = rows * columns * view * blocks.pixel_rows_each / 300
         assert fixed + samples <= limit
-    assert (blocks.rows_each, blocks.columns_each, blocks.pixel_rows_each) == (9, 11, 300)
+    # By footprints 16 MiB are a block of its own.
+    assert (blocks.rows_each, blocks.columns_each, blocks.pixel_rows_each) == (
+        9 if method == "rays" else 2,
+        11,
+        300,
+    )
+    with ThreadPoolExecutor(3) as pool:
+        assert drive.Drive(plan, stored, How(threads=2), pool).blocks == blocks  # so that pictures are the same
     with pytest.raises(vcc.InputError, match="is too little: this picture takes"):
         _ = driven(fixed).blocks
 

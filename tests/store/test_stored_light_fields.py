@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -178,39 +179,122 @@ def test_a_larger_world_is_only_another_frame(stored):
 # --- little is read ---
 
 
-def bytes_read(monkeypatch):
-    """Bytes that Zarr's store hands out from now on, by key, metadata left out."""
-    from zarr.storage import LocalStore
+class Counting:
+    """A stream that counts what is read of it."""
 
+    def __init__(self, stream, add):
+        self.stream, self.add = stream, add
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.stream.close()
+
+    def seek(self, place):
+        return self.stream.seek(place)
+
+    def read(self, *size):
+        found = self.stream.read(*size)
+        self.add(len(found))
+        return found
+
+
+def bytes_read(monkeypatch, store):
+    """Bytes that are read of views from now on, by their files."""
     found: dict[str, int] = {}
-    get = LocalStore.get
+    opened = Path.open
 
-    async def counted(self, key, *more, **named):
-        buffer = await get(self, key, *more, **named)
-        if buffer is not None and "/c." in key:
-            found[key] = found.get(key, 0) + len(buffer)
-        return buffer
+    def counted(self, *more, **named):
+        stream = opened(self, *more, **named)
+        if self.parent != store / "samples" or self.name == "zarr.json":
+            return stream
+        key = self.name
+        return Counting(stream, lambda size: found.update({key: found.get(key, 0) + size}))
 
-    monkeypatch.setattr(LocalStore, "get", counted)
+    monkeypatch.setattr(Path, "open", counted)
     return found
 
 
 def test_little_is_read(tmp_path, monkeypatch):
     values = np.random.default_rng(1).random((4, 5, 64, 40, 3)).astype(np.float32)
-    stored = save_store(vcc.LightField.from_views(values, 1e-3, 1e-3), tmp_path / "a.zarr", chunks=8)
-    file = (stored.path / "samples/c.2.3.0.0.0").stat().st_size
-    found = bytes_read(monkeypatch)
+    given = vcc.LightField.from_views(values, 1e-3, 1e-3)
+    stored, tiled = (save_store(given, tmp_path / f"{n}.zarr", chunks=n) for n in (8, (8, 10)))
+    file = stored.view_file(2, 3).stat().st_size
+    found = bytes_read(monkeypatch, stored.path)
     open_store(stored.path)
     assert not found
     stored.view(2, 3)
-    assert found == {"samples/c.2.3.0.0.0": file}
+    assert found == {"c.2.3.0.0.0": file}
     found.clear()
     stored[1:2]
-    assert set(found) == {f"samples/c.1.{column}.0.0.0" for column in range(5)}
+    assert set(found) == {f"c.1.{column}.0.0.0" for column in range(5)}
     found.clear()
     stored[1:2, :, 20:21]  # an epipolar slice: one of eight chunks of each view, and the index
     assert len(found) == 5
-    assert all(size < file / 8 * 1.2 + 16 * 8 + 4 for size in found.values())
+    index = 16 * 8 + 4
+    assert all(size < file / 8 * 1.2 + index for size in found.values())
+    monkeypatch.undo()
+    found = bytes_read(monkeypatch, tiled.path)
+    part = tiled[1:2, 1:2, 40:42, 12:18]  # within one of 8×4 chunks
+    np.testing.assert_array_equal(part.values, values[1:2, 1:2, 40:42, 12:18])
+    (size,) = found.values()
+    assert size < file / 32 * 1.2 + 4 * index
+
+
+@pytest.mark.parametrize("kind", ["uint8", "uint16", "float16", "float32"])
+@pytest.mark.parametrize("packing", ["ours", "in tiles", "in tiles that go beyond", "the other way round", "else"])
+def test_pixels_are_those_that_zarr_reads(tmp_path, kind, packing):
+    """Any pixels of any view, by Zarr and by us; of chunks packed otherwise, too."""
+    random = np.random.default_rng(5)
+    values = (random.random((2, 3, 21, 17, 3)) * 250).astype(kind)
+    given = vcc.LightField.from_views(values, 1e-3, 1e-3)
+    stored = save_store(
+        given, tmp_path / "a.zarr", chunks={"in tiles": (7, 17), "ours": None}.get(packing, (4, 5))
+    )
+    if packing in ("the other way round", "else"):
+        group = zarr.open_group(stored.path, mode="r+")
+        packed = [zarr.codecs.BloscCodec(), zarr.codecs.Crc32cCodec()] if packing != "else" else "auto"
+        array = group.create_array(
+            "samples", shape=values.shape, chunks=(1, 1, 4, 5, 3), shards=(1, 1, 24, 20, 3), dtype=kind,
+            serializer=zarr.codecs.BytesCodec(endian="big"), compressors=packed, overwrite=True,
+            config={"write_empty_chunks": True},
+        )  # fmt: skip
+        array[:] = values
+        stored = open_store(stored.path)
+    assert (stored._chunked.kind is None) == (packing == "else")
+    for _ in range(10):
+        j, i = random.integers(2), random.integers(3)
+        (a, b), (c, d) = (np.sort(random.choice(size + 1, 2, replace=False)) for size in (21, 17))
+        found = stored.stored_view(j, i, a, b, (c, d))
+        assert found.dtype == kind
+        np.testing.assert_array_equal(found, stored.array[j, i, a:b, c:d])
+        np.testing.assert_array_equal(found, values[j, i, a:b, c:d])
+
+
+def test_bytes_that_rot_are_found_out(tmp_path):
+    """Those of chunks that are not needed are not looked at."""
+    values = np.random.default_rng(6).random((1, 1, 6, 8)).astype(np.float32)
+    stored = save_store(vcc.LightField.from_views(values, 1e-3, 1e-3), tmp_path / "a.zarr", chunks=(3, 4))
+    file = stored.view_file(0, 0)
+    whole = file.read_bytes()
+    refused = 0
+    for place in range(0, len(whole), 3):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << place % 8
+        file.write_bytes(damaged)
+        with pytest.raises(vcc.InputError, match="is damaged or cut off"):
+            stored.read()
+        try:
+            np.testing.assert_array_equal(stored[:, :, :2, :2].values, values[:, :, :2, :2])
+        except vcc.InputError:
+            refused += 1
+    # One chunk of four, and the index, which stands for all.
+    assert refused == pytest.approx((len(whole) / 4 + 3 / 4 * (4 * 16 + 4)) / 3, abs=2)
+    for size in range(0, len(whole), 7):
+        file.write_bytes(whole[:size])
+        with pytest.raises(vcc.InputError, match="is damaged or cut off"):
+            stored.read()
 
 
 def test_opening_is_quick(stored):

@@ -19,6 +19,9 @@ SUMS = 3
 """Sums of rasters that are there at a time: one for each eightfold number of blocks, 512 of them."""
 SHARES = 64
 """Blocks by footprints that there are for many to work on at once, at least where each is still worth it."""
+READING, VIEWS = 1 / 8, 3
+"""Share of the memory that views may take while several are read at once; and views that one is in memory as then:
+it is read, unpacked and converted before it has its place."""
 WORTH = 2**24
 """Bytes of samples from which on a block of its own is worth what it costs to ask for."""
 
@@ -90,6 +93,7 @@ class Need:
         times: how many times a block's samples are in memory.
         border: dark views along each axis of a block, those on both of its sides.
         raster: bytes of a block's raster, in double precision.
+        readers: how many views are read at a time.
     """
 
     fixed: int
@@ -97,6 +101,7 @@ class Need:
     times: float
     border: int
     raster: int
+    readers: int = 1
 
     @classmethod
     def of(cls, plan: Plan, grid: Grid, engine_memory: int, copies: bool) -> Need:
@@ -119,6 +124,15 @@ class Need:
     def with_sums(self) -> Need:
         """With what whoever runs blocks for others keeps beside: the results of blocks that are to be summed."""
         return replace(self, fixed=self.fixed + TOGETHER * self.raster)
+
+    def with_readers(self, threads: int, limit: float) -> Need:
+        """With views read by several threads, as many as a limit of bytes has room for."""
+        return replace(self, readers=max(min(threads, int(READING * limit / (VIEWS * self.view))), 1))
+
+    @property
+    def reading(self) -> float:
+        """Bytes that are taken while views are read."""
+        return VIEWS * self.view * self.readers
 
     @property
     def least_for_views(self) -> int:
@@ -144,8 +158,7 @@ def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
     high, wide = rows[1] - rows[0], columns[1] - columns[0]
     of = partial(Blocks, rows, columns, nt, ns)
     view, border = need.view, need.border
-    # A view is read, unpacked and converted before it has its place.
-    spare = max(limit - need.fixed - 3 * view, 0.0) / need.times
+    spare = max(limit - need.fixed - need.reading, 0.0) / need.times
     if spare >= view * high * wide:  # a single block has no neighbours and needs no border
         return of(high, wide, nt)
     rows_each = int(spare // (view * (wide + border))) - border
@@ -154,7 +167,7 @@ def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
     columns_each = int(spare // (view * (1 + border))) - border
     if columns_each >= 1:
         return of(1, min(columns_each, wide), nt)
-    pixel_row = view / nt * (3 + need.times * (1 + border) ** 2)
+    pixel_row = view / nt * (VIEWS + need.times * (1 + border) ** 2)
     pixel_rows_each = int(max(limit - need.fixed, 0.0) // pixel_row)
     if pixel_rows_each >= 1:
         return of(1, 1, min(pixel_rows_each, nt))
@@ -165,8 +178,8 @@ def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
     )
 
 
-def cut_for_many(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
-    """Blocks for many to work on at once: those of `cut`, or by footprints smaller ones, so that all have work.
+def cut_evenly(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
+    """Blocks to work on: those of `cut`, or by footprints smaller ones, so that many may have work at once.
 
     How many work does not count: the same blocks are the same picture, byte for byte. By rays blocks are as large
     as may be, since all rays are traced for each.
@@ -183,9 +196,9 @@ def cut_for_many(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
     if plan.by_rays:
         return cut(plan, grid, need, limit)
     views = int(plan.core.used_views(grid.shape).sum())
-    # What comes back of a block, its raster, is to be little beside it.
+    # What comes of a block, its raster, is to be little beside it.
     each = max(views * need.view / SHARES, WORTH, 8.0 * need.raster, need.view)
-    return cut(plan, grid, need, min(limit, need.fixed + 3 * need.view + need.times * each))
+    return cut(plan, grid, need, min(limit, need.fixed + need.reading + need.times * each))
 
 
 def _span(used: Any) -> tuple[int, int]:

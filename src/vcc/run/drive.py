@@ -32,7 +32,7 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
-from vcc.run.blocks import Blocks, Need, cut, cut_for_many
+from vcc.run.blocks import Blocks, Need, cut_evenly
 from vcc.run.executors import Tree, Work, crew, memory_of_task
 from vcc.run.sent import Carried, Sent
 
@@ -207,6 +207,7 @@ class Drive:
         self.radiance = self.unit / self.samples.grid.full_scale
         self.core = plan.core.scaled(self.radiance)
         self.runner = plan.core.by(self.engine)
+        self._kept: NDArray[Any] | None = None
 
     @classmethod
     def of_linear(cls, plan: Plan, samples: Samples, how: How, executor: Any = None) -> Drive:
@@ -249,6 +250,8 @@ class Drive:
         threads = self.threads if self.crew is None else self.sent.how.workers
         taken = self.engine.memory(self.plan.core, self.channels, threads)
         need = Need.of(self.plan, self.samples.grid, taken, self.engine.copies)
+        if self.plan.views_between is None:  # views made in between keep what they are made of
+            need = need.with_readers(threads, self.limit)
         return need if self.crew is None else need.with_sums()
 
     @cached_property
@@ -271,8 +274,7 @@ class Drive:
         """
         grid = self.samples.grid
         if not self.in_memory:
-            cut_up = cut if self.crew is None else cut_for_many
-            return cut_up(self.plan, grid, self.need, self.limit)
+            return cut_evenly(self.plan, grid, self.need, self.limit)
         copied = self.plan.core.border == 0 and any(operator.copies for operator in self.plan.before)
         return Blocks.by_column(grid) if copied else Blocks.one(grid)
 
@@ -441,13 +443,26 @@ class Drive:
             counted.add(self.used_in(block))
             return self.engine.prepared(self.plan.before, self.samples.read(block), self.threads)
         around = self.around(block)
-        room = np.zeros(self.plan.shape((*around.shape, *self.samples.grid.shape[4:])), dtype=self.kind)
+        room = self._room(self.plan.shape((*around.shape, *self.samples.grid.shape[4:])))
         (a, b), (c, d) = block.rows, block.columns
-        for j, i in zip(*np.nonzero(self.used[a:b, c:d]), strict=True):
-            row, column = a + int(j), c + int(i)
+
+        def put(place: tuple[int, int]) -> None:
+            row, column = a + place[0], c + place[1]
             room[row - around.rows[0], column - around.columns[0]] = self._view(row, column, block)
-            counted.add(1)
+
+        with Workers(self.need.readers) as pool:
+            for _ in pool.map(put, np.argwhere(self.used[a:b, c:d]).tolist()):
+                counted.add(1)
         return room
+
+    def _room(self, shape: tuple[int, ...]) -> NDArray[Any]:
+        """Zeros for a block: where the last had the same shape in its memory, as new memory takes long."""
+        if self._kept is None or self._kept.shape != shape:
+            self._kept = None
+            self._kept = np.zeros(shape, dtype=self.kind)
+        else:
+            self._kept.fill(0)
+        return self._kept
 
     def with_reach(self, block: Block) -> tuple[Block, tuple[int, int]]:
         """A block with the rows of pixels that operators before look at beside it; how many above and below."""
@@ -458,7 +473,8 @@ class Drive:
     def _view(self, row: int, column: int, block: Block) -> Any:
         """The samples of one view of a block, read with as many more rows of pixels as operators before reach."""
         one, (above, below) = self.with_reach(replace(block, rows=(row, row + 1), columns=(column, column + 1)))
-        view = self.engine.prepared(self.plan.before, self.samples.read(one), self.threads)[0, 0]
+        threads = self.threads if self.need.readers == 1 else 1  # others are at other views
+        view = self.engine.prepared(self.plan.before, self.samples.read(one), threads)[0, 0]
         return view[above : view.shape[0] - below] if above or below else view
 
     def _look_between(self, between: ViewsBetween) -> None:

@@ -99,21 +99,29 @@ class Lossy:
 Compression = Lossless | Lossy
 
 
-def chunk_rows(rows: int, row_bytes: int, wanted: int | None) -> int:
-    """Rows of pixels in an inner chunk: all chunks of a view nearly alike.
+Pixels = int | tuple[int, int]
+"""How many pixels are packed together: rows of them, or (rows, columns)."""
+
+
+def chunk_pixels(view: tuple[int, ...], bytes_each: int, wanted: Pixels | None) -> tuple[int, int]:
+    """(rows, columns) of pixels in an inner chunk.
 
     Args:
-        rows: of a view.
-        row_bytes: bytes of a row.
-        wanted: how many were asked for; None chooses by `CHUNK_BYTES`.
+        view: (rows, columns[, channels]) of a view.
+        bytes_each: bytes of a number.
+        wanted: what was asked for; None takes whole rows, all chunks of a view nearly alike, by `CHUNK_BYTES`.
 
     Raises:
         InputError: a number below 1.
     """
-    if wanted is not None:
-        checks.whole_number_between("chunks", wanted, 1, of="rows of pixels that are packed together")
-    target = min(max(CHUNK_BYTES // row_bytes, 8) if wanted is None else wanted, rows)
-    return target if wanted is not None else math.ceil(rows / math.ceil(rows / target))
+    rows, columns = view[:2]
+    if wanted is None:
+        target = min(max(CHUNK_BYTES // (math.prod(view[1:]) * bytes_each), 8), rows)
+        return math.ceil(rows / math.ceil(rows / target)), columns
+    down, across = wanted if isinstance(wanted, tuple) else (wanted, columns)
+    checks.whole_number_between("chunks", down, 1, of="rows of pixels that are packed together")
+    checks.whole_number_between("chunks", across, 1, of="columns of pixels that are packed together")
+    return min(down, rows), min(across, columns)
 
 
 def know_pictures() -> None:
@@ -122,12 +130,11 @@ def know_pictures() -> None:
 
 
 def layout(
-    shape: tuple[int, ...], kind: np.dtype[Any], compression: Compression, chunks: int | None
+    shape: tuple[int, ...], kind: np.dtype[Any], compression: Compression, chunks: Pixels | None
 ) -> dict[str, Any]:
     """How an array of this shape is cut and packed, as arguments of `zarr.Group.create_array`."""
     from zarr.codecs import BloscCodec, Crc32cCodec
 
-    rows = shape[2]
     if isinstance(compression, Lossy):
         if chunks is not None:
             raise InputError("chunks is for lossless compression: a picture is packed as a whole")
@@ -135,7 +142,8 @@ def layout(
         know_pictures()
         codec = {"name": PICTURES, "configuration": asdict(compression)}
         return {"chunks": view, "chunk_key_encoding": FLAT, "serializer": codec, "compressors": [Crc32cCodec()]}
-    inner = chunk_rows(rows, math.prod(shape[3:]) * kind.itemsize, chunks)
+    inner = chunk_pixels(shape[2:], kind.itemsize, chunks)
+    whole = (math.ceil(size / part) * part for size, part in zip(shape[2:4], inner, strict=True))
     blosc = BloscCodec(
         cname=compression.codec,
         clevel=compression.level,
@@ -143,8 +151,8 @@ def layout(
         typesize=kind.itemsize,
     )
     return {
-        "chunks": (1, 1, inner, *shape[3:]),
-        "shards": (1, 1, math.ceil(rows / inner) * inner, *shape[3:]),
+        "chunks": (1, 1, *inner, *shape[4:]),
+        "shards": (1, 1, *whole, *shape[4:]),
         "chunk_key_encoding": FLAT,
         "compressors": [blosc, Crc32cCodec()],  # packed bytes that rot are found out
     }

@@ -20,7 +20,7 @@ from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
 from vcc.files.transfer import decode, encode
 from vcc.store.attributes import DTYPES, Transfer
-from vcc.store.compression import Compression
+from vcc.store.compression import Compression, Pixels
 from vcc.store.reading import StoredLightField
 from vcc.store.writing import write_views
 
@@ -34,7 +34,7 @@ def convert(
     transfer: Transfer = "linear",
     dtype: DTypeLike | None = None,
     provenance: dict[str, Any] | None = None,
-    chunks: int | None = None,
+    chunks: Pixels | None = None,
     compression: Compression | None = None,
     overwrite: bool = False,
     progress: Progress | None = None,

@@ -40,6 +40,7 @@ from vcc.files.transfer import decode
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer, same
+from vcc.store.chunks import Chunked, Range, sharding
 from vcc.store.compression import know_pictures
 from vcc.store.disparity_maps import keep_maps, read_maps
 from vcc.store.video_layout import VIDEO, places
@@ -50,8 +51,6 @@ MEASURED_REACH = 3
 """How many views on either side of the middle one disparities are measured from; see `vcc.fields.parallax`."""
 MOST_VIEWS = 2**18
 """Of a store: which of them are there is looked up one by one, and metadata may state any number."""
-NOT_THERE = 2**64 - 1
-"""How the index of a Zarr shard says that a chunk was never written."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -225,14 +224,19 @@ class StoredLightField(OnGrid):
         place = (row, column) + (0,) * (len(self.shape) - 2)
         return self.path / ARRAY / str(self.array.metadata.encode_chunk_key(place))
 
-    def linear_view(self, row: int, column: int, first: int, stop: int) -> NDArray[Any]:
+    def linear_view(
+        self, row: int, column: int, first: int, stop: int, columns: Range | None = None
+    ) -> NDArray[Any]:
         """Rows of pixels of one view as they are stored, or linear float32 of sRGB codes.
+
+        Only the chunks of its file that hold them are read.
 
         Args:
             row: of views.
             column: of views.
             first: row of pixels.
             stop: the row of pixels after the last.
+            columns: the first column of pixels and the one after the last; None for all.
 
         Returns:
             Shape (rows, columns[, channels]).
@@ -240,10 +244,12 @@ class StoredLightField(OnGrid):
         Raises:
             InputError: the view is missing, its file is damaged or cut off, or it holds what is no radiance.
         """
-        samples = self.stored_view(row, column, first, stop)
+        samples = self.stored_view(row, column, first, stop, columns)
         return decode(samples) if self.transfer == "srgb" else samples
 
-    def stored_view(self, row: int, column: int, first: int, stop: int) -> NDArray[Any]:
+    def stored_view(
+        self, row: int, column: int, first: int, stop: int, columns: Range | None = None
+    ) -> NDArray[Any]:
         """As `linear_view`, always as stored."""
         file = self.view_file(row, column)
         if not file.is_file():
@@ -252,8 +258,7 @@ class StoredLightField(OnGrid):
                 + ("Copy or make the store again" if self.complete else self._count_words(self.missing()))
             )
         try:
-            self._check_index(file)
-            samples = np.asarray(self.array[row, column, first:stop])
+            samples = self._unpacked(row, column, (first, stop), columns or (0, self.shape[3]))
         except MemoryError as error:
             raise InputError(
                 f"view ({row}, {column}) of {self.path} takes {self.view_bytes / 1e9:.1f} GB of memory, more than "
@@ -271,25 +276,19 @@ class StoredLightField(OnGrid):
             )
         return samples
 
-    def _check_index(self, file: Path) -> None:
-        """Refuse a file of which a chunk was never written, before Zarr makes room for it and reads zeros there.
+    @cached_property
+    def _chunked(self) -> Chunked | None:
+        """How the files of views are cut into chunks."""
+        return Chunked.of(self.array)
 
-        Raises:
-            ValueError: what is wrong.
-        """
-        if self.array.shards is None:
-            return
-        chunks = math.prod(math.ceil(s / c) for s, c in zip(self.array.shards, self.array.chunks, strict=True))
-        size, index_size = file.stat().st_size, 16 * chunks + 4
-        if size < index_size:
-            raise ValueError(f"it has {size:,} bytes, and the index of its chunks alone {index_size:,}")
-        at_end = _sharding(self.array).get("index_location", "end") == "end"
-        with file.open("rb") as stream:
-            stream.seek(size - index_size if at_end else 0)
-            index = np.frombuffer(stream.read(index_size)[: 16 * chunks], dtype="<u8").reshape(chunks, 2)
-        absent = int((index[:, 0] == NOT_THERE).sum())
-        if absent:
-            raise ValueError(f"{absent} of its {chunks} chunks were never written")
+    def _unpacked(self, row: int, column: int, rows: Range, columns: Range) -> NDArray[Any]:
+        """Pixels of a view, by Zarr where nobody else knows how they are packed."""
+        file = self.view_file(row, column)
+        if self._chunked is not None and self._chunked.kind is not None:
+            return self._chunked.read(file, rows, columns)
+        if self._chunked is not None:
+            self._chunked.index(file)
+        return np.asarray(self.array[row, column, slice(*rows), slice(*columns)])
 
     def _count_words(self, missing: list[tuple[int, int]]) -> str:
         """What is missing, in words."""
@@ -308,14 +307,12 @@ class StoredLightField(OnGrid):
 
     def _samples(self, ranges: tuple[range, ...], progress: Progress | None = None) -> NDArray[Any]:
         """The samples at these indices along each axis, read now."""
-        rows, columns, pixel_rows, *rest = ranges
-        low, high = min(pixel_rows[0], pixel_rows[-1]), max(pixel_rows[0], pixel_rows[-1]) + 1
-        within = (
-            as_slice(range(pixel_rows.start - low, pixel_rows.stop - low, pixel_rows.step)),
-            *map(as_slice, rest),
-        )
-        channels = self.shape[4:] if len(rest) == 1 else (len(rest[1]),)
-        shape = (len(rows), len(columns), len(pixel_rows), len(rest[0]), *channels)
+        rows, columns, *pixels = ranges
+        down, of_rows = _spanned(pixels[0])
+        across, of_columns = _spanned(pixels[1])
+        within = (of_rows, of_columns, *map(as_slice, pixels[2:]))
+        channels = self.shape[4:] if len(pixels) == 2 else (len(pixels[2]),)
+        shape = (len(rows), len(columns), len(pixels[0]), len(pixels[1]), *channels)
         try:
             values: NDArray[Any] = np.empty(shape, self.read_dtype)
         except MemoryError:
@@ -326,7 +323,7 @@ class StoredLightField(OnGrid):
             ) from None
         total = len(rows) * len(columns)
         for done, (j, i) in enumerate(np.ndindex(len(rows), len(columns)), start=1):
-            values[j, i] = self.linear_view(rows[j], columns[i], low, high)[within]
+            values[j, i] = self.linear_view(rows[j], columns[i], down[0], down[1], across)[within]
             tell(progress, done, total)
         return values
 
@@ -372,6 +369,12 @@ class StoredLightField(OnGrid):
             f"{SAMPLES_IN_WORDS[self.sample]}, "
             f"{self.grid.geometry}{state})"
         )
+
+
+def _spanned(along: range) -> tuple[Range, slice]:
+    """The first and the one after the last of some indices, and what takes them from what lies between."""
+    first, stop = min(along[0], along[-1]), max(along[0], along[-1]) + 1
+    return (first, stop), as_slice(range(along.start - first, along.stop - first, along.step))
 
 
 def open_store(path: str | PathLike[str]) -> StoredLightField:
@@ -437,7 +440,7 @@ def _check_array(folder: Path, array: Any, attributes: Attributes) -> None:
             f"shards of {file}"
         )
     if array.shards is not None:
-        index = [codec.get("name") for codec in _sharding(array).get("index_codecs", [])]
+        index = [codec.get("name") for codec in sharding(array).get("index_codecs", [])]
         if index != ["bytes", "crc32c"]:
             raise InputError(f"{where}: index_codecs of the shards are bytes and crc32c, not {index}")
 
@@ -521,11 +524,3 @@ def _choice(folder: Path) -> str:
         f"take one of its frames, {folder / first.name} ({first.time:g} s) to {last.name} ({last.time:g} s); "
         "vcc.store.open_video opens all"
     )
-
-
-def _sharding(array: Any) -> dict[str, Any]:
-    """The configuration of an array's sharding codec; empty for none."""
-    for codec in array.metadata.to_dict()["codecs"]:
-        if codec["name"] == "sharding_indexed":
-            return dict(codec["configuration"])
-    return {}

@@ -31,7 +31,7 @@ from vcc.files.atomic import refusal
 from vcc.files.parts import clear_leftovers, part_of, put_in_place
 from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, SETTINGS, Attributes, Transfer, difference, plain, same
-from vcc.store.compression import Compression, Lossless, Lossy, layout
+from vcc.store.compression import Compression, Lossless, Lossy, Pixels, layout
 from vcc.store.disparity_maps import keep_maps
 from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata, restored
 
@@ -200,7 +200,7 @@ def create_store(
     channel_names: tuple[str, ...] | None = None,
     disparity_range: tuple[float, float] | None = None,
     sample: Sample = "mean",
-    chunks: int | None = None,
+    chunks: Pixels | None = None,
     compression: Compression | None = None,
 ) -> StoreWriter:
     """A store to write views to: a new one, or one of the same description that is gone on with.
@@ -216,7 +216,8 @@ def create_store(
         channel_names: one for each channel.
         disparity_range: (lowest, highest), pixels per view along u, where known.
         sample: ``"mean"`` over a pixel or ``"point"``, see `vcc.LightField`.
-        chunks: rows of pixels that are packed together; None takes what is about 128 KiB.
+        chunks: rows of pixels that are packed together, or (rows, columns) of them: cameras and parts that need
+            few pixels of each view read the chunks that hold them. None takes rows of about 128 KiB.
         compression: `Lossless` or `Lossy`; None is ``Lossless()``.
 
     Returns:
@@ -239,7 +240,7 @@ def create_store(
         "channel_names": None if channel_names is None else list(channel_names),
         "disparity_range": None if disparity_range is None else list(disparity_range),
         "compression": packing.words,
-        "chunks": chunks,
+        "chunks": list(chunks) if isinstance(chunks, tuple) else chunks,
         "sample": sample,
     }
     made = None if description is None else {"maker": description, SETTINGS: settings}
@@ -279,7 +280,7 @@ def save_store(
     provenance: dict[str, Any] | None = None,
     transfer: Transfer = "linear",
     channel_names: tuple[str, ...] | None = None,
-    chunks: int | None = None,
+    chunks: Pixels | None = None,
     compression: Compression | None = None,
     overwrite: bool = False,
     progress: Progress | None = None,
@@ -430,7 +431,7 @@ def _make(
     shape: tuple[int, ...],
     kind: np.dtype[Any],
     packing: Compression,
-    chunks: int | None,
+    chunks: Pixels | None,
 ) -> None:
     """Make the group and its array under a temporary name and rename it: a store is there or it is not."""
     import zarr
