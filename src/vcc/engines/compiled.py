@@ -49,11 +49,17 @@ def read_as(kind: np.dtype[Any]) -> np.dtype[Any]:
     return kind if kind in SAMPLES else np.dtype(np.float32)
 
 
-def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """What makes a function a compiled one, with `numba.njit`'s options; it is compiled when first called."""
+def compiled(borrowing: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """What makes a function a compiled one, with `numba.njit`'s options; it is compiled when first called.
+
+    Args:
+        borrowing: it makes no arrays, and counts no references to those that its callers hold. Functions that were
+            given tuples of arrays for each pixel spent half of their time counting, in all threads by turns.
+        options: of `numba.njit`.
+    """
 
     def made(function: Callable[..., Any]) -> Any:
-        dispatcher = njit(nogil=True, error_model="numpy", **options)(function)
+        dispatcher = njit(nogil=True, error_model="numpy", _nrt=not borrowing, **options)(function)
         dispatcher._cache = _Kept(function)  # as dispatcher.enable_caching() does
         return dispatcher
 

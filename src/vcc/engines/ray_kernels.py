@@ -24,8 +24,9 @@ PACKET = 256
 DIGITS_ABOVE, DIGITS_BELOW = np.float32(2.0**DIGITS), 2.0**-DIGITS
 """What takes a point to its digits as a whole number, and back."""
 
-_compiled = compiled(fastmath={"contract", "nsz"})
-_inlined = compiled(fastmath={"contract", "nsz"}, inline="always")
+_compiled = compiled(borrowing=True, fastmath={"contract", "nsz"})
+_inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
+_allocating = compiled(fastmath={"contract", "nsz"})
 
 
 @_compiled
@@ -275,7 +276,6 @@ def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-de
     values, (nv, nu, nt, ns), channels = samples
     x, y, s, t, share = rays
     to_indices(index_from_ray, rays, n)
-    flat = sums.reshape(-1)
     # Where x and y do not mix, the pixels looked at in four views are two columns and two rows.
     parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
     vectors = parted and (channels == 1 or channels == 3 or channels == 4)
@@ -334,11 +334,11 @@ def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-de
                 columns = one - fi - left_1, left_1, fi - right_1, right_1
                 at = half * sums.shape[1]
                 if channels == 3:
-                    add_views_of_3(values, corners, line, rows, columns, flat, at)
+                    add_views_of_3(values, corners, line, rows, columns, sums, at)
                 elif channels == 1:
-                    add_views_of_1(values, corners, line, rows, columns, flat, at)
+                    add_views_of_1(values, corners, line, rows, columns, sums, at)
                 else:
-                    add_views_of_4(values, corners, line, rows, columns, flat, at)
+                    add_views_of_4(values, corners, line, rows, columns, sums, at)
                 continue
         for dj in range(2):
             wj = weight * (fj if dj else 1.0 - fj)
@@ -545,7 +545,7 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
         share[p] = weight * wide * tall
 
 
-@_inlined
+@_allocating
 def room():  # type: ignore[no-untyped-def]
     """Where rays are traced: (rays, near, images, flipped); see `cells_at` and `turn_to`."""
     rays = Packet(np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET))
@@ -581,7 +581,7 @@ def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ign
         flipped[n] = hashed(number, seed + 1 + n) >> np.uint32(32 - DIGITS)
 
 
-@_compiled
+@_allocating
 def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type: ignore[no-untyped-def]
     """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
 
@@ -591,19 +591,29 @@ def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type:
     Returns:
         (3,): weights of all rays, of missing rays, how many rays.
     """
+    lanes = max(field.samples.channels, LANES)
+    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(3)
+    add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, room(), sums)
+    return sums[2]
+
+
+@_compiled
+def add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
+    """As `add_tile`, within what `room` gives.
+
+    ``sums``: of a packet, in single precision, and of a pixel, (2, lanes) each; and the tally, (3,).
+    """
     table, samples, beside, seed = points
     cells = aim.cells
     blocks = table.shape[1] // samples
     channels = field.samples.channels
-    tally = np.zeros(3)
-    rays, near, images, flipped = room()
+    rays, near, images, flipped = within
     share = rays.share
-    sums = np.zeros((2, max(channels, LANES)), dtype=np.float32)
-    totals = np.zeros(sums.shape)
+    sums, totals, tally = sums
     for row in range(tile.first_row, min(tile.end_row, sensor.rows)):
         for column in range(tile.first_column, min(tile.end_column, sensor.columns)):
             if ended[0]:
-                return tally
+                return
             pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
             first = ((np.int64(hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
             totals[:] = 0
@@ -634,4 +644,3 @@ def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type:
                 one, two = totals[0, channel] * field.scale / samples, totals[1, channel] * field.scale / samples
                 pictures[0, row, column, channel] = one + two
                 pictures[1, row, column, channel] = 2 * (one - two)
-    return tally

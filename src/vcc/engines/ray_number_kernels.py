@@ -36,8 +36,9 @@ from vcc.engines.ray_kernels import (
 )
 from vcc.engines.ray_tables import Drawn, Packet, Steps
 
-_compiled = compiled(fastmath={"contract", "nsz", "reassoc"})
-_inlined = compiled(fastmath={"contract", "nsz", "reassoc"}, inline="always")
+_compiled = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
+_inlined = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"}, inline="always")
+_allocating = compiled(fastmath={"contract", "nsz", "reassoc"})
 
 
 @_inlined
@@ -590,19 +591,25 @@ def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, to
         pixel_back(drawn, place, bar, told.sensor)
 
 
-@_compiled
+@_allocating
 def numbers_of_tiles(field, sensor, points, aim, steps, weights, ended, told, tiles):  # type: ignore[no-untyped-def]
     """What the pixels of tiles say of all numbers, added to ``told``; what is given: `vcc.engines.ray_tables`.
 
     ``weights``: (rows, columns, channels), of the picture. ``tiles``: (tiles, 4). Once ``ended[0]`` is true,
     nobody wants them, and the kernel returns.
     """
-    table, samples, beside, seed = points
-    cells, blocks = aim.cells, table.shape[1] // samples
-    _, near, images, flipped = room()
     kept = np.empty((len(steps.codes) + 2, 5, PACKET))
     ways = kept, np.empty(PACKET), np.empty((5, PACKET)), np.empty((2, PACKET)), np.empty((2, 4))
-    at_sensor = packet_of(kept[0])
+    numbers_within(field, sensor, points, aim, steps, weights, ended, told, tiles, room(), ways)
+
+
+@_compiled
+def numbers_within(field, sensor, points, aim, steps, weights, ended, told, tiles, within, ways):  # type: ignore[no-untyped-def]
+    """As `numbers_of_tiles`, within what `vcc.engines.ray_kernels.room` gives, and the ways of `packet_back`."""
+    table, samples, beside, seed = points
+    cells, blocks = aim.cells, table.shape[1] // samples
+    _, near, images, flipped = within
+    at_sensor = packet_of(ways[0][0])
     for tile in range(len(tiles)):
         for row in range(tiles[tile, 0], min(tiles[tile, 1], sensor.rows)):
             for column in range(tiles[tile, 2], min(tiles[tile, 3], sensor.columns)):

@@ -28,8 +28,9 @@ from vcc.engines.ray_kernels import (
 from vcc.engines.ray_tables import Drawn
 from vcc.engines.vector_scatter import spread_views_of_1, spread_views_of_3, spread_views_of_4
 
-_compiled = compiled(fastmath={"contract", "nsz"})
-_inlined = compiled(fastmath={"contract", "nsz"}, inline="always")
+_compiled = compiled(borrowing=True, fastmath={"contract", "nsz"})
+_inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
+_allocating = compiled(fastmath={"contract", "nsz"})
 
 
 @_inlined
@@ -82,7 +83,7 @@ def put_in_order(found, filled):  # type: ignore[no-untyped-def]
     begin[0] = 0
 
 
-@_compiled
+@_allocating
 def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # type: ignore[no-untyped-def]
     """Trace the pixels of a tile from its pixel ``start`` on, as long as there is room to keep what they meet.
 
@@ -90,10 +91,16 @@ def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # t
         The number, in the tile, of the first pixel that was not traced: as many as there are once all were. After
         ``ended[0]`` is true it means nothing.
     """
+    return find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, room())
+
+
+@_compiled
+def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, within):  # type: ignore[no-untyped-def]
+    """As `find_tile`, within what `vcc.engines.ray_kernels.room` gives."""
     table, samples, beside, seed = points
     cells = aim.cells
     blocks = table.shape[1] // samples
-    rays, near, images, flipped = room()
+    rays, near, images, flipped = within
     share = rays.share
     columns = min(tile.end_column, sensor.columns) - tile.first_column
     pixels = (min(tile.end_row, sensor.rows) - tile.first_row) * columns

@@ -40,8 +40,8 @@ def _add_views(channels: int) -> Any:
                 lower views.
             columns: (4,) float32, weights of the left and the right column of pixels in the left views, and in the
                 right views.
-            sums: flat float32.
-            at: where in ``sums`` the eight numbers stand.
+            sums: contiguous float32.
+            at: how many numbers of ``sums`` stand before the eight.
         """
         place, weights = types.int64, types.UniTuple(types.float32, 4)
         signature = types.void(values, types.UniTuple(place, 4), place, weights, weights, sums, place)

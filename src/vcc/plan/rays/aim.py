@@ -207,7 +207,11 @@ def settled(path: Path, everything: bool) -> Aimed:
     """The smallest aim, slack and all; see `vcc.plan.rays.strips.bounds`."""
     slack, before = Slack.none(path), math.inf
     for _ in range(ROUNDS):
-        _, slack = strayed(path, smallest(path, slack, everything))
+        aim = smallest(path, slack, everything)
+        regions, further = strayed(path, aim)
+        if further.same(slack):
+            return Aimed(aim, regions, slack, everything)  # another round would find the same
+        slack = further
         if abs(slack.size - before) <= SETTLED * before < math.inf:
             break
         if slack.size > UNBOUNDED:
@@ -241,20 +245,19 @@ def smallest(path: Path, slack: Slack, everything: bool) -> Aim:
         raise InputError("nothing bounds the rays of this camera: give a lens or a mask a size")
     best = min(found, key=lambda window: window.solid_angle)
     cells = cell_windows.cell_windows(path, slack.whole, everything)
-    return best if cells is None else _parted(path, best, cells)
+    return best if cells is None else _parted(path, best, *cells)
 
 
-def _parted(path: Path, whole: Window, cells: CellWindows) -> Aim:
+def _parted(path: Path, whole: Window, cells: CellWindows, seen: cell_windows.Seen) -> Aim:
     """The cells where that pays, else the window as a whole."""
-    by_cells = _solid_angle(path, cells)
-    if by_cells < WORTH_NARROWING * whole.solid_angle:
+    if seen.solid_angle < WORTH_NARROWING * whole.solid_angle:
         return cells
-    halvings = round(math.log2(max(cell_windows.cells_seen(cells, path.train.sensor), 1.0)))
+    halvings = round(math.log2(max(seen.cells, 1.0)))
     enough_rays = 2 ** (halvings + 1) <= path.samples
-    much_lost = WORTH_NARROWING * by_cells > whole.solid_angle
+    much_lost = WORTH_NARROWING * seen.solid_angle > whole.solid_angle
     return replace(cells, halvings=halvings) if enough_rays and not much_lost else whole
 
 
 def _solid_angle(path: Path, aim: Aim) -> float:
     """∫∫ ds dt over the aim."""
-    return aim.solid_angle if isinstance(aim, Window) else cell_windows.solid_angle(aim, path.train.sensor)
+    return aim.solid_angle if isinstance(aim, Window) else cell_windows.seen(aim, path.train.sensor).solid_angle

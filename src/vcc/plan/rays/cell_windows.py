@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,23 @@ PLACES, POINTS = 12, 12
 """Places a side of the sensor, and points across a cell, from which areas of windows are told."""
 
 
-def cell_windows(path: Path, slack: list[Array], everything: bool) -> CellWindows | None:
+@dataclass(frozen=True)
+class Seen:
+    """What light comes to a place on the sensor through cells' windows, the mean over some places.
+
+    Args:
+        solid_angle: ∫∫ ds dt through all windows.
+        cells: how many there are.
+    """
+
+    solid_angle: float
+    cells: float
+
+
+def cell_windows(path: Path, slack: list[Array], everything: bool) -> tuple[CellWindows, Seen] | None:
     """The cells of the array nearest to the sensor, where something beyond it bounds what they see.
+
+    And what comes through them.
 
     Args:
         path: from the sensor.
@@ -40,8 +55,9 @@ def cell_windows(path: Path, slack: list[Array], everything: bool) -> CellWindow
     leg = _array(path)
     if leg is None:
         return None
-    found = list(_towards(path, leg, _beyond(path, leg, slack, everything)))
-    return min(found, key=lambda windows: solid_angle(windows, path.train.sensor), default=None)
+    found = _towards(path, leg, _beyond(path, leg, slack, everything))
+    known = [(windows, seen(windows, path.train.sensor)) for windows in found]
+    return min(known, key=lambda each: each[1].solid_angle, default=None)
 
 
 def cell_windows_towards(
@@ -95,8 +111,9 @@ def _towards(path: Path, leg: Leg, beyond: list[Bound]) -> Iterator[CellWindows]
     assert isinstance(bending, CellDeflection)
     cells = replace(bending, lattice=_moved(bending.lattice, element.decentre))
     opening = _opening(leg.stage.faces.pattern, bending.lattice, path.decisions)
+    to_sensor = leg.from_sensor.inverse()
     for bound in beyond:
-        way = bound.from_sensor @ leg.from_sensor.inverse()
+        way = bound.from_sensor @ to_sensor
         sight = None if _mixed(way) else _sight(leg.from_sensor, way, bound.axes)
         if sight is None:
             continue
@@ -198,15 +215,11 @@ def _reach(cells: CellDeflection, opening: CellOpening, sight: Sight, stop: Stop
     )
 
 
-def solid_angle(windows: CellWindows, sensor: Sensor) -> float:
-    """∫∫ ds dt through all cells' windows, the mean over some places on the sensor."""
-    areas = _areas(windows, sensor).sum(axis=1).mean()
-    return float(areas / abs(np.prod(windows.sight.place_from_slope)))
-
-
-def cells_seen(windows: CellWindows, sensor: Sensor) -> float:
-    """Through how many cells light comes to a place on the sensor, the mean over some places."""
-    return float((_areas(windows, sensor) > 0).sum(axis=1).mean())
+def seen(windows: CellWindows, sensor: Sensor) -> Seen:
+    """What is seen through cells' windows."""
+    areas = _areas(windows, sensor)
+    solid_angle = areas.sum(axis=1).mean() / abs(np.prod(windows.sight.place_from_slope))
+    return Seen(float(solid_angle), float((areas > 0).sum(axis=1).mean()))
 
 
 def _areas(windows: CellWindows, sensor: Sensor) -> Array:

@@ -46,6 +46,11 @@ class Slack(Brief):
         """All of it in one number, metres and slopes summed: to see it settle or run away."""
         return sum(float(np.abs(part).sum()) for part in self.whole)
 
+    def same(self, other: Slack) -> bool:
+        """Whether all of it is what the other's is, to the last digit."""
+        mine, others = (*self.whole, *self.unknown), (*other.whole, *other.unknown)
+        return all(np.array_equal(one, another) for one, another in zip(mine, others, strict=True))
+
 
 def strayed(
     path: Path, aim: Aim, bends: Sequence[Slopes] | None = None
