@@ -101,4 +101,5 @@ FORMATS = {
     "mitsuba scene": Format(seeds.mitsuba_scene, "a.xml", readers.mitsuba),
     "obj mesh": Format(seeds.mesh, "a.obj", readers.mesh),
     "info": Format(seeds.views_csv, "", readers.info),
+    "info video": Format(seeds.light_field_video, "v.zarr", readers.info),
 }

@@ -51,6 +51,19 @@ def test_what_stands_still_is_the_picture_of_capture_to_the_last_bit(field):
 
 
 @COARSE
+def test_an_exposure_of_no_length_is_the_picture_of_its_moment(field):
+    moving = MovingCamera(CAMERA, {"sensor.z": lambda t: 52 * mm + t}, Steps([0], [0.25]))
+    moment = moving.capture(field, 0)
+    np.testing.assert_array_equal(moment.values, CAMERA.capture(field).values / 4)
+    video = LightFieldVideo([field, noise(3)], [0, 1 * ms])
+    between = MovingCamera(CAMERA).capture(video, 0, start=0.25 * ms).values
+    one, other = (CAMERA.capture(frame).values.astype(np.float64) for frame in video.frames)
+    np.testing.assert_allclose(between, 0.75 * one + 0.25 * other, rtol=1e-6)
+    with pytest.raises(vcc.InputError, match=r"0\.002 s is not within the video, from 0 s to 0\.001 s"):
+        MovingCamera(CAMERA).capture(video, 0, start=2 * ms)
+
+
+@COARSE
 def test_a_mask_that_switches_gives_the_mean_of_both_pictures(field):
     codes = [mura(5), Circle(6 * mm)]
     moving = MovingCamera(CAMERA, {"code.pattern": Steps([0, 5 * ms], codes)})
@@ -241,7 +254,7 @@ def test_a_camera_that_cannot_be_is_refused(courses, shutter, words):
 @pytest.mark.parametrize(
     ("moving", "exposure", "words"),
     [
-        (MovingCamera(CAMERA), 0, "exposure"),
+        (MovingCamera(CAMERA), -1 * ms, "exposure"),
         (MovingCamera(CAMERA, shutter=lambda t: 2.0), 1 * ms, "the shutter at"),
         (MovingCamera(CAMERA, {"sensor.shape": Steps([0, 1e-3], [(20, 24), (5, 5)])}), 2 * ms, "stay as many"),
         (MovingCamera(CAMERA, {"main.focal_length": lambda t: 50 * mm if t < 1 * ms else 0}), 2 * ms, "at 0.0"),

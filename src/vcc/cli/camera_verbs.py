@@ -7,10 +7,13 @@ from typing import Any, Literal
 from vcc.advice.explain import Explanation
 from vcc.base.progress import Progress
 from vcc.camera import Camera
+from vcc.cli.timing import Timing
 from vcc.fields.samples import Samples
 from vcc.image import Image
+from vcc.motion import MovingCamera
 from vcc.plan.how import How
 from vcc.recording import Recording
+from vcc.store import StoredVideo
 
 SAMPLES_WORTH_A_BAR = 3e8
 """Below this, a picture takes less than a second, and asking for progress would only slow it down."""
@@ -21,6 +24,15 @@ def captured(camera: Camera, field: Samples, how: How, progress: Progress, execu
     plan = camera.compile(field, how, progress=progress)
     long = field.whole() is None or plan.samples_touched * (field.grid.channels or 1) > SAMPLES_WORTH_A_BAR
     return camera.capture(field, how, plan=plan, executor=executor, progress=progress if long else None)
+
+
+def captured_over_time(
+    camera: Camera, video: StoredVideo, timing: Timing, how: How, progress: Progress, executor: Any = None
+) -> Image:
+    """The picture of a moment of a video, or what the sensor gathers of it over an exposure."""
+    start, length = timing.of(video)
+    moving = MovingCamera(camera)
+    return moving.capture(video, length, how, start=start, progress=progress, executor=executor)
 
 
 def exposed(

@@ -1,11 +1,13 @@
 """``vcc capture``: the picture that a camera records."""
 
 from vcc.camera_file import load_camera
-from vcc.cli.camera_verbs import captured
+from vcc.cli.camera_verbs import captured, captured_over_time
 from vcc.cli.console import check_output, progress, show
 from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, Factor, LightFieldFile, Making, Output, Reading
+from vcc.cli.timing import Timing
 from vcc.files.pictures import WRITE_ENDINGS
+from vcc.store import StoredVideo
 
 
 def capture(
@@ -16,6 +18,7 @@ def capture(
     output: Output,
     exposure: Factor = "auto",
     as_recorded: bool = False,
+    timing: Timing = Timing(),
     how: Making = Making(),
     executing: Executing = Executing(),
     reading: Reading = Reading(),
@@ -31,7 +34,11 @@ def capture(
     output = check_output(output, WRITE_ENDINGS)
     optics = load_camera(camera)
     executing.check(light_field)
-    field = reading.light_field(light_field)
+    timing.check(light_field)
+    field = reading.light(light_field)
     with executing.opened() as executor, progress("Capturing") as advance:
-        image = captured(optics, field, how, advance, executor)
+        if isinstance(field, StoredVideo):
+            image = captured_over_time(optics, field, timing, how, advance, executor)
+        else:
+            image = captured(optics, field, how, advance, executor)
     show(image.save(output, exposure=exposure, upright=not as_recorded).description)

@@ -17,14 +17,14 @@ from vcc.base.units import short
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
 from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, told
-from vcc.cli.store_words import store_facts
+from vcc.cli.store_words import store_facts, video_facts
 from vcc.cli.view_grid import Views, draw
 from vcc.fields.grid import SAMPLES_IN_WORDS, pair
 from vcc.formats import FolderInfo, keep_geometry, lytro_lfp, open_sparse_views, read_geometry
 from vcc.formats.dark_views import dark_words, mean_light
 from vcc.formats.lytro_lfp import read_lytro
 from vcc.light_field import LightField
-from vcc.store import is_store, open_store
+from vcc.store import is_store, is_video, open_store, open_video
 
 AS_STORED = Reading(transfer="as-is")
 _NAMED_AT_MOST = 12
@@ -77,6 +77,11 @@ def describe(
             if picture is not None:
                 raise InputError(f"{path} is a raw recording of a Lytro camera: it has no grid of views to draw")
             lines = _lytro_facts(path)
+        elif is_video(path):
+            video = open_video(path)
+            if picture is not None and video:
+                raise InputError(f"{path} is a video: draw the views of one frame, {video[0].path}")
+            lines = video_facts(video, quick)
         elif is_store(path):
             lines = _of_a_store(path, quick, picture)
         else:

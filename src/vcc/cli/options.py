@@ -23,7 +23,7 @@ from vcc.formats.tiles import Layout
 from vcc.formats.writing import Kind
 from vcc.light_field import LightField
 from vcc.plan.how import BetweenViews, EngineName, How, Interpolation, Method  # noqa: F401  # How's fields name them
-from vcc.store import StoredLightField, is_store, open_store
+from vcc.store import StoredLightField, StoredVideo, is_store, is_video, open_store, open_video
 
 MAKING = Group("Making the picture", sort_key=2)
 READING = Group("Reading the light field", sort_key=3)
@@ -289,18 +289,28 @@ class Reading(Arrangement, ViewCameras):
     transfer: Literal["auto", "srgb", "linear", "as-is"] = "auto"
     orientation: Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"] = "auto"
 
+    def light(self, path: Path) -> LightField | StoredLightField | StoredVideo:
+        """As `light_field`, and a video is opened, too."""
+        if not is_video(path):
+            return self.light_field(path)
+        self._check_nothing_told(path)
+        return open_video(path)
+
     def light_field(self, path: Path) -> LightField | StoredLightField:
         """The light field that is asked for, with a progress bar; a store is opened, not read.
 
         Raises:
-            InputError: what `vcc.open_light_field` refuses; a store and cameras told beside it.
+            InputError: what `vcc.open_light_field` refuses; a video; a store and cameras told beside it.
         """
         if is_store(path):
-            if names := told(self, but=("transfer",)):
-                raise InputError(f"{path} is a store, which states its cameras: leave out {', '.join(names)}")
+            self._check_nothing_told(path)
             return open_store(path)
         with progress("Reading views") as advance:
             return open_light_field(path, progress=advance, **self.given())
+
+    def _check_nothing_told(self, path: Path) -> None:
+        if names := told(self, but=("transfer",)):
+            raise InputError(f"{path} is a store, which states its cameras: leave out {', '.join(names)}")
 
     def in_memory(self, path: Path) -> LightField:
         """The light field that is asked for, all of it read."""

@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
+from vcc.base.showing import spread
 from vcc.base.units import short
 from vcc.fields.grid import SAMPLES_IN_WORDS
-from vcc.store import StoredLightField
+from vcc.store import StoredLightField, StoredVideo
+from vcc.store.video_layout import Between
+
+LOOKED_AT = 3
+"""Frames of which a video's size on the disk is told."""
+EVENLY = 1e-6
+"""How much of a gap between frames the others may differ by, and be told as evenly spaced."""
+BETWEEN_IN_WORDS: dict[Between, str] = {
+    "linear": "light of both, mixed by time (linear)",
+    "held": "light of the first, until the second (held)",
+}
+"""What there is between two frames, for people."""
 
 
 def store_facts(stored: StoredLightField, quick: bool) -> dict[str, str]:
@@ -48,6 +61,49 @@ def store_facts(stored: StoredLightField, quick: bool) -> dict[str, str]:
         if not isinstance(value, dict | list):
             lines[str(name).replace("_", " ")] = str(value)
     return lines
+
+
+def video_facts(video: StoredVideo, quick: bool) -> dict[str, str]:
+    """What a video states, by names.
+
+    Args:
+        video: the video.
+        quick: leave out what takes looking at views.
+    """
+    lines = {"format": "Zarr store of vcc, a video"}
+    if not video:
+        return lines | {"frames": "none yet"}
+    first, last = video[0], video.times[-1]
+    of_each = store_facts(first, quick=True)
+    nv, nu = first.shape[:2]
+    in_memory = len(video) * nv * nu * first.view_bytes
+    size = f"{in_memory / 1e6:,.1f} MB in memory, linear"
+    if not quick:
+        looked_at = [video[number] for number in spread(len(video), LOOKED_AT)]
+        packed = sum(frame.stored_bytes for frame in looked_at) / len(looked_at) * len(video)
+        size = f"{'about ' if len(video) > LOOKED_AT else ''}{packed / 1e6:,.1f} MB on disk, {size}"
+    lines |= {
+        "frames": f"{len(video)}, {short(video.times[0], 'time')} to {short(last, 'time')}{_apart(video.times)}",
+        "between frames": BETWEEN_IN_WORDS[video.between],
+        **{name: of_each[name] for name in ("views", "pictures", "samples")},
+        "size": size,
+        "cameras": of_each["cameras"],
+    }
+    for name, value in video.provenance.items():
+        if not isinstance(value, dict | list):
+            lines[str(name).replace("_", " ")] = str(value)
+    return lines | {"one frame": f"vcc info {first.path}"}
+
+
+def _apart(times: tuple[float, ...]) -> str:
+    """How far frames are apart, in words that follow others."""
+    if len(times) < 2:
+        return ""
+    gaps = [after - before for before, after in pairwise(times)]
+    least, most = min(gaps), max(gaps)
+    if most - least <= EVENLY * most:
+        return f", every {short((times[-1] - times[0]) / len(gaps), 'time')}"
+    return f", {short(least, 'time')} to {short(most, 'time')} apart"
 
 
 def written(made: StoredLightField, packing: str) -> str:

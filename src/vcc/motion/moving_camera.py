@@ -128,7 +128,7 @@ class MovingCamera(Brief):
 
         Args:
             light_field: one that stays, a video, or a function from seconds to a light field; all of one shape.
-            exposure: T, seconds.
+            exposure: T, seconds; 0 for the picture of the moment at which it begins.
             how: as in `vcc.Camera.capture`.
             start: when the exposure begins, in the time of the video or function, seconds.
             time_tolerance: refine until the estimated error of the mean over time, root mean square over the
@@ -148,16 +148,16 @@ class MovingCamera(Brief):
             ResultWarning: the tolerance was not reached; what `vcc.Camera.capture` warns of, once for each kind.
 
         Raises:
-            InputError: no exposure above 0, a video that does not last that long, a shutter that lets through less
+            InputError: an exposure below 0, a video that does not last that long, a shutter that lets through less
                 than 0 or more than 1; what the camera refuses at a time, or what `vcc.Camera.capture` refuses.
         """
-        length = checks.above_zero("exposure", exposure, unit="s")
+        length = checks.zero_or_more("exposure", exposure, unit="s")
         begun = checks.finite("start", start, "seconds")
         tolerance = checks.above_zero("time_tolerance", time_tolerance, "a share of the picture's mean")
         light = light_of(light_field)
         light.check_lasts(begun, begun + length)
         work = _Work(self, light, begun, How.of(how, options), executor)
-        return work.gathered(length, tolerance, progress)
+        return work.gathered(length, tolerance, progress) if length > 0 else work.at_once()
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,6 +237,12 @@ class _Work:
                 "for. Say at which times something jumps (vcc.motion.Steps, vcc.motion.Function(…, breaks=…))"
             )
         return self._image(total, error, passed)
+
+    def at_once(self) -> Image:
+        """Of the moment at which the exposure begins."""
+        found = next(self._moments([0.0]))
+        self._remarks.say(self._made, "moments")
+        return self._image(found, 0.0, self._moving.open_at(0.0))
 
     def _image(self, total: _Gathered, error: float, passed: float) -> Image:
         camera = self._moving.camera

@@ -65,6 +65,10 @@ class LightFieldVideo(Brief):
         """
         least = 1e-9 * (stop - start)  # rounding of sums of times
         if start < self.times[0] - least or stop > self.stop + least:
+            if start == stop:
+                raise InputError(
+                    f"{start:g} s is not within the video, from {self.times[0]:g} s to {self.stop:g} s"
+                )
             raise InputError(
                 f"the exposure goes from {start:g} s to {stop:g} s, and the video from {self.times[0]:g} s to "
                 f"{self.stop:g} s: choose another start, or a shorter exposure"

@@ -30,7 +30,7 @@ from vcc.files.atomic import atomic_path
 from vcc.files.parts import clear_folder, clear_leftovers, part_of, settle, settle_names
 from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import Transfer, plain
-from vcc.store.compression import Compression
+from vcc.store.compression import Compression, Pixels
 from vcc.store.converting import as_kept
 from vcc.store.reading import restored
 from vcc.store.video_layout import UNFINISHED, VIDEO, Between, Common, Place, VideoAttributes
@@ -45,7 +45,7 @@ class Packing(Brief):
     transfer: Transfer = "linear"
     dtype: np.dtype[Any] | None = None
     channel_names: tuple[str, ...] | None = None
-    chunks: int | None = None
+    chunks: Pixels | None = None
     compression: Compression | None = None
 
 
@@ -244,7 +244,7 @@ def create_video(
     dtype: DTypeLike | None = None,
     channel_names: tuple[str, ...] | None = None,
     provenance: dict[str, Any] | None = None,
-    chunks: int | None = None,
+    chunks: Pixels | None = None,
     compression: Compression | None = None,
 ) -> VideoWriter:
     """A video to append frames to: a new one, or one that is there and goes on.
