@@ -5,6 +5,7 @@ One cluster of two processes for all of them.
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import time
@@ -90,6 +91,8 @@ def test_a_cluster_makes_the_same_picture_though_a_worker_is_killed(client, stor
     found = camera.capture(stored, executor=client, progress=lambda *call: calls.append(call))
     assert found.values.tobytes() == here.values.tobytes()
     assert calls[-1] == (16, 16)
+    operator = camera.operator(stored)
+    assert operator.T(here.values, executor=client).tobytes() == operator.T(here.values).tobytes()
     before = set(client.nthreads())
     deadly = Deadly(stored, (3,), tmp_path)
     assert camera.capture(deadly, executor=client).values.tobytes() == here.values.tobytes()
@@ -179,6 +182,15 @@ def test_work_whose_scheduler_is_lost_ends_with_an_error_and_ctrl_c_cancels(ends
                 raise KeyboardInterrupt
             cluster.close()
 
+        async def never(data):
+            await asyncio.sleep(3600)
+
+        monkeypatch.setattr(executors, "SILENT", 0.2)
+        workers = crew(client)
+        with monkeypatch.context() as frozen:
+            frozen.setitem(cluster.scheduler.handlers, "echo", never)
+            with pytest.raises(vcc.InputError, match=r"has not answered for 0\.2 s: it is stopped"):
+                workers.summed(Work(pause, 0.5), [0], joined, told)
         expected, words = {
             "interrupt": (KeyboardInterrupt, None),
             "scheduler": (vcc.InputError, "connection to the Dask scheduler inproc.* was lost"),
@@ -211,6 +223,10 @@ def test_a_sweep_whose_scheduler_is_lost_says_what_is_kept_and_goes_on(stored, t
     assert vcc.sweeps.open_sweep(tmp_path / "a.zarr").done.sum() == 2
     whole, alone = vcc.sweep(*given, output=tmp_path / "a.zarr"), vcc.sweep(*given)
     np.testing.assert_allclose(whole.pictures, alone.pictures, rtol=0, atol=1e-6 * alone.pictures.max())
+
+
+def pause(seconds, item):
+    time.sleep(seconds)
 
 
 def sleep(_, item):

@@ -20,13 +20,17 @@ from functools import reduce
 import array_api_strict
 import numpy as np
 import pytest
+import zarr
 
 import vcc
+from tests.physics.random_cameras import KINDS, drawn
 from vcc.base.units import mm
 from vcc.plan.how import How
-from vcc.run import drive, sent
+from vcc.run import backwards, drive, sent
+from vcc.run.backwards import AHEAD
 from vcc.run.blocks import Blocks
 from vcc.run.executors import TOGETHER, Parcel, Pool, Tree, Work
+from vcc.run.operator import Operator
 from vcc.shapes.patterns import CosineSum
 from vcc.store import save_store
 
@@ -122,6 +126,7 @@ def in_blocks(monkeypatch):
         return Blocks(*spans, *grid.shape[2:4], -(-grid.shape[0] // 5), -(-grid.shape[1] // 3), grid.shape[2])
 
     monkeypatch.setattr(drive, "cut_evenly", cut)
+    monkeypatch.setattr(backwards, "cut_evenly", cut)
 
 
 # --- the picture ---
@@ -155,6 +160,7 @@ def test_processes_make_the_same_picture_and_one_that_dies_is_told(stored, in_bl
         assert sorted(calls) == calls
         picture = operator(samples, executor=pool)
         np.testing.assert_allclose(picture, operator(samples), rtol=0, atol=1e-6 * np.abs(picture).max())
+        np.testing.assert_array_equal(operator.T(picture, executor=pool), operator.T(picture))
         with pytest.raises(vcc.InputError, match=r"a process of the executor, ProcessPoolExecutor, ended before"):
             list(Pool(pool).each(Work(end_process, None), [0, 1]))
         with pytest.raises(vcc.InputError, match="ended before its work was done"):
@@ -180,6 +186,62 @@ def test_views_in_between_are_made_elsewhere_and_what_no_view_shows_is_told(in_b
     assert pictures[0] == pictures[1]
     assert told[0] == told[1]
     assert any("of the samples between views show what none" in words for words in told[0])
+
+
+# --- back ---
+
+
+@pytest.mark.parametrize("name", list(CAMERAS))
+def test_what_a_picture_says_of_samples_is_that_of_one_after_the_other(stored, in_blocks, tmp_path, name):
+    """Into memory, and into a Zarr array whose chunks are none of the blocks."""
+    camera, options = CAMERAS[name]
+    in_memory = stored.read()
+    plan = camera.compile(in_memory, **options)
+    given, elsewhere = (Operator(plan, each, How()) for each in (in_memory, stored))
+    picture = np.random.default_rng(3).standard_normal(given.picture_shape).astype(np.float32)
+    whole, here = given.T(picture), elsewhere.T(picture)
+    np.testing.assert_allclose(here, whole, rtol=0, atol=1e-6 * np.abs(whole).max())
+    calls = []
+    out = zarr.create_array(
+        tmp_path / "back.zarr", shape=given.samples_shape, chunks=(2, 3, 5, 7, 3), dtype="f4", fill_value=9
+    )
+    with Hostile(1) as executor:
+        np.testing.assert_array_equal(elsewhere.T(picture, executor=executor), here)
+        elsewhere.T(picture, out=out, executor=executor, progress=lambda *call: calls.append(call))
+        np.testing.assert_array_equal(given.T(picture[None], executor=executor)[0], here)
+    np.testing.assert_array_equal(out[:], here)
+    used = int(plan.core.used_views(SHAPE).sum())
+    assert sorted(calls) == calls
+    assert calls[-1] == (used, used)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_dot_products_of_random_cameras_by_an_executor(kind, in_blocks):
+    case = drawn(kind, 17, 10, 4)
+    operator = case.camera.operator(case.light_field)
+    random = np.random.default_rng(4)
+    samples = random.standard_normal(operator.samples_shape).astype(operator.dtype)
+    with ThreadPoolExecutor(2) as pool:
+        ahead = operator(samples)
+        picture = ahead + random.standard_normal(ahead.shape).astype(ahead.dtype) * np.abs(ahead).mean()
+        back = operator.T(picture, executor=pool)
+    product = float((ahead.astype(np.float64) * picture).sum())
+    assert abs(float((samples * back.astype(np.float64)).sum()) - product) <= 1e-6 * abs(product), case.described()
+
+
+def test_not_all_that_others_find_waits_here(stored, in_blocks):
+    """Samples may be more than memory: no more are made than are soon taken."""
+    operator = CAMERAS["fine mask"][0].operator(stored)
+    with Hostile(2) as executor:
+        pieces = operator.T.pieces(np.ones(operator.picture_shape, np.float32), executor=executor)
+        next(pieces)
+        time.sleep(0.05)
+        assert executor.done <= AHEAD < len(list(pieces))
+    with (
+        Hostile(3, dies_after=2) as executor,
+        pytest.raises(vcc.InputError, match="ended before its work was done"),
+    ):
+        operator.T(np.ones(operator.picture_shape, np.float32), executor=executor)
 
 
 # --- sums ---

@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import replace
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, groupby
 from typing import Any
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.fields.grid import Block
@@ -25,10 +27,15 @@ from vcc.fields.samples import Samples
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Gradient, Partial
-from vcc.run.blocks import Blocks, cut
+from vcc.run.blocks import Blocks, cut_evenly
 from vcc.run.drive import Counted, Drive
+from vcc.run.executors import Work
+from vcc.run.sent import Sent
 
 Array = NDArray[np.float64]
+
+AHEAD = 4
+"""Pieces that others make for each of their places before those that are there are taken."""
 
 
 def back(
@@ -192,7 +199,7 @@ class Backwards:
         need, each = drive.need, self._kind.itemsize / drive.kind.itemsize
         times = (need.times if self._reads else 0.0) + each * (3 if self.plan.before else 1)
         fixed = need.fixed + 8 * math.prod(self.plan.core.raster_shape) * drive.channels
-        return cut(self.opened, drive.samples.grid, replace(need, fixed=fixed, times=times), drive.limit)
+        return cut_evenly(self.opened, drive.samples.grid, replace(need, fixed=fixed, times=times), drive.limit)
 
     def _room(self) -> NDArray[Any] | None:
         """Where the derivative to samples is gathered; None where it comes as a whole."""
@@ -217,11 +224,41 @@ class Backwards:
             yield self._part(blocks[0], values, raster, samples, progress)
             return
         counted = Counted(progress, sum(map(drive.used_in, blocks)))
+        if drive.crew is not None:
+            yield from self._parts_by_others(raster, counted)
+            return
         for block in blocks:
             values = drive.values(block, counted) if self.of_core else None
             yield self._part(block, values, raster, samples)
             if values is None:
                 counted.add(drive.used_in(block))
+
+    def _parts_by_others(self, raster: Array, counted: Counted) -> Iterator[tuple[Block, Gradient]]:
+        """What each block says of its samples, in order; no more are there at a time than `AHEAD` says."""
+        drive, blocks = self.drive, self._blocks
+        assert drive.crew is not None
+        assert not self._reads, "others are asked about samples alone"
+        work, each = Work(_share_of, SentBack(drive.sent, raster), first=_begun), AHEAD * max(drive.crew.places, 1)
+        for start in range(0, len(blocks), each):
+            found = {}
+            for number, part in drive.crew.each(work, blocks[start : start + each]):
+                found[number] = part
+                counted.add(drive.used_in(blocks[start + number]))
+            work = replace(work, first=None)
+            yield from (found.pop(number) for number in sorted(found))
+
+    def begin(self) -> None:
+        """Go back to a row of pixels of a view, so that all code is compiled."""
+        backwards, drive = copy(self), copy(self.drive)
+        if self.plan.by_rays:
+            drive.core = replace(drive.core, raster_shape=(1, 1))
+        backwards.drive = drive
+        raster = np.zeros((*drive.core.raster_shape, drive.channels))
+        backwards.part(replace(self._blocks[0], pixel_rows=(0, 1)), raster)
+
+    def part(self, block: Block, raster: Array) -> tuple[Block, Gradient]:
+        """What weights of the raster say of a block's samples, and of which samples that is."""
+        return self._part(block, None, raster, True)
 
     def _gathered(self, parts: Iterator[tuple[Block, Gradient]]) -> tuple[Block, NDArray[Any]]:
         """The parts of some views as one."""
@@ -286,6 +323,34 @@ class Backwards:
                 engine, threads = self.drive.engine, self.drive.threads
                 weights = engine.prepared_back((operator,), weights, threads, written_over=True)
         return grown, Gradient(weights.astype(self._kind, copy=False) if samples else None, numbers)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SentBack(Brief):
+    """All that a block's way back needs but which block it is.
+
+    Args:
+        ahead: the plan, and the grid of samples that nobody looks at.
+        raster: weights of the raster, (rows, columns, channels).
+    """
+
+    ahead: Sent
+    raster: Array
+
+    @property
+    def backwards(self) -> Backwards:
+        """The plan on its way back, here."""
+        return Backwards(Drive.of_linear(self.ahead.plan, self.ahead.samples, self.ahead.how))
+
+
+def _share_of(sent: SentBack, block: Block) -> tuple[Block, Gradient]:
+    """What a block says, in another thread or process, or on another machine."""
+    return sent.backwards.part(block, sent.raster)
+
+
+def _begun(sent: SentBack, _: None) -> None:
+    """What whoever goes back does first."""
+    sent.backwards.begin()
 
 
 def _parted(name: str) -> tuple[str, int, str]:

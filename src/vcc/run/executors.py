@@ -37,6 +37,8 @@ LOOK = 1.0
 """Seconds after which somebody looks whether a crew that says nothing is still there."""
 LEAST_ROOM = 2**26
 """Bytes for a task without which nobody need begin."""
+SILENT = 60.0
+"""Seconds within which a scheduler answers that is asked whether it is there; one that is frozen never does."""
 TAKEN, LIBRARIES = 0.7, 4e8
 """Of a Dask worker's memory, the share that it may take before it spills to disk; and bytes that Python, its
 libraries and compiled code take of that."""
@@ -358,13 +360,12 @@ class Cluster:
     """
 
     def __init__(self, client: Any) -> None:
-        self._client = client
+        self._client, self._silent = client, False
         if client.asynchronous:
             raise InputError(
                 "executor is a Dask client made with asynchronous=True: pass distributed.Client(address)"
             )
-        if client.status != "running":
-            raise self._lost()
+        self._look()
 
     @property
     def places(self) -> int:
@@ -489,13 +490,23 @@ class Cluster:
             raise
 
     def _look(self) -> None:
-        """See whether the scheduler is still there.
+        """See whether the scheduler is still there, by asking it.
 
         Raises:
-            InputError: it is not.
+            InputError: it is not, or does not answer.
         """
         if self._client.status != "running":
             raise self._lost()
+        try:
+            self._client.sync(self._client.scheduler.echo, data=None, callback_timeout=SILENT)
+        except TimeoutError as error:
+            self._silent = True
+            raise InputError(
+                f"the Dask scheduler {self._address} has not answered for {SILENT:g} s: it is stopped, or far too "
+                "busy. See to it, or start another; then start again"
+            ) from error
+        except OSError as error:
+            raise self._lost() from error
 
     def _lost(self) -> InputError:
         return InputError(
@@ -511,5 +522,5 @@ class Cluster:
     def _cancel(self, futures: Sequence[Any]) -> None:
         """End what is not done, where there is anybody to be told."""
         waiting = [future for future in futures if future is not None and not future.done()]
-        if waiting and self._client.status == "running":
+        if waiting and self._client.status == "running" and not self._silent:
             self._client.cancel(waiting)

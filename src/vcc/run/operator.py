@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from vcc.base import late
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
+from vcc.fields.disparity import Disparities
 from vcc.fields.grid import Block, Grid
 from vcc.fields.samples import InMemory, Samples
 from vcc.plan.how import How
@@ -170,11 +171,11 @@ class Operator:
         picture: NDArray[Any] = drive.picture(drive.rounds(progress))
         return picture
 
-    def _backwards(self) -> Backwards:
-        """The way back to samples that nobody looks at: of stored ones in blocks, as they are read."""
-        grid = replace(self.light_field.grid, kind=self.dtype)
-        if self.light_field.whole() is None:
-            return Backwards(self._drive(_Unread(grid)))
+    def _backwards(self, executor: Any = None) -> Backwards:
+        """The way back to samples that nobody looks at: of stored ones, and by others, in blocks."""
+        grid = replace(self.light_field.grid, kind=self.dtype, disparities=Disparities())
+        if executor is not None or self.light_field.whole() is None:
+            return Backwards(self._drive(_Unread(grid), executor))
         return Backwards(self._drive(InMemory.of(np.broadcast_to(np.zeros((), self.dtype), grid.shape), grid)))
 
     def _checked(self, what: str, given: Any, shape: tuple[int, ...]) -> NDArray[Any]:
@@ -211,13 +212,17 @@ class Adjoint:
 
     T: Operator
 
-    def __call__(self, picture: Any, *, out: Slots | None = None, progress: Progress | None = None) -> Any:
+    def __call__(
+        self, picture: Any, *, out: Slots | None = None, executor: Any = None, progress: Progress | None = None
+    ) -> Any:
         """The samples Aᵀ · picture.
 
         Args:
             picture: floating-point numbers of ``op.picture_shape``, or several pictures, (n, …).
             out: where to put the samples of one picture, an array of ``op.samples_shape`` (of NumPy, mapped from
                 disk, of Zarr), piece by piece: there need be no room for them in memory; None makes an array.
+            executor: who goes back to blocks of views, as in `vcc.Camera.capture`. What they find comes here, a
+                few blocks at a time, and is put into ``out`` here: others need not reach it.
             progress: called with (done, total), for each picture anew.
 
         Returns:
@@ -225,25 +230,27 @@ class Adjoint:
 
         Raises:
             InputError: a picture of another shape, of another type than floating point, or not finite; of a light
-                field on disk, samples that take more than the memory limit.
+                field on disk, samples that take more than the memory limit; what an executor does not take, or one
+                that dies.
         """
         checked = self.T._checked("pictures", picture, self.T.picture_shape)
         if out is not None:
-            return self._into(out, checked, progress)
-        return _each(
-            checked, self.T.picture_shape, lambda one: self.T._backwards().gradient(one, progress=progress).samples
-        )
+            return self._into(out, checked, executor, progress)
+        return _each(checked, self.T.picture_shape, lambda one: self._samples(one, executor, progress))
 
     @property
     def shape(self) -> tuple[int, int]:
         """As of a matrix: (samples, values of the picture)."""
         return self.T.shape[::-1]
 
-    def pieces(self, picture: Any, *, progress: Progress | None = None) -> Iterator[tuple[Block, NDArray[Any]]]:
+    def pieces(
+        self, picture: Any, *, executor: Any = None, progress: Progress | None = None
+    ) -> Iterator[tuple[Block, NDArray[Any]]]:
         """The samples Aᵀ · picture in pieces that are in memory one at a time.
 
         Args:
             picture: of ``op.picture_shape``.
+            executor: see the call.
             progress: called with (done, total).
 
         Yields:
@@ -253,16 +260,22 @@ class Adjoint:
             InputError: see the call.
         """
         checked = self.T._checked("pictures", picture, self.T.picture_shape)
-        return self.T._backwards().pieces(checked, progress)
+        return self.T._backwards(executor).pieces(checked, progress)
 
     def __repr__(self) -> str:
         return f"{self.T!r}.T"
 
-    def _into(self, out: Slots, picture: NDArray[Any], progress: Progress | None) -> Slots:
+    def _samples(self, picture: NDArray[Any], executor: Any, progress: Progress | None) -> Any:
+        if executor is not None and self.T.light_field.whole() is not None:  # where there is room for as many
+            made = np.empty(self.T.samples_shape, self.T.dtype)
+            return self._into(made, picture, executor, progress)
+        return self.T._backwards(executor).gradient(picture, progress=progress).samples
+
+    def _into(self, out: Slots, picture: NDArray[Any], executor: Any, progress: Progress | None) -> Slots:
         if tuple(out.shape) != self.T.samples_shape:
             raise InputError(f"out has the shape {tuple(out.shape)}, and the samples {self.T.samples_shape}")
         unseen = np.ones(out.shape[:2], dtype=bool)
-        for block, samples in self.T._backwards().pieces(picture, progress):
+        for block, samples in self.T._backwards(executor).pieces(picture, progress):
             out[block.slices] = samples
             unseen[block.slices[:2]] = False
         for row, column in np.argwhere(unseen):
