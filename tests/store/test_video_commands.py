@@ -46,12 +46,17 @@ def test_info_says_what_a_video_is(video):
         lines["size"] == f"{packed / 1e6:,.1f} MB on disk, {3 * 12 * 20 * 24 * 12 / 1e6:,.1f} MB in memory, linear"
     )
     assert lines["scene"] == "noise"
+    darkest, brightest = np.quantile([frame.read().values for frame in video], [0.001, 0.999])
+    found = re.match(r"(\S+) to (\S+) in linear light", lines["brightness"])
+    np.testing.assert_allclose([float(each) for each in found.groups()], [darkest, brightest], rtol=0.1)
     assert run(*lines["one frame"].split()[1:]).exit_code == 0
     assert "on disk" not in run("info", "v.zarr", "--quick").stdout
     with create_video("v.zarr") as frames:
         frames.append(video[0], 0.1)
     assert "4, 0 s to 100 ms, 20 ms to 60 ms apart" in run("info", "v.zarr", "--quick").stdout
-    assert "size            about " in run("info", "v.zarr").stdout
+    said = run("info", "v.zarr").stdout
+    assert "size            about " in said
+    assert "stops; of frames 0, 2, 3" in said
     create_video("empty.zarr")
     assert "none yet" in run("info", "empty.zarr").stdout
 

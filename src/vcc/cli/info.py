@@ -17,7 +17,7 @@ from vcc.base.units import short
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
 from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, told
-from vcc.cli.store_words import store_facts, video_facts
+from vcc.cli.store_words import looked_at, store_facts, video_facts
 from vcc.cli.view_grid import Views, draw
 from vcc.fields.grid import SAMPLES_IN_WORDS, pair
 from vcc.formats import FolderInfo, keep_geometry, lytro_lfp, open_sparse_views, read_geometry
@@ -78,10 +78,7 @@ def describe(
                 raise InputError(f"{path} is a raw recording of a Lytro camera: it has no grid of views to draw")
             lines = _lytro_facts(path)
         elif is_video(path):
-            video = open_video(path)
-            if picture is not None and video:
-                raise InputError(f"{path} is a video: draw the views of one frame, {video[0].path}")
-            lines = video_facts(video, quick)
+            lines = _of_a_video(path, quick, picture)
         elif is_store(path):
             lines = _of_a_store(path, quick, picture)
         else:
@@ -170,6 +167,24 @@ def _of_a_store(path: Path, quick: bool, picture: Path | None) -> dict[str, str]
     if picture is not None:
         lines["picture"] = draw(views, path.resolve().name, picture, assumed=False)
     return lines
+
+
+def _of_a_video(path: Path, quick: bool, picture: Path | None) -> dict[str, str]:
+    """Of a video, by names."""
+    video = open_video(path)
+    if picture is not None and video:
+        raise InputError(f"{path} is a video: draw the views of one frame, {video[0].path}")
+    lines = video_facts(video, quick)
+    if not quick and video:
+        some = looked_at(video)
+        views = (
+            video[number].linear_view(row, column, 0, video.shape[2])
+            for number in some
+            for row, column in np.ndindex(*video.shape[:2])
+        )
+        of_these = f"; of frames {', '.join(map(str, some))}" if len(some) < len(video) else ""
+        lines["brightness"] = brightness(views, "linear") + of_these
+    return lines | ({"one frame": f"vcc info {video[0].path}"} if video else {})
 
 
 def _facts(facts: FolderInfo) -> dict[str, str]:

@@ -13,7 +13,7 @@ from vcc.store import StoredLightField, StoredVideo
 from vcc.store.video_layout import Between
 
 LOOKED_AT = 3
-"""Frames of which a video's size on the disk is told."""
+"""Frames of which a video's size on the disk and its brightness are told."""
 EVENLY = 1e-6
 """How much of a gap between frames the others may differ by, and be told as evenly spaced."""
 BETWEEN_IN_WORDS: dict[Between, str] = {
@@ -79,8 +79,8 @@ def video_facts(video: StoredVideo, quick: bool) -> dict[str, str]:
     in_memory = len(video) * nv * nu * first.view_bytes
     size = f"{in_memory / 1e6:,.1f} MB in memory, linear"
     if not quick:
-        looked_at = [video[number] for number in spread(len(video), LOOKED_AT)]
-        packed = sum(frame.stored_bytes for frame in looked_at) / len(looked_at) * len(video)
+        some = looked_at(video)
+        packed = sum(video[number].stored_bytes for number in some) / len(some) * len(video)
         size = f"{'about ' if len(video) > LOOKED_AT else ''}{packed / 1e6:,.1f} MB on disk, {size}"
     lines |= {
         "frames": f"{len(video)}, {short(video.times[0], 'time')} to {short(last, 'time')}{_apart(video.times)}",
@@ -92,7 +92,12 @@ def video_facts(video: StoredVideo, quick: bool) -> dict[str, str]:
     for name, value in video.provenance.items():
         if not isinstance(value, dict | list):
             lines[str(name).replace("_", " ")] = str(value)
-    return lines | {"one frame": f"vcc info {first.path}"}
+    return lines
+
+
+def looked_at(video: StoredVideo) -> list[int]:
+    """The frames of which is told what takes looking at views: all, or some of many."""
+    return spread(len(video), LOOKED_AT)
 
 
 def _apart(times: tuple[float, ...]) -> str:

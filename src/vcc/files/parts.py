@@ -44,7 +44,7 @@ def clear_leftovers(target: Path, patience: float = DAY) -> None:
     Args:
         target: file or folder that is about to be written.
         patience: seconds that a part must have been untouched where nobody can tell whether its writer lives,
-            because that is a process of another machine or container.
+            because that is a process of another machine or container; 0 where this process alone may write.
     """
     for left in _left(target, "part", patience):
         _remove(left)
@@ -183,7 +183,7 @@ def _parts(folder: Path, stem: str, state: str, suffix: str, patience: float) ->
 def _dead(machine: str, process: int, path: Path, patience: float) -> bool:
     """Whether the writer of a part is known to be dead, or left it alone for long enough."""
     if machine == _machine():
-        return not _runs(process)
+        return process != os.getpid() if patience == 0 else not _runs(process)  # a zombie runs, too
     try:
         touched = max(each.lstat().st_ctime for each in (path, *path.rglob("*")))
     except OSError:  # somebody is at work there
