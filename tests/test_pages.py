@@ -174,6 +174,8 @@ def folder(given, tmp_path, monkeypatch):
 def write_given():
     write_views(Path("my_views"))
     shutil.copytree("my_views", "views")
+    for number in (1, 2):
+        shutil.copytree("my_views", f"take/frame_000{number}")
     Path("dgauss.50mm.dat").write_text(LENS)
     places = np.linspace(-1, 1, 16) * 5e-3
     np.save("cap.npy", -(places[:, None] ** 2 + places**2) / 0.1)

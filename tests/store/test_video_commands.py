@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+import shutil
+from pathlib import Path
 
+import imagecodecs
 import numpy as np
 import pytest
 
 import vcc
-from tests.command_line import CAMERA, refused, run
+from tests.command_line import CAMERA, KNOWN, refused, run, write_views
 from vcc.store import create_video, open_video
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.ResultWarning")  # of noise in few views
@@ -93,3 +96,69 @@ def test_capture_takes_a_moment_or_an_exposure(video):
 def test_what_a_video_is_not_taken_for_is_said(video, command, words):
     create_video("empty.zarr").__exit__(None, None, None)
     assert words in refused(*command.split())
+
+
+# --- made of folders ---
+
+
+def take(count, first=1):
+    """Folders of views, one for each frame; returns what is in them."""
+    for n in range(first, first + count):
+        views = write_views(Path(f"take/frame_{n:02d}"))
+        for file in Path(f"take/frame_{n:02d}").iterdir():
+            file.write_bytes(imagecodecs.png_encode(imagecodecs.png_decode(file.read_bytes()) // n))
+    return views
+
+
+def converted(*options):
+    result = run("convert", "take", "take.zarr", "--frame-rate", 25, *options)
+    assert result.exit_code == 0, result.output
+    return result
+
+
+@pytest.fixture
+def frames(tmp_path, monkeypatch):
+    """Folders of two frames; this is the folder to work in. Returns the views of the first."""
+    monkeypatch.chdir(tmp_path)
+    Path("take").mkdir()
+    Path("take/notes.txt").write_text("scene 7")
+    return take(2)
+
+
+def test_folders_become_the_frames_of_a_video(frames):
+    said = converted(*KNOWN).stdout
+    assert said == "take.zarr: 2 frames, 0 s to 0.04 s, each 3×3 views of 24×20 pixels, uint8 srgb\n"
+    video = open_video("take.zarr")
+    assert video.times == (0.0, 1 / 25)
+    for n, each in enumerate(video, start=1):
+        codes = [[each.stored_view(j, i, 0, 20) for i in range(3)] for j in range(3)]
+        np.testing.assert_array_equal(codes, frames // n)
+    take(1, first=3)
+    assert converted(*KNOWN).stdout.startswith("take.zarr: 3 frames, 1 of them new, 0 s to 0.08 s")
+    assert converted(*KNOWN).stdout.startswith("take.zarr: 3 frames, none of them new")
+    assert "frame rate" in run("info", "take.zarr", "--quick").stdout
+
+
+def test_what_is_assumed_of_all_frames_is_said_once(frames):
+    assert converted("--dtype", "float16").stderr.count("do not state") == 1
+    assert open_video("take.zarr")[1].dtype == np.float16
+    assert "assumed         spacing, slope_per_pixel, focus_distance" in run("info", "take.zarr", "--quick").stdout
+
+
+@pytest.mark.parametrize(
+    ("harm", "options", "words"),
+    [
+        (lambda: Path("take/frame_04").mkdir(), "", "frame 3 is missing between frame_02 and frame_04"),
+        (lambda: Path("take/frame_002").mkdir(), "", "frame_002 and frame_02 are both frame 2"),
+        (lambda: Path("take/other_1").mkdir(), "", "several kinds of numbered names, frame_01, other_1"),
+        (lambda: Path("take/frame_03").mkdir(), "", "no light field was found in take/frame_03"),
+        (lambda: None, "--overwrite", "leave out --kind and --overwrite"),
+        (lambda: run("convert", "take", "take.zarr", "--frame-rate", 30, *KNOWN), "", "frame_rate is 30.0 there"),
+        (lambda: create_video("take.zarr"), "", "a video of other frames: converted_from is None there"),
+        (lambda: Path("take.zarr").mkdir() or Path("take.zarr/x").write_text(""), "", "is no video"),
+        (lambda: [shutil.rmtree(each) for each in Path("take").glob("f*")], "", "take holds nothing numbered"),
+    ],
+)  # fmt: skip
+def test_folders_that_make_no_video_are_refused(frames, harm, options, words):
+    harm()
+    assert words in refused("convert", "take", "take.zarr", "--frame-rate", 25, *KNOWN, *options.split())

@@ -74,6 +74,7 @@ COMMANDS = {
         "vcc convert views/ small.zarr --lossy jpegxl --quality 90",
         "vcc convert scene.zarr half.zarr --dtype float16",
         "vcc convert scene.zarr flight.mp4",
+        'vcc convert take/ video.zarr --frame-rate 24 --spacing "1 mm"',
     ),
     "decode": (
         "Turn the raw recording of a plenoptic or mask-modulated camera into a light field.\n\n"

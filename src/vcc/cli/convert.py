@@ -1,6 +1,7 @@
 """``vcc convert``: a light field into a store, or into files of another format."""
 
 import dataclasses
+import warnings
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -9,8 +10,9 @@ from typing import Annotated, Any, Literal
 from cyclopts import Group, Parameter
 
 from vcc import __version__
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, ResultWarning
 from vcc.cli.console import free_output, progress, show
+from vcc.cli.numbered_frames import numbered_frames
 from vcc.cli.options import (
     Arrangement,
     FileKind,
@@ -20,15 +22,18 @@ from vcc.cli.options import (
     Reading,
     ViewExposure,
     Whole,
+    above_zero,
     exposed,
+    quantity,
     told,
 )
-from vcc.cli.store_words import written
+from vcc.cli.store_words import video_written, written
 from vcc.formats import read_geometry
 from vcc.formats.writing import kind_of, save_light_field
 from vcc.light_field import LightField
-from vcc.store import Lossless, Lossy, StoredLightField, is_store
+from vcc.store import Lossless, Lossy, StoredLightField, create_video, is_store, is_video, open_video
 from vcc.store import convert as convert_to_store
+from vcc.store.attributes import difference
 
 
 @Parameter(name="*", group=Group("Making a store", sort_key=2))
@@ -76,15 +81,28 @@ def convert(
     kind: FileKind | None = None,
     exposure: ViewExposure = 1.0,
     overwrite: Overwrite = False,
+    frame_rate: Annotated[float | None, quantity("NUMBER", above_zero)] = None,
     storing: Storing = Storing(),
     reading: Reading = Reading(),
 ) -> None:
     """Put a light field into a store (Zarr), or into files of another format.
 
+    Args:
+        frame_rate: LIGHT_FIELD is a folder that holds a light field for each frame (frame_0001, frame_0002, …):
+            make a video of them, so many a second. The same command goes on with those that came since.
+
     Raises:
         InputError: an output that is there, or what reading and writing refuse.
     """
-    if output.suffix.lower() == ".zarr":
+    if frame_rate is not None:
+        if output.suffix.lower() != ".zarr" or kind or overwrite:
+            raise InputError(
+                "--frame-rate makes a video, which goes on where it is there: end OUT in .zarr, and leave out "
+                "--kind and --overwrite"
+            )
+        exposed(exposure, "zarr")
+        show(_to_video(light_field, output.expanduser(), storing, reading, frame_rate))
+    elif output.suffix.lower() == ".zarr":
         if kind:
             raise InputError("--kind is for folders and pictures of views: OUT is a store")
         exposed(exposure, "zarr")
@@ -121,6 +139,49 @@ def _to_store(
             progress=advance,
         )
     return written(made, packing.words)
+
+
+def _to_video(source: Path, output: Path, storing: Storing, reading: Reading, rate: float) -> str:
+    """Append the light fields of a folder to a video, those that are not there yet; what came of it, in words."""
+    frames, packing = numbered_frames(source), storing.packing()
+    made = {
+        "converted_from": source.expanduser().resolve().name,
+        "first_frame": frames[0].name,
+        "frame_rate": rate,
+    }
+    before = _frames_of(output, made)
+    with warnings.catch_warnings():
+        for number, path in enumerate(frames[before:], start=before):
+            field, transfer, assumed = _with_its_codes(path, reading)
+            kept = create_video(
+                output,
+                transfer=transfer,
+                dtype=storing.dtype,
+                provenance=_provenance(source, assumed or []) | made,
+                chunks=storing.chunks,
+                compression=packing,
+            )
+            with kept as video, progress(f"Writing frame {number + 1} of {len(frames)}") as advance:
+                video.append(field, number / rate, progress=advance)
+            # What is assumed is assumed of all frames, and said once.
+            warnings.filterwarnings("ignore", ".* do not state ", ResultWarning)
+    return video_written(open_video(output), before)
+
+
+def _frames_of(output: Path, made: dict[str, Any]) -> int:
+    """How many frames are there of a video that is made so.
+
+    Raises:
+        InputError: another one is.
+    """
+    if not is_video(output):
+        return 0
+    there = open_video(output)
+    other = {name: there.provenance.get(name) for name in made}
+    if other != made:
+        words = difference(other, made)
+        raise InputError(f"{output} is there already, a video of other frames: {words}. Choose another name")
+    return len(there)
 
 
 def _with_its_codes(

@@ -44,8 +44,7 @@ def store_facts(stored: StoredLightField, quick: bool) -> dict[str, str]:
         "size": f"{packed / 1e6:,.1f} MB on disk, {stored.view_bytes * nv * nu / 1e6:,.1f} MB in memory, linear",
         "cameras": stored.grid.geometry,
     }
-    if assumed := stored.provenance.get("assumed"):
-        lines["assumed"] = f"{', '.join(map(str, assumed))}: the files it was made from did not state them"
+    lines |= _assumed(stored.provenance)
     if stored.lossy is not None:
         lines["lossy"] = loss(stored.lossy)
     known = stored.disparity_range
@@ -61,6 +60,14 @@ def store_facts(stored: StoredLightField, quick: bool) -> dict[str, str]:
         if not isinstance(value, dict | list):
             lines[str(name).replace("_", " ")] = str(value)
     return lines
+
+
+def _assumed(provenance: dict[str, Any]) -> dict[str, str]:
+    """What of the cameras nobody stated, by name."""
+    assumed = provenance.get("assumed")
+    if not assumed:
+        return {}
+    return {"assumed": f"{', '.join(map(str, assumed))}: the files it was made from did not state them"}
 
 
 def video_facts(video: StoredVideo, quick: bool) -> dict[str, str]:
@@ -89,6 +96,7 @@ def video_facts(video: StoredVideo, quick: bool) -> dict[str, str]:
         "size": size,
         "cameras": of_each["cameras"],
     }
+    lines |= _assumed(video.provenance)
     for name, value in video.provenance.items():
         if not isinstance(value, dict | list):
             lines[str(name).replace("_", " ")] = str(value)
@@ -121,6 +129,22 @@ def written(made: StoredLightField, packing: str) -> str:
         f"{packed / 1e6:,.1f} MB, {samples / packed:.1f} times smaller"
     )
     return words if made.lossy is None else f"{words}\n{loss(made.lossy)}"
+
+
+def video_written(made: StoredVideo, before: int) -> str:
+    """What was appended to a video, in a line.
+
+    Args:
+        made: the video.
+        before: frames that were there.
+    """
+    new = "none of them new" if before == len(made) else f"{len(made) - before} of them new" if before else ""
+    nv, nu, nt, ns = made.shape[:4]
+    first, frames = made[0], ", ".join(filter(None, (f"{len(made)} frames", new)))
+    return (
+        f"{made.path}: {frames}, {made.times[0]:g} s to {made.times[-1]:g} s, each {nv}×{nu} views of {ns}×{nt} "
+        f"pixels, {first.dtype} {first.transfer}"
+    )
 
 
 def loss(lossy: dict[str, Any]) -> str:
