@@ -119,8 +119,7 @@ def stored(tmp_path_factory):
 def in_blocks(monkeypatch):
     """Here and elsewhere blocks of a fifth of the rows and a third of the columns of views: two levels of sums."""
 
-    def cut(plan, grid, need, limit):
-        used = plan.core.used_views(grid.shape)
+    def cut(used, grid, need, limit):
         looked_at = (np.flatnonzero(used.any(axis=axis)) for axis in (1, 0))
         spans = [(int(places[0]), int(places[-1]) + 1) for places in looked_at]
         return Blocks(*spans, *grid.shape[2:4], -(-grid.shape[0] // 5), -(-grid.shape[1] // 3), grid.shape[2])

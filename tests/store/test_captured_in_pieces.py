@@ -65,8 +65,7 @@ def light_fields(request, tmp_path_factory):
 
 
 def cut_as(monkeypatch, each):
-    def cut(plan, grid, need, limit):
-        used = plan.core.used_views(grid.shape)
+    def cut(used, grid, need, limit):
         looked_at = (np.flatnonzero(used.any(axis=axis)) for axis in (1, 0))
         spans = [(int(places[0]), int(places[-1]) + 1) for places in looked_at]
         return Blocks(*spans, *SHAPE[2:], *each)

@@ -14,7 +14,7 @@ import pytest
 
 import vcc
 from vcc.patterns import Circle, mura
-from vcc.sweeps import PSNR, DeblurringError, listed, random, sharpness, sobol
+from vcc.sweeps import PSNR, DeblurringError, listed, random, sharpness, sobol, sweeping
 from vcc.units import mm
 
 SENSOR = vcc.Sensor(z=52 * mm, shape=(20, 24), pitch=0.4 * mm)
@@ -63,9 +63,9 @@ def test_a_grid_holds_what_each_camera_makes_by_itself(field, at):
 def test_rays_and_stored_light_fields_are_swept_too(field, tmp_path):
     values = {"sensor.z": ["51 mm", "53 mm"], "code.pattern": [CELLS, 1 - CELLS]}
     stored = vcc.store.save_store(field, tmp_path / "field.zarr")
-    swept = vcc.sweep(camera(at=30 * mm), stored, values, memory_limit=10**6)
+    swept = vcc.sweep(camera(at=30 * mm), stored, values, memory_limit=10**7)
     by_rays = vcc.sweep(camera(), field, values, method="rays", samples=4)
-    same_picture(swept[1, 0], camera(z=53 * mm, at=30 * mm).capture(stored, memory_limit=10**6))
+    same_picture(swept[1, 0], camera(z=53 * mm, at=30 * mm).capture(stored, memory_limit=10**7))
     same_picture(by_rays[0, 1], camera(1 - CELLS, z=51 * mm).capture(field, method="rays", samples=4))
     assert by_rays.numbers["sampling_error"].min() > 0
 
@@ -256,6 +256,16 @@ def test_more_masks_at_the_views_than_views_are_made_of_their_pictures(field, in
     swept = vcc.sweep(camera(), field, {"code.pattern": codes}, interpolation=interpolation)
     for n in (0, 7, 29):
         same_picture(swept[n], camera(codes[n]).capture(field, interpolation=interpolation))
+
+
+@pytest.mark.filterwarnings("ignore::vcc.ResultWarning")
+def test_a_light_field_on_disk_is_read_once_for_sixteen_cameras(field, tmp_path, monkeypatch):
+    stored, read = vcc.store.save_store(field, tmp_path / "field.zarr"), []
+    reading = vcc.store.StoredLightField.read
+    monkeypatch.setattr(vcc.store.StoredLightField, "read", lambda *given: read.append(given) or reading(*given))
+    monkeypatch.setattr(sweeping, "BATCH_SAMPLES", 1)  # larger than can be gone through in some seconds
+    vcc.sweep(camera(), stored, {"sensor.z": "51mm:53mm:17"})
+    assert len(read) == 2 * 25
 
 
 @pytest.mark.filterwarnings("ignore::vcc.ResultWarning")

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.fields.grid import Block, Grid
@@ -93,6 +94,7 @@ class Need:
         times: how many times a block's samples are in memory.
         border: dark views along each axis of a block, those on both of its sides.
         raster: bytes of a block's raster, in double precision.
+        by_rays: whether all rays are traced for each block.
         readers: how many views are read at a time.
     """
 
@@ -101,6 +103,7 @@ class Need:
     times: float
     border: int
     raster: int
+    by_rays: bool
     readers: int = 1
 
     @classmethod
@@ -119,7 +122,9 @@ class Need:
         times = 1 + 16 / kept if copies else 1.0
         raster = (16 if plan.by_rays else 8) * pixels
         single = 4 * pixels if plan.by_rays else 0
-        return cls((1 + SUMS) * raster + single + engine_memory, grown, times, 2 * plan.core.border, raster)
+        return cls(
+            (1 + SUMS) * raster + single + engine_memory, grown, times, 2 * plan.core.border, raster, plan.by_rays
+        )
 
     def with_sums(self) -> Need:
         """With what whoever runs blocks for others keeps beside: the results of blocks that are to be summed."""
@@ -140,11 +145,11 @@ class Need:
         return math.ceil(self.fixed + 8 * self.view)
 
 
-def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
+def cut(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks:
     """The largest blocks that keep to a memory limit.
 
     Args:
-        plan: whose parts run.
+        used: which views are looked at, (v, u).
         grid: of the light field.
         need: what the blocks take.
         limit: bytes.
@@ -153,7 +158,6 @@ def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
         InputError: a limit that a single row of pixels does not fit.
     """
     _, _, nt, ns = grid.shape[:4]
-    used = plan.core.used_views(grid.shape)
     rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
     high, wide = rows[1] - rows[0], columns[1] - columns[0]
     of = partial(Blocks, rows, columns, nt, ns)
@@ -178,14 +182,14 @@ def cut(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
     )
 
 
-def cut_evenly(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
+def cut_evenly(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks:
     """Blocks to work on: those of `cut`, or by footprints smaller ones, so that many may have work at once.
 
     How many work does not count: the same blocks are the same picture, byte for byte. By rays blocks are as large
     as may be, since all rays are traced for each.
 
     Args:
-        plan: as for `cut`.
+        used: as for `cut`.
         grid: as for `cut`.
         need: as for `cut`.
         limit: bytes for each of them.
@@ -193,12 +197,12 @@ def cut_evenly(plan: Plan, grid: Grid, need: Need, limit: float) -> Blocks:
     Raises:
         InputError: as `cut`.
     """
-    if plan.by_rays:
-        return cut(plan, grid, need, limit)
-    views = int(plan.core.used_views(grid.shape).sum())
+    if need.by_rays:
+        return cut(used, grid, need, limit)
+    views = int(used.sum())
     # What comes of a block, its raster, is to be little beside it.
     each = max(views * need.view / SHARES, WORTH, 8.0 * need.raster, need.view)
-    return cut(plan, grid, need, min(limit, need.fixed + need.reading + need.times * each))
+    return cut(used, grid, need, min(limit, need.fixed + need.reading + need.times * each))
 
 
 def _span(used: Any) -> tuple[int, int]:

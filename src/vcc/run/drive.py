@@ -9,10 +9,11 @@ each the share that is there, and each block meets the same rays.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import count, groupby
 from typing import Any
 
 import numpy as np
@@ -32,10 +33,12 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
-from vcc.run.blocks import Blocks, Need, cut_evenly
+from vcc.run.blocks import SUMS, Blocks, Need, cut_evenly
 from vcc.run.executors import Tree, Work, crew, memory_of_task
 from vcc.run.sent import Carried, Sent
 
+SHARED = 0.5
+"""Share of the memory that a block takes at which several plans look; the rest is for their sums."""
 HELD = 0.25
 """Share of the memory that views and maps, kept to be used again, may take where views in between are made."""
 IN_MEMORY = 2**28
@@ -92,8 +95,9 @@ def drive(
 def rounds_of(drives: Sequence[Drive]) -> list[Partial]:
     """The rasters of several plans of one light field, read once where an engine can share it.
 
-    It can where the samples are in memory as a whole, the same is done to them before, and the cores differ in one
-    mask alone (see `vcc.plan.protocol.Engine.together`); other plans of samples in memory are run side by side.
+    It can where the same is done to the samples before, and the cores differ in one mask alone (see
+    `vcc.plan.protocol.Engine.together`); other plans are run side by side. Of samples that are not in memory each
+    block is read once for as many plans as there is memory for.
 
     Args:
         drives: plans on their way through one engine, with the same samples.
@@ -112,7 +116,50 @@ def rounds_of(drives: Sequence[Drive]) -> list[Partial]:
             # Each by one thread: nothing waits for the slowest of several at the end of each.
             with Workers(first.threads) as pool:
                 return list(pool.map(Drive.rounds_by_one_thread, drives))
-    return [drive.rounds() for drive in drives]
+    groups = map(_over_shared_blocks, _sharing(drives))
+    return [found for group in groups for found in group]
+
+
+def _sharing(drives: Sequence[Drive]) -> Iterator[Sequence[Drive]]:
+    """Plans next to each other that can look at the same blocks, as many as there is memory for their sums."""
+    for takes, alike in groupby(drives, key=Drive.takes):
+        group = list(alike)
+        most = 1 if takes is None else group[0].most_at_once
+        yield from (group[first : first + most] for first in range(0, len(group), most))
+
+
+def _over_shared_blocks(drives: Sequence[Drive]) -> list[Partial]:
+    """The rasters of plans that look at the same blocks, each of which is read once."""
+    if len(drives) == 1:
+        return [drives[0].rounds()]
+    reader = drives[0].reading_for(drives)
+    blocks = list(filter(reader.used_in, reader.blocks))
+    trees = [Tree(sum(map(bool, map(drive.used_in, blocks))), _sum) for drive in drives]
+    numbers = [count() for _ in drives]
+    for block in blocks:
+        values = reader.values(block, Counted(None, 0))
+        those = [n for n, drive in enumerate(drives) if drive.used_in(block)]
+        for n, part in zip(those, _parts([drives[n] for n in those], block, values), strict=True):
+            trees[n].put(next(numbers[n]), part)
+    return [drive.of_all_rays(_in_double(tree.total)) for drive, tree in zip(drives, trees, strict=True)]
+
+
+def _parts(drives: Sequence[Drive], block: Block, values: Any) -> list[Partial]:
+    """The rasters of a block by several plans; side by side each is made by one thread, as for `rounds_of`."""
+    first, cores = drives[0], [drive.core.part(drive.plan.block(drive.around(block))) for drive in drives]
+    found = first.engine.together(cores, values, threads=first.threads) if len(drives) > 1 else None
+    if found is not None:
+        return found
+    threads = 1 if first.name == "numba" and len(drives) > 1 else first.threads
+    runs = [
+        partial(drive.runner, core, values, threads=threads) for drive, core in zip(drives, cores, strict=True)
+    ]
+    with Workers(first.threads if threads == 1 else 1) as pool:
+        return list(pool.map(_called, runs))
+
+
+def _called(run: Callable[[], Partial]) -> Partial:
+    return run()
 
 
 def recorded_together(drives: Sequence[Drive]) -> list[Recorded]:
@@ -274,7 +321,7 @@ class Drive:
         """
         grid = self.samples.grid
         if not self.in_memory:
-            return cut_evenly(self.plan, grid, self.need, self.limit)
+            return cut_evenly(self.used, grid, self.need, self.limit)
         copied = self.plan.core.border == 0 and any(operator.copies for operator in self.plan.before)
         return Blocks.by_column(grid) if copied else Blocks.one(grid)
 
@@ -359,10 +406,14 @@ class Drive:
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
             return run(core, self.prepared, progress=progress)
-        total = self._over_blocks(listed, beside, progress)
+        return self.of_all_rays(self._over_blocks(listed, beside, progress), beside)
+
+    def of_all_rays(self, total: Partial, beside: int = 0) -> Partial:
+        """The sum of all blocks with what is known of all rays; each block knows of its own only."""
         if not self.plan.by_rays or self.in_memory:
             return total
-        # Each block knows of its own rays only: a light field of one sample tells which of all are missing.
+        # A light field of one sample tells which of all are missing.
+        core, run = self._core_and_run(beside)
         whole = run(core.alone(), np.zeros((1, 1, 1, 1), self.kind))
         return replace(total, asked=whole.asked, lacking=whole.lacking, rays=whole.rays)
 
@@ -380,6 +431,28 @@ class Drive:
     def used(self) -> NDArray[np.bool_]:
         """Which views are looked at, (v, u)."""
         return self.plan.core.used_views(self.samples.grid.shape)
+
+    def takes(self) -> Any:
+        """What the blocks of samples on disk are made to be before they are looked at; None where that is another
+        thing for each plan, or a matter of several rounds."""
+        if self.in_memory or self.crew is not None or self.how.tolerance is not None or self.plan.views_between:
+            return None
+        return self.plan.before, self.plan.core.border, self.plan.by_rays, self.kind, self.limit
+
+    @property
+    def most_at_once(self) -> int:
+        """How many such plans can look at the same blocks: for their sums there is half of the memory."""
+        within = self.limit * (1 - SHARED)
+        if within < self.need.least_for_views:
+            return 1
+        return max(int(within / ((1 + SUMS) * self.need.raster)) - self.threads, 1)
+
+    def reading_for(self, drives: Sequence[Drive]) -> Drive:
+        """What reads blocks for several plans: all views that any of them looks at, within half of the memory."""
+        made = copy(self)
+        made.used, made.limit = np.logical_or.reduce([drive.used for drive in drives]), self.limit * SHARED
+        made.__dict__.pop("blocks", None)
+        return made
 
     def looking_as(self, plan: Plan) -> Drive:
         """The same with all views read that another plan looks at."""

@@ -33,6 +33,8 @@ from vcc.sweeps.result import InMemory, Results, Sweep
 
 BATCH_BYTES = 2**28
 """Of the pictures that are made together, about; each of them takes some more while it is made."""
+SHARE_A_READING = 16
+"""Cameras that are made together of a light field on disk, at least: so it is not read for each of them."""
 MOST_TOGETHER = 1024
 """Pictures that are made together, at most: progress is told, and results are kept, after each batch."""
 BATCH_SAMPLES = 6 * 10**9
@@ -168,7 +170,9 @@ class Work(Brief):
         camera, channels = self.cameras[0], self.light_field.grid.channels or 1
         pixels = math.prod(camera.sensor.shape) * channels
         samples = camera.compile(self.light_field, self.how).samples_touched * channels
-        return int(max(1, min(MOST_TOGETHER, BATCH_BYTES // (4 * pixels), BATCH_SAMPLES // max(samples, 1))))
+        least = 1 if self.light_field.whole() is not None else SHARE_A_READING
+        within_time = max(BATCH_SAMPLES // max(samples, 1), least)
+        return int(max(1, min(MOST_TOGETHER, BATCH_BYTES // (4 * pixels), within_time)))
 
     def results(self, output: str | PathLike[str] | None) -> Results:
         """Where results go; what is there already of the same sweep is kept.

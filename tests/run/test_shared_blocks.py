@@ -1,0 +1,91 @@
+"""Several cameras before a light field on disk: each block is read once for all, and pictures are those of each.
+
+Oracle: the picture that each camera captures by itself; where blocks are the same and no mask is shared, the same
+bytes. Single precision sums in another order differ by about 1e-7 of the brightest pixel; 1e-6 is asked for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import vcc
+from tests.run.test_executors import FOCUS, in_blocks, light_field  # noqa: F401  # fixtures
+from vcc.base.units import mm
+from vcc.camera import captured_together
+from vcc.plan.how import How
+from vcc.run import drive
+from vcc.store import StoredLightField, save_store
+
+pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+
+CELLS = np.random.default_rng(3).random((9, 9))
+
+
+def camera(z=FOCUS, diameter=7 * mm, cells=None, at=0.96 * FOCUS):
+    elements = [vcc.Lens(focal_length=50 * mm, diameter=diameter)]
+    if cells is not None:
+        elements.append(vcc.Mask(cells, width=20 * mm, z=at))
+    return vcc.Camera(elements, vcc.Sensor(z, (12, 14), FOCUS * 3e-3))
+
+
+CAMERAS = {
+    "places": [camera(z * FOCUS) for z in (0.96, 0.99, 1.0, 1.03)],
+    "stops, which look at other views": [camera(diameter=d * mm) for d in (3, 7, 11)],
+    "masks in mid-path": [camera(cells=each) for each in (CELLS, 1 - CELLS, CELLS[::-1])],
+    "masks at the views": [camera(cells=each, at=0.0) for each in (CELLS, 1 - CELLS)],
+    "of several kinds": [camera(), camera(cells=CELLS), camera(0.9 * FOCUS), camera(cells=CELLS, at=0.0)],
+}
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    return save_store(light_field(), tmp_path_factory.mktemp("shared") / "a.zarr")
+
+
+@pytest.fixture
+def read(monkeypatch):
+    """The blocks that are read from now on."""
+    reading, blocks = StoredLightField.read, []
+
+    def noting(self, block=None, progress=None):
+        blocks.append(block.ranges)
+        return reading(self, block, progress)
+
+    monkeypatch.setattr(StoredLightField, "read", noting)
+    return blocks
+
+
+@pytest.mark.parametrize("how", [How(), How(method="rays", samples=4)], ids=["footprints", "rays"])
+@pytest.mark.parametrize("name", CAMERAS)
+def test_each_picture_is_that_of_its_camera_and_blocks_are_read_once(stored, in_blocks, read, name, how):  # noqa: F811
+    alone = [each.capture(stored, how) for each in CAMERAS[name]]
+    by_each = len(read)
+    read.clear()
+    together = captured_together(CAMERAS[name], stored, how)
+    for found, truth in zip(together, alone, strict=True):
+        np.testing.assert_allclose(found.values, truth.values, rtol=0, atol=1e-6 * truth.values.max())
+        assert (found.missing_rays, found.camera) == (truth.missing_rays, truth.camera)
+        assert found.sampling_error == pytest.approx(truth.sampling_error, rel=1e-4)
+    if name == "places":
+        assert all(np.array_equal(one.values, other.values) for one, other in zip(together, alone, strict=True))
+    if name != "of several kinds":
+        assert len(read) == len(set(read)) < by_each
+
+
+def test_as_many_share_as_there_is_memory_for(stored, in_blocks, read, monkeypatch):  # noqa: F811
+    cameras = CAMERAS["places"] * 2
+    for most, times in ((3, 3), (1, 8), (20, 1)):
+        monkeypatch.setattr(drive.Drive, "most_at_once", most)
+        read.clear()
+        captured_together(cameras, stored, How())
+        assert len(read) == times * len(set(read))
+
+
+def test_sums_keep_to_half_of_the_memory(stored):
+    made = [
+        drive.Drive(each.compile(stored), stored, How(threads=2, memory_limit=10**6)) for each in CAMERAS["places"]
+    ]
+    raster = made[0].need.raster  # three sums of blocks and the raster of one, for each camera and thread
+    assert made[0].most_at_once == int(0.5e6 / (4 * raster)) - 2
+    assert made[0].reading_for(made).limit == 0.5e6
