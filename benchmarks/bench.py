@@ -50,6 +50,8 @@ MOVES, EVERY = 240, 1 / 60
 """Of the mouse in a drag, and seconds between them."""
 STILL = 1.0
 """Seconds for which the hand holds still before it lets go."""
+BEHIND_LENSLETS = 8
+"""Of the mouse to both sides, pixels of the page: further on, the sensor would stand before the lenslets."""
 TURNS = 100
 """Of the host alone."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -131,10 +133,10 @@ def cases() -> list[Case]:
         Case("lens; the sensor", 9, 500, alone, "sensor", 20),
         Case("lens; the lens", 9, 500, further, 0, 20),
         Case("mask half-way; the mask", 9, 500, masked, 1, 20),
-        Case("plenoptic, by rays; the sensor", 9, 500, plenoptic, "sensor", 20, swing=10),
+        Case("plenoptic, by rays; the sensor", 9, 500, plenoptic, "sensor", 20, swing=BEHIND_LENSLETS),
         Case("lens; the sensor", 20, 500, alone, "sensor", 10),
         Case("mask half-way; the mask", 20, 500, masked, 1, 10),
-        Case("plenoptic, by rays; the sensor", 20, 500, plenoptic, "sensor", 10, swing=10),
+        Case("plenoptic, by rays; the sensor", 20, 500, plenoptic, "sensor", 10, swing=BEHIND_LENSLETS),
     ]
 
 
@@ -267,6 +269,7 @@ def drag(page: Any, case: Case) -> dict[str, Any]:
     box = page.locator(f'[data-part="{case.part}"] .strip').bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 3
     page.mouse.move(x, y)
+    page.keyboard.down("Alt")  # else it stays where something is sharp, and there is no new picture to be made
     page.mouse.down()
     began = time.perf_counter()
     for number in range(MOVES):
@@ -274,6 +277,7 @@ def drag(page: Any, case: Case) -> dict[str, Any]:
         page.mouse.move(x + case.swing * math.sin(2 * math.pi * (number + 1) / 120.5), y)
     page.wait_for_timeout(1000 * STILL)
     page.mouse.up()
+    page.keyboard.up("Alt")
     page.wait_for_timeout(50)
     page.wait_for_selector('section.picture[aria-busy="false"]', timeout=60_000)
     page.wait_for_timeout(100)

@@ -29,6 +29,7 @@ from vcc.bench.picture import COARSER, WHOLE, Pace, Taken, codes, take
 from vcc.bench.session import CHANGES, MOST_WAITING, QUESTIONS, Broken
 from vcc.camera_file import ELEMENT_KINDS
 from vcc.files.pictures import auto_exposure
+from vcc.plan.choice import compile_best
 
 
 @pytest.fixture
@@ -434,6 +435,13 @@ def test_at_rest_a_camera_is_rehearsed_for_a_drag_and_nobody_sees_it(monkeypatch
     client.at_rest()
     assert client.session.join(30)
     assert made == [(WHOLE, pytest.approx(0.052))]
+    # by rays what is out of focus is made as all else is, and a whole picture has compiled all
+    del made[:]
+    lenslets = {"kind": "lens_array", "z": "50 mm", "pitch": "2 mm", "focal_length": "20 mm"}
+    client.do("set", where=["elements", 1], value=lenslets, turn=3)
+    client.at_rest()
+    assert client.session.join(30)
+    assert made == [(each, pytest.approx(0.052)) for each in levels]
     client.close()
 
 
@@ -467,6 +475,23 @@ def test_a_coarse_picture_by_few_rays_is_as_bright(fineness):
     # of the rays more than half pass: three times the error of a share of them
     rays = coarse.values[..., 0].size * coarse.plan.core.samples
     assert coarse.values.mean() == pytest.approx(whole.values.mean(), rel=3 / rays**0.5)
+
+
+def test_few_rays_through_lenslets_look_at_views_with_pixels_twice_as_coarse():
+    # as a plan does that is made for such views; odd numbers of pixels, so that a border is left out
+    field = Field(noise(4, 51))
+    lens = {"kind": "lens", "z": "0 mm", "focal_length": "50 mm", "diameter": "18 mm"}
+    lenslets = {"kind": "lens_array", "z": "50 mm", "pitch": "3 mm", "focal_length": "20 mm"}
+    document = START.changed(["elements"], [lens, lenslets])
+    train = (
+        document.changed(["sensor"], {"z": "52 mm", "shape": [96, 96], "pitch": "0.25 mm"}).train(NOWHERE).train
+    )
+    made = take(train, field, START, COARSER[0]).plan
+    views = field.with_pixels_of(2 * COARSER[0].pixels)
+    wanted = compile_best(train, views.grid)
+    assert made.core.views == wanted.core.views == (4, 4, 12, 12)
+    assert made.core.index_from_ray.isclose(wanted.core.index_from_ray)
+    np.testing.assert_allclose(made.core.motion, wanted.core.motion, atol=1e-9)
 
 
 # --- sequences ---

@@ -17,6 +17,7 @@ from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.bench.document import Document, Views
 from vcc.bench.offered import Field
+from vcc.fields.grid import Grid
 from vcc.files.pictures import auto_exposure
 from vcc.files.transfer import encode
 from vcc.image import Image
@@ -26,6 +27,7 @@ from vcc.plan.choice import compile_best
 from vcc.plan.model import Plan
 from vcc.plan.rays.compile import DEFAULT_SAMPLES
 from vcc.plan.rays.model import Rays
+from vcc.plan.rays.windows import CellWindows
 from vcc.recording import Recording, recorded
 from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
@@ -73,6 +75,8 @@ class Fineness:
 WHOLE = Fineness(1, None)
 COARSER = (Fineness(2, 16), Fineness(2, 4), Fineness(4, 8), Fineness(8, 4))
 """What is made in time, finest first."""
+COARSEST = COARSER[-1].pixels
+"""Of a view, so many each way are one at most."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -226,7 +230,12 @@ def take(
     camera = train if fineness.pixels == 1 else coarser_sensor(train, fineness.pixels)
     plan = compile_best(camera, light_field.grid)
     if fineness.rays is not None and isinstance(plan.core, Rays):
-        plan = _with_fewer_rays(plan, plan.core, fineness.rays)
+        if isinstance(plan.core.aim, CellWindows):
+            wide = replace(fineness, pixels=min(2 * fineness.pixels, COARSEST))
+            coarser = document.aperture.placed(light_field_of(field, document.views, wide, progress))
+            plan = _looking_at(plan, plan.core, light_field.grid, coarser.grid)
+            light_field = coarser
+        plan = _with_fewer_rays(plan, fineness.rays)
     planning = time.perf_counter() - began
     found = drive(plan, light_field, None, progress)
     image = Image(found.values, camera.sensor.frame, found.missing_rays, found.sampling_error, camera=camera)
@@ -240,10 +249,28 @@ def take(
     return Taken(image, recording, plan, found, fineness != WHOLE, time.perf_counter() - began, planning)
 
 
-def _with_fewer_rays(plan: Plan, core: Rays, rays: int) -> Plan:
+def _with_fewer_rays(plan: Plan, rays: int) -> Plan:
     """A plan with fewer rays, that look at views as they are: sharper ones would only show the noise of so few."""
-    fewer = max(core.samples * rays // DEFAULT_SAMPLES, FEWEST_RAYS)
-    return replace(plan, core=core.more(fewer), before=())
+    assert isinstance(plan.core, Rays)
+    fewer = max(plan.core.samples * rays // DEFAULT_SAMPLES, FEWEST_RAYS)
+    return replace(plan, core=plan.core.more(fewer), before=())
+
+
+def _looking_at(plan: Plan, core: Rays, fine: Grid, coarse: Grid) -> Plan:
+    """A plan whose rays look at the same views with coarser pixels.
+
+    Through a lenslet a pixel sees as much of the scene as the lenslet is wide, which is several samples: few rays
+    find their mean with less noise where they look at means, and where neighbours look at the same ones.
+    """
+    coarse_from_fine = coarse.frame.inverse() @ fine.frame
+    nv, nu, nt, ns = coarse.shape[:4]
+    made = replace(
+        core,
+        index_from_ray=coarse_from_fine @ core.index_from_ray,
+        motion=coarse_from_fine.linear[2:, 2:] @ core.motion,
+        views=(nv, nu, nt, ns),
+    )
+    return replace(plan, core=made, grid_shape=coarse.shape[:4])
 
 
 # --- for a screen ---

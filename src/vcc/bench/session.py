@@ -500,10 +500,15 @@ class Session:
         return self._send is None or self._taken is None or self._taken.coarse or self._kinds() in self._rehearsed
 
     def _rehearse(self) -> None:
-        """Make what the first places of a drag would wait for: coarser light fields, compiled code, the pace."""
+        """Make what the first places of a drag would wait for: coarser light fields, compiled code, the pace.
+
+        By rays a whole picture has compiled all already, and what is out of focus is made as all else is.
+        """
         self._rehearsed.add(self._kinds())
-        quick = (self._pace.seconds(self._kinds()) or math.inf) <= SLOW
-        for train in (out_of_focus(self._described.train), self._described.train):
+        by_rays = self._taken is not None and self._taken.plan.by_rays
+        quick = not by_rays and (self._pace.seconds(self._kinds()) or math.inf) <= SLOW
+        present = self._described.train
+        for train in (present,) if by_rays else (out_of_focus(present), present):
             described = replace(self._described, train=train)
             for fineness in (WHOLE, *COARSER) if quick else COARSER:
                 try:
