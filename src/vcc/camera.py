@@ -29,6 +29,7 @@ from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
 from vcc.run.drive import Drive, Recorded, drive, recorded_together
 from vcc.run.expose import Exposure
+from vcc.run.needed import needed
 from vcc.run.operator import Operator
 from vcc.run.operators import carried_to
 
@@ -420,6 +421,6 @@ def captured_together(
     plans = compile_several(cameras, light_field.grid, how, seeds)
     for caution in (caution for plan in plans for caution in plan.cautions):
         warn_of_result(caution)
-    drives = [Drive(plan, light_field, how) for plan in plans]
+    drives = [Drive(*needed(plan, light_field), how) for plan in plans]
     made = zip(cameras, plans, recorded_together(drives), absurd, strict=True)
     return [camera._image(plan, light_field, found, said) for camera, plan, found, said in made]

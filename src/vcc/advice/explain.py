@@ -17,6 +17,7 @@ from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.parallax_rule import vergences
 from vcc.run.drive import Drive
+from vcc.run.needed import needed
 
 COLUMNS = 80
 """Into which an explanation's lines fit, but for words that are longer."""
@@ -55,11 +56,11 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: An
     limits = _limits(train, samples.grid, how.scene_distance)
     text = _wrapped("\n\n".join([_what(train, samples.grid), made, limits, *parts]))
     if samples.whole() is None:
-        more, seconds = explain_store.section(run)
+        more, seconds = explain_store.section(Drive(*needed(plan, samples), how))
         text = f"{text}\n\n{more}"
     by_executor = None
     if executor is not None:
-        more, by_executor = explain_executor.section(Drive(plan, samples, how, executor), seconds)
+        more, by_executor = explain_executor.section(Drive(*needed(plan, samples), how, executor), seconds)
         text = f"{text}\n\n{_wrapped(more)}"
     result = Explanation(text)
     result.plan, result.expected_seconds, result.expected_seconds_by_executor = plan, seconds, by_executor

@@ -110,6 +110,20 @@ class Plan(Value, Shown):
             block = operator.block(block)
         return block
 
+    def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
+        """Which pixels of each view of a light field may be looked at.
+
+        Args:
+            shape: of its samples, (v, u, t, s[, channels]).
+
+        Returns:
+            The first, and the one after the last, of rows and of columns: (v, u, 2, 2).
+        """
+        found = self.core.used_pixels(self.shape(shape))
+        for operator in reversed(self.before):
+            found = operator.made_of(found)
+        return np.clip(found, 0, np.array(shape[2:4])[:, None])
+
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
         """The type that samples of a NumPy type have in memory, and what a number of theirs stands for."""
         factor = 1.0

@@ -60,6 +60,14 @@ class Before(Protocol):
         """Which of the samples that the core takes come from a block of those that there are."""
         ...
 
+    def made_of(self, pixels: Any) -> Any:
+        """Of which pixels those are made that the core takes: what goes beyond a view is cut off by who asks.
+
+        Args:
+            pixels: first and stop of rows and of columns of pixels, (…, 2, 2).
+        """
+        ...
+
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
         """The shape that samples of a shape get."""
         ...
@@ -110,6 +118,10 @@ class SwapPixelAxes(Value):
     def block(self, block: Block) -> Block:
         """The same samples, their axes in the other order."""
         return replace(block, pixel_rows=block.pixel_columns, pixel_columns=block.pixel_rows)
+
+    def made_of(self, pixels: Any) -> Any:
+        """The same, in the other order."""
+        return pixels[..., ::-1, :]
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
         """With rows and columns of pixels in the other order."""
@@ -165,6 +177,10 @@ class BlurViews(Brief, Value):
         (first, stop), (left, right) = block.pixel_rows, block.pixel_columns
         high, wide = (n - 1 for n in self.kernel.shape)
         return replace(block, pixel_rows=(first, stop + high), pixel_columns=(left, right + wide))
+
+    def made_of(self, pixels: Any) -> Any:
+        """Those under the kernel, which stands before them in the grown view."""
+        return pixels - np.stack([np.array(self.kernel.shape) - 1, [0, 0]], axis=-1)
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
         """With the rows and columns by which views grow."""
@@ -264,6 +280,10 @@ class SharpenViews(Value):
     def block(self, block: Block) -> Block:
         """The same samples: those read beside them are cut off again."""
         return block
+
+    def made_of(self, pixels: Any) -> Any:
+        """With those that the filter looks at beside them."""
+        return pixels + np.array([-self.reach, self.reach])
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
         """As it was."""

@@ -287,6 +287,17 @@ class Core(Protocol):
         """Which of the views of a light field of this shape are looked at, (v, u)."""
         ...
 
+    def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
+        """Which pixels of each view may be looked at.
+
+        Args:
+            shape: (v, u, t, s[, channels]) of the samples that the core takes.
+
+        Returns:
+            The first, and the one after the last, of rows and of columns: (v, u, 2, 2). They may go beyond a view.
+        """
+        ...
+
     @property
     def samples_touched(self) -> int:
         """How many samples an engine goes through, those that it goes through twice counted twice."""

@@ -35,6 +35,7 @@ from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
 from vcc.run.blocks import SUMS, Blocks, Need, cut_evenly
 from vcc.run.executors import Tree, Work, crew, memory_of_task
+from vcc.run.needed import needed
 from vcc.run.sent import Carried, Sent
 
 SHARED = 0.5
@@ -89,7 +90,7 @@ def drive(
         InputError: an engine that does not take these arrays; of samples that are read, views that are missing or
             damaged, or a memory limit that is too small; what an executor does not take, or one that dies.
     """
-    return Drive(plan, samples, how or How(), executor).recorded(progress)
+    return Drive(*needed(plan, samples), how or How(), executor).recorded(progress)
 
 
 def rounds_of(drives: Sequence[Drive]) -> list[Partial]:

@@ -25,6 +25,7 @@ from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.run.backwards import Backwards
 from vcc.run.drive import Drive
+from vcc.run.needed import needed
 
 
 class Slots(Protocol):
@@ -167,7 +168,7 @@ class Operator:
         return Drive.of_linear(self.plan, samples, self.how, executor)
 
     def _picture(self, samples: Samples, executor: Any, progress: Progress | None) -> NDArray[Any]:
-        drive = self._drive(samples, executor)
+        drive = Drive.of_linear(*needed(self.plan, samples), self.how, executor)
         picture: NDArray[Any] = drive.picture(drive.rounds(progress))
         return picture
 

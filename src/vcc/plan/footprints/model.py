@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import ClassVar
 
 import numpy as np
@@ -20,7 +21,7 @@ from vcc.base.errors import InputError
 from vcc.base.lookup import smooth
 from vcc.base.values import Value
 from vcc.fields.grid import Block
-from vcc.plan.footprints.shares import Division
+from vcc.plan.footprints.shares import REACH, Division
 from vcc.plan.numbers import numbers
 from vcc.plan.protocol import BackRunner, Engine, Runner
 
@@ -224,6 +225,35 @@ class Footprints(Value):
         used = np.zeros(shape[:2], dtype=bool)
         rows, columns = np.nonzero(self.weights) if self.weights.any() else ([0], [0])
         used[self.view_rows[rows], self.view_columns[columns]] = True
+        return used
+
+    def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
+        """Which pixels of each view may give light to the raster, (v, u, 2, 2); none of views that give none.
+
+        They are the box around the samples whose footprints reach the raster: places are affine functions of
+        indices, and so are indices of places.
+        """
+        reach = REACH[self.interpolation]
+        if self.refine > 1:  # finer samples have footprints of their own around those that are divided
+            reach = 2 * reach + (0 if self.sharpen_samples is None else len(self.sharpen_samples) // 2)
+        (xk, xl), (yk, yl) = self.step
+        # Along a row of the raster places are followed with the shear, so that it adds to the reach.
+        beside = reach * (abs(self.column_step) + abs(xl)) + abs(self.shear) + 1, reach * (abs(yk) + abs(yl)) + 1
+        rows, columns = self.raster_shape
+        used = np.zeros((*shape[:2], 2, 2), dtype=np.intp)
+        seen = self.used_views(shape)
+        if abs(xk * yl - xl * yk) <= 1e-12 * np.abs(self.step).max() ** 2:  # a view falls into a line
+            used[seen] = [[0, shape[2]], [0, shape[3]]]
+            return used
+        ends = [(-beside[0], columns - 1 + beside[0]), (-beside[1], rows - 1 + beside[1])]
+        corners = np.array(list(product(*ends)))[:, None, None] - np.stack([self.x, self.y], axis=-1)
+        index = np.clip(corners @ np.linalg.inv(self.step).T, -1, max(shape[2:4]))[..., ::-1]
+        first, stop = np.floor(index.min(axis=0)).astype(np.intp), np.ceil(index.max(axis=0)).astype(np.intp) + 1
+        used[seen, :, 0] = max(shape[2:4])
+        for b, a in zip(*np.nonzero(self.weights), strict=True):
+            one = used[self.view_rows[b], self.view_columns[a]]
+            np.minimum(one[:, 0], first[b, a], out=one[:, 0])
+            np.maximum(one[:, 1], stop[b, a], out=one[:, 1])
         return used
 
     def scaled(self, factor: float) -> Footprints:

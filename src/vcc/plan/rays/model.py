@@ -124,6 +124,10 @@ class Rays(Value):
         """All views may be looked at."""
         return np.ones(shape[:2], dtype=bool)
 
+    def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
+        """All pixels may be looked at."""
+        return np.broadcast_to(np.array([[0, shape[2]], [0, shape[3]]]), (*shape[:2], 2, 2))
+
     @property
     def rays(self) -> int:
         """How many rays are aimed at one cell or window, over all pixels."""

@@ -1,0 +1,106 @@
+"""What a picture does not need of a stored light field is not read, and the picture stays.
+
+Oracles: the adjoint, which is not zero at any sample that gives light; the picture of all samples in memory; by
+how many pixels a sensor before a lens sees a view, in a closed form.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vcc
+from tests.physics.random_cameras import AFFINE, drawn
+from vcc.base.units import mm
+from vcc.run.needed import Needed, needed
+from vcc.shapes.patterns import CosineSum
+from vcc.store import StoredLightField, save_store
+
+pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
+
+SHAPE = (3, 4, 40, 48)
+FOCUS = 1 / (1 / 50e-3 - 1)
+LENS = vcc.Lens(focal_length=50 * mm, diameter=7 * mm)
+MASK = vcc.Mask(pattern=CosineSum((0.5 * mm, 0.6 * mm), 1, 0.3), z=0.96 * FOCUS)
+
+
+def light_field(*channels):
+    values = np.random.default_rng(0).random((*SHAPE, *channels)).astype(np.float32)
+    return vcc.LightField.from_views(values, 2 * mm, 2e-3, 1.0, disparity_range=(-0.3, 0.2))
+
+
+def seen(plan, shape):
+    """Whether a sample lies within the pixels that a plan says it needs, of the samples' shape."""
+    pixels = plan.used_pixels(shape)
+    inside = np.zeros(shape[:4], bool)
+    for place in np.ndindex(*shape[:2]):
+        (top, bottom), (left, right) = pixels[place]
+        inside[place][top:bottom, left:right] = True
+    return inside
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic", "sharp"])
+@pytest.mark.parametrize("kind", AFFINE)
+def test_all_samples_that_give_light_are_needed(kind, interpolation):
+    """Cameras of random elements whose sensor is a tenth of its size, in its place or turned."""
+    for seed in range(3):
+        case = drawn(kind, seed, 24, 4)
+        sensor = case.camera.sensor
+        few = tuple(max(n // 10, 2) for n in sensor.shape)
+        camera = vcc.Camera(case.camera.elements, replace(sensor, shape=few))
+        given = case.light_field
+        operator = camera.operator(given, method="footprints", interpolation=interpolation, engine="reference")
+        back = operator.T(np.random.default_rng(seed).random(operator.picture_shape) + 1)
+        lit = (back != 0).reshape(*given.shape[:4], -1).any(axis=-1)
+        assert not (lit & ~seen(operator.plan, given.shape)).any(), case.described()
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, np.pi / 2])
+@pytest.mark.parametrize("name", ["in focus", "out of focus", "mask", "diffuser"])
+def test_the_picture_stays_and_little_is_read(tmp_path, monkeypatch, name, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    roll = vcc.Affine.from_parts(np.kron(np.eye(2), [[c, -s], [s, c]]), np.zeros(4))
+    given = light_field(3).transformed(roll)
+    place = 0.97 * FOCUS if name == "out of focus" else FOCUS
+    elements = {"mask": [LENS, MASK], "diffuser": [LENS, vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.004))]}
+    camera = vcc.Camera(elements.get(name, [LENS]), vcc.Sensor(place, (7, 9), FOCUS * 2e-3))
+    stored = save_store(given, tmp_path / "a.zarr", chunks=(4, 4))
+    plan = camera.compile(stored, method="footprints")
+    read = []
+    stored_view = StoredLightField.stored_view
+
+    def noted(self, row, column, first, stop, columns=None):
+        read.append((stop - first) * (columns[1] - columns[0]))
+        return stored_view(self, row, column, first, stop, columns)
+
+    monkeypatch.setattr(StoredLightField, "stored_view", noted)
+    whole = camera.capture(given, plan=plan).values
+    here = camera.capture(stored, plan=plan).values
+    np.testing.assert_allclose(here, whole, rtol=0, atol=1e-6 * whole.max())
+    inside = seen(plan, given.shape)
+    assert 0 < sum(read) <= inside.sum()
+    if name in ("in focus", "out of focus") and angle != 0.4:
+        assert inside.mean() < 0.25
+    with ThreadPoolExecutor(2) as pool:
+        assert camera.capture(stored, plan=plan, executor=pool).values.tobytes() == here.tobytes()
+        operator = camera.operator(stored, method="footprints")
+        assert operator(executor=pool).tobytes() == operator().tobytes() == here.tobytes()
+
+
+def test_the_pixels_are_those_that_the_sensor_sees(tmp_path):
+    """In focus each pixel of a view falls on one of the sensor: those, and what interpolation looks at beside."""
+    stored = save_store(light_field(), tmp_path / "a.zarr")
+    camera = vcc.Camera([LENS], vcc.Sensor(FOCUS, (8, 10), FOCUS * 2e-3))
+    plan, samples = needed(camera.compile(stored), stored)
+    assert isinstance(samples, Needed)
+    assert plan.grid_shape == samples.grid.shape == (*SHAPE[:2], *samples.grid.shape[2:])
+    for size, (first, stop) in zip((8, 10), samples.block.ranges[2:], strict=True):
+        assert size <= stop - first <= size + 12
+    middle = [(first + stop) / 2 for first, stop in samples.block.ranges[2:]]
+    np.testing.assert_allclose(middle, [20, 24], atol=1)
+    assert needed(plan, samples)[1].grid.shape == samples.grid.shape
+    by_rays = camera.compile(stored, method="rays")
+    assert needed(by_rays, stored) == (by_rays, stored)
