@@ -88,6 +88,7 @@ FORMATS = {
     "camera npy": Format(seeds.camera(".npy"), "camera.toml", readers.camera),
     "camera csv": Format(seeds.camera(".csv"), "camera.toml", readers.camera),
     "camera png": Format(seeds.camera(".png"), "camera.toml", readers.camera),
+    "camera moving": Format(seeds.moving_camera, "camera.toml", readers.moving_camera),
     "lens dat": Format(seeds.text("a.dat", LENS), "a.dat", readers.lens),
     "lens zmx": Format(seeds.text("a.zmx", ZEMAX), "a.zmx", readers.lens),
     "truth pfm": Format(seeds.pfm, "", readers.truth),

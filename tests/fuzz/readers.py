@@ -14,6 +14,7 @@ from vcc.cli.info import describe
 from vcc.cli.lenslet_centres import _listed
 from vcc.files.pictures import read_grey
 from vcc.formats import read_ground_truth, read_lytro
+from vcc.motion import load_moving_camera
 from vcc.sources.meshes import loaded
 from vcc.sources.mitsuba.renderer import _contents
 from vcc.sources.pbrt import PbrtScene
@@ -54,6 +55,11 @@ def truth(path: Path) -> Read:
 
 def camera(path: Path) -> Read:
     return _read(vcc.load_camera(path))
+
+
+def moving_camera(path: Path) -> Read:
+    moving = load_moving_camera(path)
+    return _read(moving.camera, moving.courses, moving.shutter)
 
 
 def lens(path: Path) -> Read:

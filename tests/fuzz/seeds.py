@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.io import savemat
 
 import vcc
-from tests.fuzz.texts import CAMERA, HCI_CAMERA, LENS, MITSUBA_SCENE, PBRT_SCENE
+from tests.fuzz.texts import CAMERA, HCI_CAMERA, LENS, MITSUBA_SCENE, MOVING, PBRT_SCENE
 from vcc.store import Lossy, create_video, save_store
 
 Maker = Callable[[Path], Any]
@@ -270,6 +270,12 @@ def camera(ending: str) -> Maker:
         (folder / "lens.dat").write_text(LENS)
 
     return make
+
+
+def moving_camera(folder: Path) -> None:
+    camera(".npy")(folder)
+    file = folder / "camera.toml"
+    file.write_text(file.read_text() + MOVING)
 
 
 def text(name: str, content: str) -> Maker:

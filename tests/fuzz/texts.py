@@ -68,6 +68,13 @@ pitch = "48 um"
 color_filter = "RGGB"
 full_well = 10000
 """
+MOVING = """
+[moving]
+sensor.z = { name = "lines", times = ["0 ms", "90 ms"], values = ["151 mm", "153 mm"] }
+"code.pattern" = { name = "steps", times = ["0 ms", "5 ms"], values = [[[0, 1], [1, 0.5]], "cells.npy"] }
+code.decentre = { name = "lines", times = ["0 ms", "5 ms"], values = [["0 mm", "0 mm"], ["1 mm", "0.5 mm"]] }
+shutter = { name = "coded", code = "1101001", exposure = "90 ms" }
+"""
 LENS = """# D-GAUSS
 29.475 3.76 1.67 25.2
 84.83 0.12 1 25.2

@@ -54,20 +54,20 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: An
     parts, seconds = room.sections(run)
     made = "How the picture is made\n" + "\n".join(f"  {note}" for note in plan.notes)
     limits = _limits(train, samples.grid, how.scene_distance)
-    text = _wrapped("\n\n".join([_what(train, samples.grid), made, limits, *parts]))
+    text = wrapped("\n\n".join([_what(train, samples.grid), made, limits, *parts]))
     if samples.whole() is None:
         more, seconds = explain_store.section(Drive(*needed(plan, samples), how))
         text = f"{text}\n\n{more}"
     by_executor = None
     if executor is not None:
         more, by_executor = explain_executor.section(Drive(*needed(plan, samples), how, executor), seconds)
-        text = f"{text}\n\n{_wrapped(more)}"
+        text = f"{text}\n\n{wrapped(more)}"
     result = Explanation(text)
     result.plan, result.expected_seconds, result.expected_seconds_by_executor = plan, seconds, by_executor
     return result
 
 
-def _wrapped(text: str) -> str:
+def wrapped(text: str) -> str:
     """Text whose lines fit a terminal: what is longer goes on in the next line, further to the right."""
     lines = []
     for line in text.split("\n"):

@@ -9,7 +9,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
@@ -46,6 +46,8 @@ from vcc.shapes.patterns import Pattern
 LIKELY = 0.75
 """How alike a name must be to a known one to be a slip of it: "lense" for "lens", but not "stop" for "prism"."""
 
+MOVING = "moving"
+"""The table of a camera file that says what changes over time; see `vcc.motion.moving_file`."""
 DEEPEST = 30
 """How deep tables and lists of a camera may stand in one another; NumPy has arrays of up to 32 axes."""
 LARGEST = float(np.finfo(np.float32).max)
@@ -136,7 +138,11 @@ def tables_of_text(text: str, called: str = "the camera") -> dict[str, Any]:
 
 
 def train_of_tables(
-    tables: Mapping[str, Any], beside: Beside, called: str = "the camera", name: str = ""
+    tables: Mapping[str, Any],
+    beside: Beside,
+    called: str = "the camera",
+    name: str = "",
+    others: Collection[str] = (),
 ) -> TrainAsWritten:
     """The optical train that tables describe: those of a camera file, or the same from elsewhere.
 
@@ -145,13 +151,14 @@ def train_of_tables(
         beside: the files that they may name.
         called: what a message calls the whole.
         name: of the train.
+        others: names of tables that may be there besides, and are not looked at any further.
 
     Raises:
         InputError: as `vcc.camera_file.load_camera`; a file that may not be opened.
     """
     try:
         _check_values(tables, called, DEEPEST)
-        return _train_of(tables, called, beside, name)
+        return _train_of({key: each for key, each in tables.items() if key not in others}, called, beside, name)
     except InputError as error:
         raise InputError(as_toml(str(error))) from error.__cause__
 
@@ -190,7 +197,13 @@ def read_field(kind: type, name: str, given: Any, called: str, beside: Beside) -
 
 
 def _train_of(tables: Mapping[str, Any], called: str, beside: Beside, name: str) -> TrainAsWritten:
-    _check_keys(tables, {"elements", "sensor"}, {"sensor"}, called, "table")
+    if MOVING in tables:
+        raise InputError(
+            f"{called} has a table [{MOVING}], so that the camera changes over time, which cannot be had here: "
+            "vcc.motion.load_moving_camera reads it, and vcc capture takes it with --exposure-time. Without "
+            f"[{MOVING}] it is the camera at rest"
+        )
+    check_keys(tables, {"elements", "sensor"}, {"sensor"}, called, "table")
     elements = tables.get("elements", [])
     if not isinstance(elements, list) or not all(isinstance(entry, dict) for entry in elements):
         raise InputError(f"{called}: each element starts with a line [[elements]] of its own")
@@ -243,7 +256,7 @@ def _read_element(entry: Mapping[str, Any], number: int, called: str, beside: Be
     place = f"{called}: element {number}"
     if "kind" not in entry:
         raise InputError(f"{place} has no kind: add kind = … with one of {listed(ELEMENT_KINDS)}")
-    kind = _known(entry["kind"], ELEMENT_KINDS, f"{place}: kind")
+    kind = known_choice(entry["kind"], ELEMENT_KINDS, f"{place}: kind")
     name = entry.get("name")
     named = f" {in_toml(name)}" if isinstance(name, str) and name else ""
     place = f"{place} ({entry['kind']}{named})"
@@ -272,8 +285,17 @@ def _comes_from_file(kind: type, given: Mapping[str, Any], place: str) -> bool:
     return True
 
 
-def _known(name: object, choices: Mapping[str, Any], what: str) -> Any:
-    """The choice of that name, in which capitals, spaces, "-" and "_" do not matter."""
+def known_choice(name: object, choices: Mapping[str, Any], what: str) -> Any:
+    """The choice of that name, in which capitals, spaces, "-" and "_" do not matter.
+
+    Args:
+        name: as the file has it.
+        choices: by the names that there are.
+        what: is to be chosen, for messages.
+
+    Raises:
+        InputError: no text, or no such name; what may have been meant, or all that there is, is said.
+    """
     if not isinstance(name, str):
         raise InputError(f"{what} is {in_toml(name)}: write it as text, one of {listed(choices)}")
     plain = {_plain(choice): choice for choice in choices}
@@ -294,10 +316,21 @@ def _nearest(name: str, choices: Iterable[str]) -> str:
     return f"; known are {listed(choices)}"
 
 
-def _check_keys(
+def check_keys(
     given: Mapping[str, Any], known: Iterable[str], required: Iterable[str], place: str, noun: str
 ) -> None:
-    """Refuse what is not known, then what is missing."""
+    """Refuse what is not known, then what is missing.
+
+    Args:
+        given: a table.
+        known: keys that it may have.
+        required: those that it must have.
+        place: where it stands, for messages.
+        noun: what a key of it is called, such as "field".
+
+    Raises:
+        InputError: there is such.
+    """
     known = list(known)
     for key in given:
         if key not in known:
@@ -310,7 +343,7 @@ def _check_keys(
 def _build(kind: type, given: Mapping[str, Any], place: str, beside: Beside) -> Any:
     """An object of a dataclass from the fields of a table."""
     fields = parameters_of(kind)
-    _check_keys(given, fields, [name for name in fields if needed(fields[name])], place, "field")
+    check_keys(given, fields, [name for name in fields if needed(fields[name])], place, "field")
     hints = get_type_hints(kind)
     values = {
         name: _read_value(value, hints[name], unit_of(fields[name]), f"{place}: {name}", beside)
@@ -424,7 +457,7 @@ def _read_named(given: Any, family: Family, arrays: bool, what: str, beside: Bes
     if "name" not in given:
         raise InputError(f"{what} has no name: add name = … with one of {listed([*family.names, *extra])}")
     parameters = {key: value for key, value in given.items() if key != "name"}
-    kind = _known(given["name"], {**family.names, **extra}, f"{what}: name")
+    kind = known_choice(given["name"], {**family.names, **extra}, f"{what}: name")
     built = _build(kind, parameters, f"{what} ({given['name']})", beside)
     if kind not in extra.values():
         return built

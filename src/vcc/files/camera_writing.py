@@ -7,6 +7,7 @@ import inspect
 import math
 import re
 import tempfile
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from vcc.base import units
 from vcc.base.affine import Affine
-from vcc.base.describe import is_default
+from vcc.base.describe import Brief, is_default
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded
 from vcc.files.atomic import atomic_path
@@ -36,15 +37,28 @@ from vcc.files.camera_reading import Beside, read_array
 from vcc.optics import Element
 from vcc.optics.train import Train
 from vcc.shapes import patterns
-from vcc.shapes.patterns import Cells
+from vcc.shapes.patterns import Cells, Pattern
 
 
 def write_train(train: Train, path: str | PathLike[str]) -> None:
     """Write an optical train as TOML that reads as an equal one; see `vcc.camera_file.save_camera`."""
+    file = expanded(path)
+    write_tables(file, *tables_of_train(train, file))
+
+
+def write_tables(file: Path, tables: Mapping[str, Any], arrays: Mapping[str, NDArray[np.float64]]) -> None:
+    """Write a camera file and the arrays that it names, each whole or not at all.
+
+    Args:
+        file: the camera file; an older one of that name is replaced.
+        tables: what it says.
+        arrays: by the names of their files.
+
+    Raises:
+        InputError: a folder that cannot be written to.
+    """
     import tomli_w
 
-    file = expanded(path)
-    tables, arrays = tables_of_train(train, file)
     for name, values in arrays.items():  # first, so that the camera file never names a missing one
         with atomic_path(file.parent / name) as temporary, temporary.open("wb") as stream:
             np.save(stream, values)
@@ -71,7 +85,7 @@ def tables_of_train(train: Train, file: Path) -> tuple[dict[str, Any], dict[str,
         "elements": [
             _write_element(element, number, file, arrays) for number, element in enumerate(train.elements, start=1)
         ],
-        "sensor": _Writer(file, "sensor", "sensor", arrays).table_of(train.sensor),
+        "sensor": Writer(file, "sensor", "sensor", arrays).table_of(train.sensor),
     }
     if not train.elements:
         del tables["elements"]
@@ -84,7 +98,7 @@ def _write_element(
     for name, kind in ELEMENT_KINDS.items():
         if type(element) is kind:
             slug = re.sub(r"\W+", "_", element.name) or f"{name}_{number}"
-            writer = _Writer(file, element.label, slug, arrays)
+            writer = Writer(file, element.label, slug, arrays)
             form = FROM_FILES[kind].of(element, file.parent) if kind in FROM_FILES else None
             return {"kind": name, **writer.table_of(form or element)}
     raise InputError(
@@ -94,9 +108,16 @@ def _write_element(
     )
 
 
-@dataclasses.dataclass(frozen=True)
-class _Writer:
-    """Turns one object into a table; arrays are put aside, to be written as files of their own."""
+@dataclasses.dataclass(frozen=True, repr=False)
+class Writer(Brief):
+    """Turns one object into a table; arrays are put aside, to be written as files of their own.
+
+    Args:
+        file: the camera file.
+        label: what messages call the object.
+        slug: what files of its arrays are named after, beside the camera file.
+        arrays: by the names of their files; more come to them.
+    """
 
     file: Path
     label: str
@@ -117,7 +138,29 @@ class _Writer:
             table[name] = self.value(value, unit_of(field), name)
         return table
 
+    def field(self, holder: Any, name: str, value: Any) -> Any:
+        """What a file has where a field of a dataclass is to take a value: `read_field` reads it.
+
+        Raises:
+            InputError: what a file cannot hold.
+        """
+        family = family_of(alternatives(get_type_hints(type(holder))[name]))
+        self.check_writable(value, family)
+        if isinstance(value, np.ndarray) and family is not None and family.base is Pattern:
+            return self.plain_array(value, "")
+        return self.value(value, unit_of(parameters_of(type(holder))[name]), name)
+
     def value(self, value: Any, unit: str | None, name: str) -> Any:
+        """What a file has for a value of a field.
+
+        Args:
+            value: of any type that files hold.
+            unit: its dimension, or None.
+            name: of the field.
+
+        Raises:
+            InputError: what a file cannot hold.
+        """
         if isinstance(value, tuple | list):
             return [self.value(part, unit, name) for part in value]
         if isinstance(value, dict):
@@ -191,6 +234,7 @@ class _Writer:
         return self.array(values)
 
     def holds(self, source: str, values: NDArray[np.float64]) -> bool:
+        """Whether the file of a name holds these numbers already."""
         try:
             return np.array_equal(read_array(source, None, True, "", Beside(self.file.parent)), values)
         except InputError:

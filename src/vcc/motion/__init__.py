@@ -10,6 +10,16 @@ from __future__ import annotations
 
 from vcc.motion.courses import Course, Function, Lines, Steps, coded
 from vcc.motion.moving_camera import MovingCamera
+from vcc.motion.moving_file import load_moving_camera
 from vcc.motion.video import LightFieldVideo
 
-__all__ = ["Course", "Function", "LightFieldVideo", "Lines", "MovingCamera", "Steps", "coded"]
+__all__ = [
+    "Course",
+    "Function",
+    "LightFieldVideo",
+    "Lines",
+    "MovingCamera",
+    "Steps",
+    "coded",
+    "load_moving_camera",
+]

@@ -148,6 +148,17 @@ def coded(code: str | Iterable[float], exposure: float) -> Steps:
     return Steps([n * length / len(shares) for n in range(len(shares))], shares)
 
 
+def code_of(steps: Steps) -> tuple[str, float] | None:
+    """The code of a shutter that opens and shuts in equal parts, and the exposure, seconds; None for others."""
+    count = len(steps.times)
+    if count < 2 or not all(isinstance(each, int | float) and each in (0, 1) for each in steps.values):
+        return None
+    code = "".join(str(int(each)) for each in steps.values)
+    # Either may have lost its last digit
+    lengths = [count * steps.times[1], count / (count - 1) * steps.times[-1]]
+    return next(((code, each) for each in lengths if each > 0 and coded(code, each).times == steps.times), None)
+
+
 def course(given: Any) -> Course:
     """What is given, as a course: functions are smooth.
 

@@ -7,11 +7,13 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from os import PathLike
 from typing import Any, Self, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.advice.explain import Explanation, wrapped
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
@@ -22,11 +24,13 @@ from vcc.camera import Camera, captured_together
 from vcc.fields.grid import Block
 from vcc.fields.samples import InMemory, Samples
 from vcc.image import Image
-from vcc.learn.parameters import replaced
+from vcc.learn.parameters import place, replaced
 from vcc.motion.courses import Course, course, pieces
 from vcc.motion.light import Light, light_of
-from vcc.motion.quadrature import MOST, Mean, mean_over
+from vcc.motion.moving_writing import write_moving
+from vcc.motion.quadrature import LEAST, MOST, Mean, mean_over
 from vcc.motion.video import LightFieldVideo
+from vcc.motion.words import course_in_words
 from vcc.plan.how import How, Options
 from vcc.store.video_reading import StoredVideo
 
@@ -101,6 +105,70 @@ class MovingCamera(Brief):
         """When something of it jumps or bends, seconds."""
         changing: list[Any] = [*self.courses.values(), *([] if self.shutter is None else [self.shutter])]
         return tuple(sorted({time for each in changing for time in each.breaks}))
+
+    def listed(self) -> list[str]:
+        """What changes, each in a line of its own: ``"sensor.z goes evenly, 51 mm at 0 s, 53 mm at 90 ms"``."""
+        found = {name: (each, place(self.camera, name)) for name, each in self.courses.items()}
+        lines = [f"{name} {course_in_words(*each)}" for name, each in found.items()]
+        return [*lines, *([] if self.shutter is None else [f"shutter {course_in_words(self.shutter)}"])]
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write this camera as a TOML file that `vcc.motion.load_moving_camera` reads back.
+
+        That gives one back that is the same at all times. See `vcc.camera_file.save_camera` for what stands beside
+        the file.
+
+        Args:
+            path: where to; an older file of that name is replaced.
+
+        Raises:
+            InputError: a function of time or anything else that a file cannot hold (`Lines` and `Steps` it holds),
+                or a folder that cannot be written to.
+        """
+        write_moving(self.camera, self.courses, self.shutter, path)
+
+    def explain(
+        self,
+        light_field: Samples | LightFieldVideo | StoredVideo | Callable[[float], Samples],
+        how: How | None = None,
+        *,
+        start: float = 0.0,
+        executor: Any = None,
+        progress: Progress | None = None,
+        **options: Unpack[Options],
+    ) -> Explanation:
+        """What changes, in words, and `vcc.Camera.explain` of the moment at which the exposure begins.
+
+        Args:
+            light_field: as in `capture`.
+            how: as in `capture`.
+            start: as in `capture`.
+            executor: as in `capture`.
+            progress: as in `vcc.Camera.explain`.
+            options: as in `capture`.
+
+        Returns:
+            Text; its plan, and the seconds that are foretold, are those of this moment.
+
+        Raises:
+            InputError: as `vcc.Camera.explain`; a video that has not begun then, or is over.
+        """
+        light = light_of(light_field)
+        light.check_lasts(start, start)
+        samples = light.at(start)[0][1]()
+        one = self.at(0.0).explain(samples, how, executor=executor, progress=progress, **options)
+        if not self.listed():
+            return one
+        changing = [
+            "What changes over time",
+            *self.listed(),
+            f"what switches takes one picture for each state, what goes on changing {LEAST} moments or more from "
+            "break to break; what follows is the moment at which the exposure begins",
+        ]
+        found = Explanation(wrapped("\n  ".join(changing)) + f"\n\n{one}")
+        found.plan, found.expected_seconds = one.plan, one.expected_seconds
+        found.expected_seconds_by_executor = one.expected_seconds_by_executor
+        return found
 
     def capture(
         self,
@@ -219,6 +287,8 @@ class _Work:
     def gathered(self, exposure: float, tolerance: float, progress: Progress | None) -> Image:
         breaks = (*self._moving.breaks, *(time - self._start for time in self._light.breaks))
         parts = pieces(0.0, exposure, breaks)
+        for begin, _ in parts:  # before long work
+            self._parts(begin)
         total, error, reached, passed = None, 0.0, True, 0.0
         for done, (begin, end) in enumerate(parts, start=1):
             share = (end - begin) / exposure

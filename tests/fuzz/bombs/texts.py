@@ -24,6 +24,12 @@ def camera(old: str, new: str, refused: bool = True) -> Bomb:
     return Bomb(change, "camera.toml", readers.camera, refused=refused)
 
 
+def _moving(old: str, new: str, refused: bool = True) -> Bomb:
+    """The file of a moving camera with something else in it."""
+    change = changed(seeds.moving_camera, "camera.toml", lambda data: data.replace(old.encode(), new.encode()))
+    return Bomb(change, "camera.toml", readers.moving_camera, refused=refused)
+
+
 def _cells(name: str, data: bytes) -> Bomb:
     """A mask's file with something else in it."""
     return Bomb(changed(seeds.camera(Path(name).suffix), name, data), "camera.toml", readers.camera)
@@ -83,6 +89,10 @@ BOMBS = {
     "camera sensor negative": camera(SHAPE, "shape = [-5, 5]"),
     "camera mura 10^9+7": camera(CELLS, '{ name = "mura", prime = 1000000007 }'),
     "camera harmonics 10^9": camera("harmonics = 2", "harmonics = 1000000000"),
+    "moving nested 500": _moving('["151 mm", "153 mm"]', _nested(500)),
+    "moving tables 5000": _moving("[moving]", f"[moving]\n{'a.' * 5000}b = 1"),
+    "moving code of 10^6": _moving("1101001", "01" * 5 * 10**5, refused=False),
+    "moving times 1e999": _moving('"90 ms"]', '"1e999 ms"]'),
     "lens dat 20000 lines": _lens("a.dat", LENS + "0.0001 0 1.5 1\n" * 20000, refused=False),
     "lens dat tiny radius": _lens("a.dat", "1e-320 1 1.5 10\n-1e-320 1 1 10\n"),
     "lens dat huge": _lens("a.dat", "1e308 1e308 1e308 1e308\n-1e308 1 1 1e308\n", refused=False),
