@@ -29,6 +29,7 @@ from vcc.camera_file import ELEMENT_KINDS
 from vcc.cli.synth.rendering import ViewsAndPixels
 from vcc.engines import array_api
 from vcc.gallery.entry import Entry, Result
+from vcc.motion import load_moving_camera
 from vcc.sources import CameraArray
 
 ROOT = Path(__file__).parents[1]
@@ -309,9 +310,12 @@ def load(text):
     """A camera file is read, and as it was when it is written and read again."""
     for file in camera_files(text):
         Path("shown.toml").write_text(file, encoding="utf-8")
-        camera = vcc.load_camera("shown.toml")
+        camera = load_moving_camera("shown.toml")
         camera.save("again.toml")
-        assert vcc.load_camera("again.toml") == camera
+        again = load_moving_camera("again.toml")
+        assert (again.camera, again.courses, again.shutter) == (camera.camera, camera.courses, camera.shutter)
+        if "[moving]" not in file:
+            assert vcc.load_camera("again.toml") == vcc.load_camera("shown.toml")
 
 
 @pytest.mark.parametrize("page", RUN, ids=name_of)

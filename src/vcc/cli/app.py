@@ -22,6 +22,7 @@ COMMANDS = {
         "vcc capture camera.toml views/ -o picture.exr --interpolation cubic",
         "vcc capture camera.toml scene.zarr -o picture.exr --executor processes",
         'vcc capture camera.toml video.zarr -o picture.png --start "0.2 s" --exposure-time "20 ms"',
+        'vcc capture moving.toml views/ -o picture.png --exposure-time "90 ms"',
     ),
     "expose": (
         "Record a light field as a real sensor would: photons, electrons, noise, raw numbers.\n\n"

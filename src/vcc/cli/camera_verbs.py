@@ -27,12 +27,24 @@ def captured(camera: Camera, field: Samples, how: How, progress: Progress, execu
 
 
 def captured_over_time(
-    camera: Camera, video: StoredVideo, timing: Timing, how: How, progress: Progress, executor: Any = None
+    moving: MovingCamera,
+    light: Samples | StoredVideo,
+    timing: Timing,
+    how: How,
+    progress: Progress,
+    executor: Any = None,
 ) -> Image:
-    """The picture of a moment of a video, or what the sensor gathers of it over an exposure."""
-    start, length = timing.of(video)
-    moving = MovingCamera(camera)
-    return moving.capture(video, length, how, start=start, progress=progress, executor=executor)
+    """The picture of a moment of a video, or what the sensor gathers over an exposure."""
+    start, length = timing.of(light)
+    return moving.capture(
+        light,
+        length,
+        how,
+        start=start,
+        time_tolerance=timing.time_tolerance,
+        progress=progress,
+        executor=executor,
+    )
 
 
 def exposed(
@@ -51,6 +63,6 @@ def exposed(
     )
 
 
-def explained(camera: Camera, field: Samples, how: How, executor: Any = None) -> Explanation:
+def explained(camera: MovingCamera, field: Samples, how: How, executor: Any = None) -> Explanation:
     """The plan in words."""
     return camera.explain(field, how, executor=executor)

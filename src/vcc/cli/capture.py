@@ -1,12 +1,12 @@
 """``vcc capture``: the picture that a camera records."""
 
-from vcc.camera_file import load_camera
 from vcc.cli.camera_verbs import captured, captured_over_time
 from vcc.cli.console import check_output, progress, show
 from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, Factor, LightFieldFile, Making, Output, Reading
 from vcc.cli.timing import Timing
 from vcc.files.pictures import WRITE_ENDINGS
+from vcc.motion import load_moving_camera
 from vcc.store import StoredVideo
 
 
@@ -32,13 +32,14 @@ def capture(
         as_recorded: Leave the picture upside down, as it lies on the sensor.
     """
     output = check_output(output, WRITE_ENDINGS)
-    optics = load_camera(camera)
+    moving = load_moving_camera(camera)
+    moves = bool(moving.listed())
     executing.check(light_field)
-    timing.check(light_field)
+    timing.check(light_field, camera, moves)
     field = reading.light(light_field)
     with executing.opened() as executor, progress("Capturing") as advance:
-        if isinstance(field, StoredVideo):
-            image = captured_over_time(optics, field, timing, how, advance, executor)
+        if moves or isinstance(field, StoredVideo):
+            image = captured_over_time(moving, field, timing, how, advance, executor)
         else:
-            image = captured(optics, field, how, advance, executor)
+            image = captured(moving.camera, field, how, advance, executor)
     show(image.save(output, exposure=exposure, upright=not as_recorded).description)

@@ -1,10 +1,10 @@
 """``vcc explain``: how a picture would be made."""
 
-from vcc.camera_file import load_camera
 from vcc.cli.camera_verbs import explained
 from vcc.cli.console import show
 from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Reading
+from vcc.motion import load_moving_camera
 
 
 def explain(
@@ -17,8 +17,8 @@ def explain(
     reading: Reading = Reading(),
 ) -> None:
     """Say how a picture would be made, what it costs and what to beware of."""
-    optics = load_camera(camera)
+    moving = load_moving_camera(camera)
     executing.check(light_field)
     field = reading.light_field(light_field)
     with executing.opened() as executor:
-        show(str(explained(optics, field, how, executor)))
+        show(str(explained(moving, field, how, executor)))

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded
-from vcc.cli.options import MAKING, Given, duration, quantity, told
+from vcc.cli.options import MAKING, Given, above_zero, duration, quantity, told
+from vcc.motion.moving_camera import TOLERANCE
 from vcc.store import StoredVideo, is_video
 
 Duration = Annotated[float, quantity("TIME", duration)]
@@ -17,39 +18,64 @@ Duration = Annotated[float, quantity("TIME", duration)]
 @Parameter(name="*", group=MAKING)
 @dataclass(frozen=True, kw_only=True)
 class Timing(Given):
-    """When the shutter is open before a video.
+    """When the shutter is open before a video, or in a camera that moves.
 
     Args:
         start: Of a video, when the shutter opens: "0.2 s". Default: with the first frame.
-        exposure_time: Of a video, how long it stays open: "20 ms". Default: for the moment --start.
+        exposure_time: Of a video or a camera file with a table [moving], how long it stays open: "20 ms". Default:
+            of a video, for the moment --start.
+        time_tolerance: How exact the mean over that time is, as a share of the picture's mean.
     """
 
     start: Duration | None = None
     exposure_time: Duration | None = None
+    time_tolerance: Annotated[float, quantity("NUMBER", above_zero)] = TOLERANCE
 
-    def check(self, light_field: Path) -> None:
+    def check(self, light_field: Path, camera: Path, moves: bool) -> None:
         """Refuse what does not go together, before anything is read.
 
-        Raises:
-            InputError: times for light that stays as it is.
-        """
-        given = told(self)
-        if given and expanded(light_field).exists() and not is_video(light_field):
-            raise InputError(f"{light_field} is no video, and stays as it is: leave out {', '.join(given)}")
+        Args:
+            light_field: what the camera looks at.
+            camera: its file.
+            moves: whether it changes over time.
 
-    def of(self, video: StoredVideo) -> tuple[float, float]:
+        Raises:
+            InputError: times for light that stays as it is and a camera that stands still, or none for one that
+                moves.
+        """
+        given, stays = told(self), expanded(light_field).exists() and not is_video(light_field)
+        if moves and self.exposure_time is None:
+            raise InputError(
+                f"{camera} changes over time (table [moving]): say how long its shutter is open, "
+                '--exposure-time "20 ms"'
+            )
+        if stays and self.start is not None:
+            raise InputError(f"{light_field} is no video, and stays as it is: leave out --start")
+        if given and stays and not moves:
+            raise InputError(
+                f"{light_field} is no video, {camera} has no table [moving]: what stays as it is takes no time, "
+                f"leave out {', '.join(given)}"
+            )
+
+    def of(self, light: Any) -> tuple[float, float]:
         """(start, length) of the exposure, seconds.
 
+        Args:
+            light: a light field, or a video.
+
         Raises:
-            InputError: nothing is said of it, or the video has no frame.
+            InputError: nothing is said of a video, or it has no frame.
         """
-        if not video:
-            raise InputError(f"{video.path} is a video that has no frame yet")
-        first, last = video.times[0], video.times[-1]
-        if not told(self):
+        length = self.exposure_time or 0.0
+        if not isinstance(light, StoredVideo):
+            return 0.0, length
+        if not light:
+            raise InputError(f"{light.path} is a video that has no frame yet")
+        first, last = light.times[0], light.times[-1]
+        if self.start is None and self.exposure_time is None:
             raise InputError(
-                f'{video.path} is a video from {first:g} s to {last:g} s: say when, --start "{first:g} s" for a '
+                f'{light.path} is a video from {first:g} s to {last:g} s: say when, --start "{first:g} s" for a '
                 'moment, and --exposure-time "10 ms" for longer; or take one of its frames, '
-                f"{video.path / video.places[0].name}"
+                f"{light.path / light.places[0].name}"
             )
-        return first if self.start is None else self.start, self.exposure_time or 0.0
+        return first if self.start is None else self.start, length
