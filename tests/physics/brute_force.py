@@ -31,7 +31,10 @@ class Texture:
     """(amplitude, fx, fy, phase) of each cosine."""
 
     def __call__(self, x: Array, y: Array) -> Array:
-        total = np.full(np.broadcast_shapes(np.shape(x), np.shape(y)), self.mean)
+        shape = np.broadcast_shapes(np.shape(x), np.shape(y))
+        if np.ndim(x) == np.ndim(y) == 2 and np.shape(x)[0] == np.shape(y)[1] == 1:
+            return self._along_axes(x, y)
+        total = np.full(shape, self.mean)
         crossed = np.size(x) + np.size(y) < total.size
         for amplitude, fx, fy, phase in self.waves:
             along, down = 2 * np.pi * fx * x + phase, 2 * np.pi * fy * y
@@ -41,6 +44,15 @@ class Texture:
             else:
                 total += amplitude * np.cos(along + down)
         return total
+
+    def _along_axes(self, x: Array, y: Array) -> Array:
+        """The same of a row of x and a column of y: all waves at once, as a product of matrices."""
+        amplitude, fx, fy, phase = np.array(self.waves).reshape(-1, 4).T
+        along, down = 2 * np.pi * fx[:, None] * x + phase[:, None], 2 * np.pi * y * fy
+        of_rows = np.concatenate([np.cos(down), -np.sin(down)], axis=1)
+        return self.mean + of_rows @ np.concatenate(
+            [amplitude[:, None] * np.cos(along), amplitude[:, None] * np.sin(along)]
+        )
 
 
 def cosines(seed: int, periods: Sequence[float], amplitude: float = 0.1, mean: float = 0.5) -> Texture:

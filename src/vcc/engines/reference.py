@@ -116,21 +116,31 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
     """Bytes that a run takes beside the samples and the raster, estimated: mostly of numbers of 8 bytes."""
     if isinstance(core, Rays):
         return memory_of_rays(core)
-    # A view in double precision, divided, and times its weights; shares of one row.
-    return 24 * channels * core.samples[0] * core.samples[1] * core.refine**2 + 16 * math.prod(core.samples)
+    # A view in double precision, divided, and times its weights; its shares, and lines of it added up.
+    rows, columns = core.samples
+    divided = core.refine * rows, core.refine * columns
+    shared = math.prod(divided) + core.raster_shape[0] * divided[0] + core.raster_shape[1] * divided[1]
+    return 24 * channels * math.prod(divided) + 16 * shared + 8 * channels * core.raster_shape[0] * divided[1]
 
 
 def _spread(core: Footprints, raster: Array, flux: Array, b: int, a: int, k: Array, l: Array) -> None:
     """Add each sample's light to the pixels under its footprint."""
     rows, columns = core.raster_shape
-    fine = core.refine
-    pixel = np.arange(columns, dtype=float)
-    y = core.y[b, a] + core.step[1, 0] * k[None, :] + core.step[1, 1] * l[:, None]
-    for row in range(rows):
-        share_y = shares(core.interpolation, float(row), y, core.row_step / fine, core.opening)
+    row, column = np.arange(rows, dtype=float), np.arange(columns, dtype=float)[:, None]
+    row_step, column_step, shear = core.row_step, core.column_step, core.shear
+    down = partial(shares, core.interpolation, step=row_step / core.refine, opening=core.opening)
+    across = partial(shares, core.interpolation, step=column_step / core.refine, opening=core.opening)
+    if (
+        core.step[1, 0] == 0 == shear
+    ):  # all columns of samples fall into the same rows, all rows into the same columns
+        lines = np.tensordot(down(pixel=row[:, None], position=core.y[b, a] + row_step * l), flux, 1)
+        raster += across(pixel=column, position=core.x[b, a] + column_step * k) @ lines
+        return
+    y = core.y[b, a] + core.step[1, 0] * k[None, :] + row_step * l[:, None]
+    for r in row:
+        share_y = down(pixel=r, position=y)
         if not share_y.any():
             continue
         line = (share_y[..., None] * flux).sum(axis=0)
-        x = core.x[b, a] + core.shear * (row - core.y[b, a]) + core.column_step * k
-        across = shares(core.interpolation, pixel[:, None], x[None, :], core.column_step / fine, core.opening)
-        raster[row] += across @ line
+        x = core.x[b, a] + shear * (r - core.y[b, a]) + column_step * k
+        raster[int(r)] += across(pixel=column, position=x) @ line

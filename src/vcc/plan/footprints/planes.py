@@ -232,6 +232,17 @@ def _fine_means(pattern: Pattern, x: Array, y: Array, width: float, height: floa
     return pattern.mean(x, y, width, height)
 
 
+def _means_around(values: Array, length: float) -> Array:
+    """Means over so many rows, 1 or more, around each row; zeros beyond the first and the last."""
+    rows, whole = len(values), int((length - 1) / 2)
+    cut = (length - 1) / 2 - whole  # what counts of the rows at the ends
+    padded = np.zeros((rows + 2 * whole + 2, *values.shape[1:]))
+    padded[whole + 1 : whole + 1 + rows] = values
+    sums = np.cumsum(padded, axis=0)
+    inner = sums[2 * whole + 1 : -1] - sums[:rows]
+    return np.asarray((inner + cut * (padded[:rows] + padded[2 * whole + 2 :])) / length)
+
+
 def detail_lost(plane: Plane, known: Array, added: Array) -> float:
     """The share of a pattern's variance that averaging over ``added`` takes away after ``known``, metres."""
     if (added <= 0).all():
@@ -247,15 +258,16 @@ def detail_lost(plane: Plane, known: Array, added: Array) -> float:
     whole = values.var()
     if whole < 1e-12:
         return 0.0
-    means = Cells(np.clip(values, 0.0, 1.0), float(size[0]), float(size[1]))
+    values = np.clip(values, 0.0, 1.0)
     # A pattern without bounds goes on beyond what is looked at: only what lies within is compared.
     reach = np.ceil(np.where(bounded, 0.0, np.hypot(known, added) / 2 / cell)).astype(int)
     across, down = (slice(n, max(count - n, n + 1)) for n, count in zip(reach, counts, strict=True))
 
     def variance(box: Array) -> float:
         # What is twice as wide as the pattern holds all of it wherever it lies: what is wider has less on average.
-        wide, high = np.clip(box, cell, 2 * size)
+        wide, high = np.clip(box, cell, 2 * size) / cell
         share = float(np.prod(np.minimum(1.0, 2 * size / np.maximum(box, cell))))
-        return share**2 * float(means.mean(x[None, across], y[down, None], float(wide), float(high)).var())
+        means = _means_around(_means_around(values, float(high))[down].T, float(wide))[across]
+        return share**2 * float(means.var())
 
     return (variance(known) - variance(np.hypot(known, added))) / float(whole)

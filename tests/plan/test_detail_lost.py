@@ -1,0 +1,32 @@
+"""How much of a mask's detail averaging takes away."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vcc.base.units import mm
+from vcc.plan.footprints.planes import Plane, _means_around, detail_lost
+from vcc.shapes.patterns import Cells, CosineSum
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_means_along_both_axes_are_those_over_rectangles_of_cells(seed):
+    rng = np.random.default_rng(seed)
+    rows, columns = rng.integers(8, 40, 2)
+    cells = Cells(rng.random((rows, columns)), columns * mm, rows * mm)
+    wide, high = (float(rng.uniform(1, 2 * n)) for n in (columns, rows))
+    if seed < 2:
+        wide, high = 1.0, 5.0
+    x, y = ((np.arange(n) - (n - 1) / 2) * mm for n in (columns, rows))
+    found = _means_around(_means_around(cells.values, high).T, wide).T
+    np.testing.assert_allclose(found, cells.mean(x[None, :], y[:, None], wide * mm, high * mm), atol=1e-13)
+
+
+def test_of_cosines_as_much_as_their_mean_over_a_box_has_less_variance():
+    pattern, box = CosineSum(period=(1 * mm, np.inf), harmonics=1), 0.4 * mm
+    plane = Plane(pattern, "cosines", (0.0, 0.0), np.zeros((2, 4)), np.zeros(2))
+    lost = detail_lost(plane, np.zeros(2), np.array([box, 0.0]))
+    # Looked at in 8 parts of the box, over 64 boxes: of means over parts, their mean over a box.
+    parts = np.sinc(0.4) / np.sinc(0.4 / 8)
+    assert lost == pytest.approx(1 - parts**2, abs=0.02)
