@@ -74,7 +74,9 @@ def draw_labels(pen: Pen, camera: Train, own_figure: bool) -> None:
         if own_figure:
             figure = pen.axes.figure
             assert isinstance(figure, Figure)
-            figure.draw_without_rendering()
+            layout = figure.get_layout_engine()
+            assert layout is not None
+            layout.execute(figure)
         left, right = pen.axes.get_xlim()
         millimetres = (right - left) / pen.axes.bbox.width  # per pixel
         widths = [(Text.get_window_extent(label).width + LABEL_GAP) * millimetres for label in labels]
