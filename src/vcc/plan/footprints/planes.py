@@ -234,13 +234,19 @@ def _fine_means(pattern: Pattern, x: Array, y: Array, width: float, height: floa
 
 def _means_around(values: Array, length: float) -> Array:
     """Means over so many rows, 1 or more, around each row; zeros beyond the first and the last."""
+    if length == 1:
+        return values
     rows, whole = len(values), int((length - 1) / 2)
     cut = (length - 1) / 2 - whole  # what counts of the rows at the ends
     padded = np.zeros((rows + 2 * whole + 2, *values.shape[1:]))
     padded[whole + 1 : whole + 1 + rows] = values
-    sums = np.cumsum(padded, axis=0)
-    inner = sums[2 * whole + 1 : -1] - sums[:rows]
-    return np.asarray((inner + cut * (padded[:rows] + padded[2 * whole + 2 :])) / length)
+    means = padded[:rows] + padded[2 * whole + 2 :]
+    means *= cut
+    sums = np.cumsum(padded, axis=0, out=padded)
+    means += sums[2 * whole + 1 : -1]
+    means -= sums[:rows]
+    means /= length
+    return means
 
 
 def detail_lost(plane: Plane, known: Array, added: Array) -> float:
