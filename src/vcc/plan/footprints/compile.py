@@ -431,5 +431,5 @@ def _check_raster(sensor_shape: tuple[int, int], guard: int) -> None:
         raise InputError(
             f"neighbouring views' pictures lie {guard} pixels apart on the sensor: closing the gaps takes a "
             f"margin of as many pixels, {rows}×{columns} in all. Give the sensor larger pixels, move it closer "
-            "to focus, or pass between_views='none'"
+            "to focus, or, in a program, pass between_views='none'"
         )

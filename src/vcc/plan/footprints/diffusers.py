@@ -177,7 +177,19 @@ def _on_lattice(kernel: Kernel, steps_from_slopes: Array, sharp: bool, decisions
         losses = min(max(12 * added, 0.0), 3.0)
         beside = decisions.keep(f"filter along axis {axis}", partial(weights_beside, losses, 1.0))
         filters.append(along_axis(losses, 1.0, beside=beside))
-    return _convolved(weights, np.outer(filters[1], filters[0]))
+    return _filtered(_filtered(weights, filters[1], 0), filters[0], 1)
+
+
+def _filtered(weights: Array, along: Array, axis: int) -> Array:
+    """Weights convolved along one axis with an odd number of weights, and as many but one more of them there.
+
+    One axis after the other: a wide kernel has millions of weights.
+    """
+    from scipy.ndimage import convolve1d
+
+    room = [(0, 0), (0, 0)]
+    room[axis] = (len(along) // 2, len(along) // 2)
+    return np.asarray(convolve1d(np.pad(weights, room), along, axis=axis, mode="constant"))
 
 
 def _beside(kernel: Kernel, steps_from_slopes: Array, decisions: Decisions) -> tuple[int, int] | None:

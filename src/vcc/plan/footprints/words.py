@@ -60,7 +60,7 @@ def notes_of(
         )
     if fine > 1:
         further = (
-            f"; finer ones, up to refine={LARGEST_REFINEMENT}, are made when asked for"
+            f"; finer ones are made when a program asks for them, by up to refine={LARGEST_REFINEMENT}"
             if fine == LARGEST_CHOSEN_REFINEMENT
             else ""
         )

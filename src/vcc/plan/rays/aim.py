@@ -34,6 +34,8 @@ SETTLED = 0.01
 """Share of the slack by which it changes where no more rounds are needed."""
 WORTH_NARROWING = 0.7
 """Share of the solid angle asked for below which a smaller one is aimed at; likewise for windows of cells."""
+NOWHERE = Window(np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(2), False, "nothing")
+"""For how far rays stray where that is the same for any aim."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -206,10 +208,12 @@ def found(path: Path) -> tuple[Aimed, Aimed | None]:
 def settled(path: Path, everything: bool) -> Aimed:
     """The smallest aim, slack and all; see `vcc.plan.rays.strips.bounds`."""
     slack, before = Slack.none(path), math.inf
+    if _strays_alike(path):
+        _, slack = strayed(path, NOWHERE)
     for _ in range(ROUNDS):
         aim = smallest(path, slack, everything)
         regions, further = strayed(path, aim)
-        if further.same(slack):
+        if further.same(slack) and slack.size <= UNBOUNDED:
             return Aimed(aim, regions, slack, everything)  # another round would find the same
         slack = further
         if abs(slack.size - before) <= SETTLED * before < math.inf:
@@ -221,6 +225,12 @@ def settled(path: Path, everything: bool) -> Aimed:
         _refuse(path)
     aim = smallest(path, slack, everything)  # once more, with all that rays can stray by
     return Aimed(aim, strayed(path, aim)[0], slack, everything)
+
+
+def _strays_alike(path: Path) -> bool:
+    """Whether rays stray as far wherever they are aimed: through lenses, lenslets and prisms alone."""
+    bent = [leg for leg in path.legs if leg.stage.faces.bending is not None]
+    return not path.scatters and all(_the_same_anywhere(leg) for leg in bent)
 
 
 def _refuse(path: Path) -> NoReturn:
