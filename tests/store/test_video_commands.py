@@ -17,15 +17,24 @@ from vcc.store import create_video, open_video
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.ResultWarning")  # of noise in few views
 
 
-@pytest.fixture
-def video(tmp_path, monkeypatch):
-    """Three frames; this is the folder to work in."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "camera.toml").write_text(CAMERA)
-    with create_video("v.zarr", provenance={"scene": "noise"}) as frames:
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A folder with a camera, a video of three frames, and one of none."""
+    folder = tmp_path_factory.mktemp("kept")
+    (folder / "camera.toml").write_text(CAMERA)
+    with create_video(folder / "v.zarr", provenance={"scene": "noise"}) as frames:
         for n in range(3):
             views = np.random.default_rng(n).random((3, 4, 20, 24, 3), dtype=np.float32)
             frames.append(vcc.LightField.from_views(views, 1e-3, 0.02, 1.3), n / 50)
+    create_video(folder / "empty.zarr").__exit__(None, None, None)
+    return folder
+
+
+@pytest.fixture
+def video(tmp_path, monkeypatch, kept):
+    """Three frames; this is the folder to work in."""
+    shutil.copytree(kept, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
     return open_video("v.zarr")
 
 
@@ -60,7 +69,6 @@ def test_info_says_what_a_video_is(video):
     said = run("info", "v.zarr").stdout
     assert "size            about " in said
     assert "stops; of frames 0, 2, 3" in said
-    create_video("empty.zarr")
     assert "none yet" in run("info", "empty.zarr").stdout
 
 
@@ -94,7 +102,6 @@ def test_capture_takes_a_moment_or_an_exposure(video):
     ],
 )  # fmt: skip
 def test_what_a_video_is_not_taken_for_is_said(video, command, words):
-    create_video("empty.zarr").__exit__(None, None, None)
     assert words in refused(*command.split())
 
 

@@ -180,8 +180,7 @@ class VideoWriter:
                 yield writer
         finally:
             self._busy = False
-            with suppress(OSError):  # another frame is in it
-                folder.rmdir()
+            _removed_if_empty(folder)
 
     def _put(self, part: Path, common: Common, place: Place) -> None:
         """Give a finished frame its name."""
@@ -299,6 +298,7 @@ def create_video(
                 f'{folder} states that it is "{video.between}" between frames, not "{between}": leave between out'
             )
         lost = clear_folder(folder / UNFINISHED, lock.patience)
+        _removed_if_empty(folder / UNFINISHED)
         if lost:
             last = f"it goes on after {video.places[-1].words}" if video else "it has no frame yet"
             warn_of_result(f"{folder}: a writer was stopped in a frame, of which nothing is kept: {last}")
@@ -323,6 +323,11 @@ def _begin(folder: Path, attributes: VideoAttributes) -> None:
         raise InputError(f"{folder} cannot be made: {error.strerror or error}") from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+def _removed_if_empty(folder: Path) -> None:
+    with suppress(OSError):  # it is not there, or a frame is in it
+        folder.rmdir()
 
 
 def _made(folder: Path) -> None:
