@@ -497,6 +497,7 @@ def test_wrong_attributes_are_named(path, keys, words):
         ({"shape": 7}, "its grid cannot be used"),
         ({"dtype": "float64"}, "dtype is one of"),
         ({"frame": [[1]]}, "its grid cannot be used: an affine map"),
+        ({"frame": [[10**400] * 5] * 5}, "its grid cannot be used: int too large"),
         ({"transfer": "log"}, "transfer is 'linear' or 'srgb'"),
         ({"channel_names": ["red"]}, "1 channel_names for 3 channels"),
         ({"channel_names": 5}, "its grid cannot be used"),

@@ -114,7 +114,7 @@ class Attributes(Brief):
                 complete=stated["complete"],
                 sample=stated.get("sample", "mean"),
             )
-        except (TypeError, ValueError, InputError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{path}: its attributes cannot be used: {error}") from None
         made.check(str(path))
         return made

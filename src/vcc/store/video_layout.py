@@ -112,7 +112,7 @@ class Common(Brief):
                 None if names is None else tuple(names),
             )
             check_shape(made.shape)
-        except (TypeError, ValueError, InputError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{path}: its grid cannot be used: {error}") from None
         attributes = Attributes(made.frame, made.transfer, made.channel_names, sample=made.sample)
         attributes.check(str(path), made.shape[4] if len(made.shape) == 5 else None)
