@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from os import PathLike
 from typing import Any, Literal, Self, TypeVar, Unpack
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
 from vcc.advice.darkness import why_dark, why_darker
@@ -13,6 +16,7 @@ from vcc.advice.explain import Explanation, explained
 from vcc.base import checks, late
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
+from vcc.engines import chosen as chosen_engine
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
 from vcc.files.camera_writing import write_train
 from vcc.image import Image
@@ -22,14 +26,13 @@ from vcc.optics.focusing import focused_train
 from vcc.optics.plenoptic import Plenoptic
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
-from vcc.plan.choice import compile_best, compile_several
+from vcc.plan.choice import compile_best, compiled_each, mixture_of
 from vcc.plan.how import OF_THE_RUN, How, Options
 from vcc.plan.model import Plan
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
-from vcc.run.drive import Drive, Recorded, drive, recorded_together
+from vcc.run.drive import Recorded, drive, each_recorded, recorded_mixed
 from vcc.run.expose import Exposure
-from vcc.run.needed import needed
 from vcc.run.operator import Operator
 from vcc.run.operators import carried_to
 
@@ -389,23 +392,36 @@ class Camera(Train):
 
 
 def captured_together(
+    cameras: Sequence[Camera], light_field: Samples, how: How, *, seeds: Sequence[int] | None = None
+) -> list[Image]:
+    """What `Camera.capture` gives of one light field for several cameras, in their order; see `each_captured`."""
+    images = dict(each_captured(cameras, light_field, how, seeds=seeds))
+    return [images[number] for number in range(len(cameras))]
+
+
+def each_captured(
     cameras: Sequence[Camera],
     light_field: Samples,
     how: How,
-    progress: Progress | None = None,
     *,
     seeds: Sequence[int] | None = None,
-) -> list[Image]:
+    room: Callable[[Sequence[int]], NDArray[np.float32] | None] | None = None,
+) -> Iterator[tuple[int, Image]]:
     """What `Camera.capture` gives of one light field for several cameras, which share what they can of the work.
 
-    Each is planned by itself; `vcc.run.drive.recorded_together` says what plans share.
+    Cameras that differ in the cells of one mask alone, and are many, are made of a few pictures
+    (`vcc.plan.footprints.mixtures`). Others are planned each by itself, while those before them are at work, and
+    `vcc.run.drive.each_recorded` says what they share.
 
     Args:
-        cameras: as many as there is memory for their pictures.
+        cameras: in memory for some hundred bytes each; their pictures are made as they are asked for.
         light_field: as in `Camera.capture`.
         how: likewise.
-        progress: likewise.
         seeds: of rays, one for each camera; None takes that of ``how`` for all.
+        room: where some of the pictures may be made, see `vcc.run.drive.recorded_mixed`.
+
+    Returns:
+        Each camera's number and picture, as they are made.
 
     Warns:
         ResultWarning: as `Camera.capture`, for each camera.
@@ -416,11 +432,29 @@ def captured_together(
     check_is_light_field(light_field)
     light_field.check_complete()
     if how.between_views == "depth":
-        return [camera.capture(light_field, how, progress=progress) for camera in cameras]
-    absurd = [camera._absurd(light_field) for camera in cameras]
-    plans = compile_several(cameras, light_field.grid, how, seeds)
-    for caution in (caution for plan in plans for caution in plan.cautions):
-        warn_of_result(caution)
-    drives = [Drive(*needed(plan, light_field), how) for plan in plans]
-    made = zip(cameras, plans, recorded_together(drives), absurd, strict=True)
-    return [camera._image(plan, light_field, found, said) for camera, plan, found, said in made]
+        yield from enumerate(camera.capture(light_field, how) for camera in cameras)
+        return
+    by_numba = chosen_engine(how.engine, light_field.whole()) == "numba"
+    mixture = mixture_of(cameras, light_field.grid, how) if by_numba else None
+    if mixture is not None:
+        absurd = metres_meant(cameras[0], light_field.grid)  # of all of them: they differ in cells alone
+        found = zip(mixture.members, recorded_mixed(mixture, light_field, how, room), strict=True)
+        for number, one in found:
+            camera = cameras[number]
+            # A picture that is dark is explained by the camera's own plan.
+            plan = mixture.plans[0] if one.values.any() else camera.compile(light_field, how)
+            yield number, camera._image(plan, light_field, one, camera._absurd(light_field) if absurd else "")
+    done = set() if mixture is None else set(mixture.members)
+    left = [number for number in range(len(cameras)) if number not in done]
+    plans = compiled_each(
+        [cameras[number] for number in left],
+        light_field.grid,
+        how,
+        None if seeds is None else [seeds[number] for number in left],
+    )
+    recorded_each = each_recorded(plans, light_field, how)
+    for number, (plan, one) in zip(left, recorded_each, strict=True):
+        for caution in plan.cautions:
+            warn_of_result(caution)
+        camera = cameras[number]
+        yield number, camera._image(plan, light_field, one, camera._absurd(light_field))

@@ -7,7 +7,7 @@ import pytest
 
 import vcc
 from vcc.plan import choice
-from vcc.plan.choice import compile_best, compile_several
+from vcc.plan.choice import compile_best, compiled_each
 from vcc.plan.how import How
 from vcc.units import mm
 
@@ -48,7 +48,7 @@ def test_plans_made_together_are_those_made_alone(case, refine, monkeypatch):
     elements, where = CASES[case]
     listed, how, anew = cameras(elements, **where), How(refine=refine if case != "an array" else "auto"), []
     monkeypatch.setattr(choice, "compile_best", lambda *given: anew.append(given) or compile_best(*given))
-    together = compile_several(listed, FIELD.grid, how)
+    together = list(compiled_each(listed, FIELD.grid, how))
     assert (not anew) == (case in SHARED)
     for camera, plan in zip(listed, together, strict=True):
         alone = compile_best(camera, FIELD.grid, how)
@@ -70,5 +70,5 @@ def test_cameras_that_differ_in_more_are_planned_alone():
     smaller = vcc.Camera([one.elements[0], vcc.Mask(np.eye(3), 8 * mm, name="code")], SENSOR)
     circle = vcc.Camera([one.elements[0], vcc.Mask(vcc.patterns.Circle(5 * mm), 8 * mm, name="code")], SENSOR)
     for different in (moved, smaller, circle):
-        first, second = compile_several([one, different], FIELD.grid, How())
+        first, second = compiled_each([one, different], FIELD.grid, How())
         assert (first, second) == tuple(compile_best(each, FIELD.grid) for each in (one, different))

@@ -103,13 +103,13 @@ def stopped_after(pictures):
 
 def counted(monkeypatch):
     """How many cameras are captured from now on."""
-    captured, made = sweeping.captured_together, []
+    captured, made = sweeping.each_captured, []
 
-    def counting(cameras, *rest):
+    def counting(cameras, *rest, **named):
         made.extend(cameras)
-        return captured(cameras, *rest)
+        return captured(cameras, *rest, **named)
 
-    monkeypatch.setattr(sweeping, "captured_together", counting)
+    monkeypatch.setattr(sweeping, "each_captured", counting)
     return made
 
 

@@ -242,7 +242,7 @@ def test_progress_is_told_and_memory_asked_for(field):
     vcc.sweep(
         camera(), field, {"sensor.z": "52mm:53mm:3"}, progress=lambda done, total: told.append((done, total))
     )
-    assert told == [(3, 3)]
+    assert told == [(1, 3), (2, 3), (3, 3)]
     large = vcc.Camera([vcc.Lens(50 * mm)], vcc.Sensor(52 * mm, (4000, 4000), 2e-6))
     with pytest.raises(vcc.InputError, match=r"50 pictures of 4000×4000×3 needs .*pictures=False"):
         vcc.sweep(large, field, {"sensor.z": "52mm:53mm:50"})
@@ -255,7 +255,8 @@ def test_more_masks_at_the_views_than_views_are_made_of_their_pictures(field, in
     codes[7][:, :2] = 0
     swept = vcc.sweep(camera(), field, {"code.pattern": codes}, interpolation=interpolation)
     for n in (0, 7, 29):
-        same_picture(swept[n], camera(codes[n]).capture(field, interpolation=interpolation))
+        # In double precision: sharpening makes more of the rounding of single precision, 1.6e-6 in `capture`.
+        same_picture(swept[n], camera(codes[n]).capture(field, interpolation=interpolation, engine="reference"))
 
 
 @pytest.mark.filterwarnings("ignore::vcc.ResultWarning")

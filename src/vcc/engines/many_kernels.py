@@ -249,3 +249,31 @@ def _reach(line_of, three, listed, low, entries, ranges, reached):  # type: igno
     for n in range(count):
         order[ends[ranges[n]]] = reached[n]
         ends[ranges[n]] += 1
+
+
+@_compiled
+def mix_piece(values, taken, numbers, pictures, rows, columns):  # type: ignore[no-untyped-def]
+    """pictures[n, top + y, left + x] = Σ_k numbers[n, taken[k]] · values[k, y · (right − left) + x].
+
+    values: (few, values) float32, a run at least, zeros behind the last. taken: (few,) int64. numbers: (pictures,
+    numbers) float32. pictures: (pictures, rows, values of a row) float32. rows: (top, bottom). columns: (left,
+    right), of values.
+    """
+    (top, bottom), (left, right) = rows, columns
+    few, length = values.shape
+    wide, count = right - left, len(numbers)
+    order, ends, places = np.arange(few), np.zeros(10, np.int64), np.arange(few) * length
+    ends[3:] = few
+    share, sums = np.empty((few, ROWS), np.float32), np.empty((ROWS, length), np.float32)
+    entries, flat = Entries(order, ends, places, share), values.reshape(-1)
+    for four in range(0, count, ROWS):
+        for r in range(ROWS):
+            line = numbers[min(four + r, count - 1)]
+            for k in range(few):
+                share[k, r] = line[taken[k]]
+        sum_whole_rows(flat, entries, None, sums, 0, length)
+        for r in range(min(ROWS, count - four)):
+            for y in range(bottom - top):
+                to, here = pictures[four + r, top + y], sums[r, y * wide : (y + 1) * wide]
+                for x in range(wide):
+                    to[left + x] = here[x]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +92,7 @@ class Sensor(Shown):
         """The (height, width) of all pixels together, metres."""
         return self.shape[0] * self.pitches[0], self.shape[1] * self.pitches[1]
 
-    @property
+    @cached_property
     def frame(self) -> Affine:
         """Maps (column, row, 1) to (x, y, 1) of the pixel's centre, metres."""
         rows, columns = self.shape

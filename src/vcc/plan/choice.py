@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from vcc.base.errors import InputError
@@ -13,6 +13,7 @@ from vcc.plan.depth_rule import denser
 from vcc.plan.footprints.codes import Codes
 from vcc.plan.footprints.compile import blurs_or_why_not, compile_footprints
 from vcc.plan.footprints.diffusers import Blurs
+from vcc.plan.footprints.mixtures import Mixture
 from vcc.plan.how import How
 from vcc.plan.model import MadeFor, Plan
 from vcc.plan.rays.compile import compile_rays
@@ -39,28 +40,45 @@ def compile_best(train: Train, grid: Grid, how: How | None = None, decisions: De
     return replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame))
 
 
-def compile_several(
+def compiled_each(
     trains: Sequence[Train], grid: Grid, how: How, seeds: Sequence[int] | None = None
-) -> list[Plan]:
+) -> Iterator[Plan] | list[Plan]:
     """The plans of several trains, as `compile_best` makes each of them; what they share is made once.
 
     Args:
-        trains: one at least.
+        trains: several, or none.
         grid: of the light field.
         how: what was chosen.
         seeds: of rays, one for each train; None takes that of ``how`` for all.
 
+    Returns:
+        A list of plans that differ in one mask, all there; else each as it is asked for.
+
     Raises:
         InputError: as `compile_best`.
     """
-    alone = how.method == "rays" or how.between_views == "depth" or (how.samples, how.tolerance) != (None, None)
-    codes = None if alone or len(trains) < 2 else Codes.of(trains)
-    plans = None if codes is None else codes.plans(grid, how)
+    codes = _codes(trains, how)
+    hows = [how] * len(trains) if seeds is None else [replace(how, seed=seed) for seed in seeds]
+    anew = (compile_best(train, grid, each) for train, each in zip(trains, hows, strict=True))
+    if codes is None:
+        return anew
+    plans = codes.plans(grid, how)
     if plans is None:
-        hows = [how] * len(trains) if seeds is None else [replace(how, seed=seed) for seed in seeds]
-        return [compile_best(train, grid, each) for train, each in zip(trains, hows, strict=True)]
+        return list(anew)
     made = zip(trains, plans, strict=True)
     return [replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame)) for train, plan in made]
+
+
+def mixture_of(trains: Sequence[Train], grid: Grid, how: How) -> Mixture | None:
+    """The pictures of several trains, or of many of them, as sums of fewer pictures; None where that is not so."""
+    codes = _codes(trains, how)
+    return None if codes is None else codes.mixture(grid, how)
+
+
+def _codes(trains: Sequence[Train], how: How) -> Codes | None:
+    """What trains differ in, if that is the cells of one mask, and pictures are made by footprints."""
+    alone = how.method == "rays" or how.between_views == "depth" or (how.samples, how.tolerance) != (None, None)
+    return None if alone or len(trains) < 2 else Codes.of(trains)
 
 
 def _compiled(train: Train, grid: Grid, how: How, decisions: Decisions) -> Plan:

@@ -9,7 +9,9 @@ each the share that is there, and each block meets the same rays.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -29,7 +31,7 @@ from vcc.fields.grid import Block
 from vcc.fields.sampled import has_values, to_dtype, to_numpy
 from vcc.fields.samples import Samples
 from vcc.plan.depth_rule import ViewsBetween
-from vcc.plan.footprints.model import Footprints
+from vcc.plan.footprints.mixtures import Mixture
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
@@ -44,6 +46,10 @@ HELD = 0.25
 """Share of the memory that views and maps, kept to be used again, may take where views in between are made."""
 IN_MEMORY = 2**28
 """Bytes of denser views that are there at a time, of a light field in memory."""
+TOGETHER = 8
+"""Plans that one thread runs together, at most."""
+TOGETHER_BYTES = 2**25
+"""Bytes of their rasters."""
 MUCH_UNSEEN = 0.01
 """Share of the samples between views that no view shows, from which on a warning says it."""
 
@@ -164,45 +170,102 @@ def _called(run: Callable[[], Partial]) -> Partial:
 
 
 def recorded_together(drives: Sequence[Drive]) -> list[Recorded]:
-    """What `Drive.recorded` gives of several plans of one light field.
-
-    Plans that weigh views otherwise and differ in nothing else, more of them than there are views, are made of one
-    picture of each view: all that is done is linear. Others share what `rounds_of` shares.
+    """What `Drive.recorded` gives of several plans of one light field, which share what `rounds_of` shares.
 
     Args:
         drives: plans on their way through one engine, with the same samples.
     """
-    first = drives[0]
-    weights = _weights_of_views(drives)
-    if weights is None:
-        rasters = rounds_of(drives)
-        with Workers(first.threads) as pool:
-            return list(pool.map(Drive.finished, drives, rasters))
-    used = np.flatnonzero(weights.any(axis=0))
-    views = [first.of_one_view(int(tap)) for tap in used]
-    pictures = np.stack([one.picture(found) for one, found in zip(views, rounds_of(views), strict=True)])
-    mixed = weights[:, used].astype(pictures.dtype) @ pictures.reshape(len(used), -1)
-    return [
-        Recorded(values.reshape(pictures.shape[1:]), drive.plan.missing_rays or 0.0, drive.plan.missing_reason)
-        for values, drive in zip(mixed, drives, strict=True)
-    ]
+    rasters = rounds_of(drives)
+    with Workers(drives[0].threads) as pool:
+        return list(pool.map(Drive.finished, drives, rasters))
 
 
-def _weights_of_views(drives: Sequence[Drive]) -> NDArray[np.float64] | None:
-    """The weights of views, (plans, taps), of plans that differ in these alone and are more than taps; or None."""
-    first, cores = drives[0], [drive.plan.core for drive in drives]
-    core = cores[0]
-    if first.name != "numba" or not isinstance(core, Footprints) or len(drives) < core.weights.size:
-        return None
-    for drive in drives:
-        plan = drive.plan
-        same = (plan.before, plan.after, plan.views_between) == (first.plan.before, first.plan.after, None)
-        own = plan.core
-        if not (same and drive.is_one_block and isinstance(own, Footprints)):
-            return None
-        if own.weights.shape != core.weights.shape or replace(own, weights=core.weights) != core:
-            return None
-    return np.stack([one.weights.ravel() for one in cores if isinstance(one, Footprints)])
+def each_recorded(plans: Iterable[Plan], samples: Samples, how: How) -> Iterator[tuple[Plan, Recorded]]:
+    """What `drive` gives of several plans of one light field, one after the other.
+
+    Plans that are there already, a sequence, and plans of samples that are read share what `rounds_of` shares. Of
+    samples in memory others are run as they come, some side by side, each by one thread, while those after them
+    are planned.
+
+    Args:
+        plans: all that is done by one engine.
+        samples: as in `drive`.
+        how: likewise.
+    """
+    alone = (
+        chosen(how.engine, samples.whole()) == "numba" and samples.whole() is not None and how.tolerance is None
+    )
+    if isinstance(plans, Sequence) or not alone:
+        listed = list(plans)
+        drives = [Drive(*needed(plan, samples), how) for plan in listed]
+        yield from zip(listed, recorded_together(drives) if drives else (), strict=True)
+        return
+    begun: deque[tuple[list[Drive], Future[list[Recorded]]]] = deque()
+    before: Drive | None = None
+    with Workers(how.workers) as pool:
+        for group in _groups(Drive(plan, samples, how) for plan in plans):
+            while begun and (len(begun) > how.workers or not group[0].by_one_thread):
+                yield from _taken(*begun.popleft())
+            if not group[0].by_one_thread:
+                yield group[0].plan, group[0].recorded()
+                continue
+            if before is None or group[0].plan.before != before.plan.before:
+                before = group[0]
+            for one in group:
+                one.prepared = before.prepared  # once for all
+            begun.append((group, pool.submit(_recorded_by_one_thread, group)))
+        while begun:
+            yield from _taken(*begun.popleft())
+
+
+def _groups(drives: Iterable[Drive]) -> Iterator[list[Drive]]:
+    """Plans on their way in groups that one thread runs together; each by itself of those that all threads run."""
+    group: list[Drive] = []
+    for made in drives:
+        joined = group and made.by_one_thread and group[0].by_one_thread and len(group) < group[0].fellows
+        if group and not (joined and made.plan.before == group[0].plan.before):
+            yield group
+            group = []
+        group.append(made)
+    if group:
+        yield group
+
+
+def _recorded_by_one_thread(drives: Sequence[Drive]) -> list[Recorded]:
+    """What several plans give of the same samples; the bytes are the same for any number of threads."""
+    alone = [copy(each) for each in drives]
+    for each in alone:
+        each.threads = 1
+    found = alone[0].engine.together([each.core for each in alone], alone[0].prepared, threads=1)
+    if found is None:
+        found = [each.rounds() for each in alone]
+    return list(map(Drive.finished, alone, found))
+
+
+def _taken(drives: Sequence[Drive], found: Future[list[Recorded]]) -> Iterator[tuple[Plan, Recorded]]:
+    return zip((each.plan for each in drives), found.result(), strict=True)
+
+
+def recorded_mixed(
+    mixture: Mixture,
+    samples: Samples,
+    how: How,
+    room: Callable[[Sequence[int]], NDArray[np.float32] | None] | None = None,
+) -> Iterator[Recorded]:
+    """What `drive` gives of several cameras whose pictures are sums of a few.
+
+    Args:
+        mixture: how.
+        samples: as in `drive`.
+        how: likewise.
+        room: gives the memory (cameras, rows, columns[, channels]) in which the pictures of some cameras are to be
+            made, by their numbers, if there is any; new memory takes long.
+    """
+    found = recorded_together([Drive(*needed(plan, samples), how) for plan in mixture.plans])
+    mixed = late.module("vcc.engines.mixed")
+    mixer = mixed.Mixer(mixture, [each.values for each in found], how.workers, room)
+    for values, (missing, reason) in zip(mixer.pictures(), mixture.missing, strict=True):
+        yield Recorded(values, missing, reason)
 
 
 class Drive:
@@ -344,14 +407,16 @@ class Drive:
         """Whether all samples are there and go through one run, by rounds of a fixed number of rays."""
         return self.in_memory and self.how.tolerance is None and len(list(self.blocks)) == 1
 
-    def of_one_view(self, tap: int) -> Drive:
-        """The same by footprints, of the light of one view tap alone, whole."""
-        assert isinstance(self.core, Footprints)
-        weights = np.zeros(self.core.weights.size)
-        weights[tap] = 1.0
-        made = copy(self)
-        made.core = replace(self.core, weights=weights.reshape(self.core.weights.shape))
-        return made
+    @property
+    def by_one_thread(self) -> bool:
+        """Whether several plans are run side by side, each by one thread."""
+        return self.is_one_block and self.name == "numba"
+
+    @property
+    def fellows(self) -> int:
+        """How many plans one thread runs together, so that samples that are in the cache serve all of them."""
+        picture = 4 * math.prod(self.plan.core.raster_shape) * self.channels
+        return int(max(1, min(TOGETHER, TOGETHER_BYTES // picture)))
 
     def rounds_by_one_thread(self) -> Partial:
         """As `rounds`; the bytes are the same for any number of threads."""

@@ -341,23 +341,43 @@ class Cells(Value, Pattern):
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The value of the cell that holds each position; zero outside the array."""
-        row, column = self._index(np.asarray(x, float), np.asarray(y, float))
-        rows, columns = self.values.shape
-        inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-        r = np.clip(np.floor(row), 0, rows - 1).astype(int)
-        c = np.clip(np.floor(column), 0, columns - 1).astype(int)
-        return np.where(inside, self.values[r, c], 0.0)
+        r, c = self.cells_at(np.asarray(x, float), np.asarray(y, float))
+        return np.where((r >= 0) & (c >= 0), self.values[r, c], 0.0)
+
+    def cells_at(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Rows of the cells that hold places y, and columns of those that hold x; −1 outside the array."""
+        places = zip(self._index(x, y), self.values.shape, strict=True)
+        row, column = (
+            np.where((place >= 0) & (place < count), np.floor(place), -1).astype(np.int64)
+            for place, count in places
+        )
+        return row, column
 
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
         """Mean transmission over rectangles, exact (differences of the array's integral)."""
         width, height = max(width, self.width * 1e-5), max(height, self.size[1] * 1e-5)
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if is_grid(x, y):  # then two small products do it
-            overlap_x = _densely(self._overlaps(x.reshape(-1), width, 1))
-            overlap_y = _densely(self._overlaps(y.reshape(-1), height, 0))
-            content = overlap_y @ self.values @ overlap_x.T
-            return np.asarray(content.reshape(np.broadcast_shapes(x.shape, y.shape)))
+            content = self.means(self.values[None], x.reshape(-1), y.reshape(-1), width, height)
+            return content.reshape(np.broadcast_shapes(x.shape, y.shape))
         return _mean_from_integral(self._integral, x, y, width, height)
+
+    def means(self, values: Array, x: Array, y: Array, width: float, height: float) -> Array:
+        """`mean` of several arrays in this one's place, over rectangles in rows and columns.
+
+        Args:
+            values: (arrays, rows, columns).
+            x: centres, metres, (columns of rectangles,).
+            y: centres, metres, (rows of rectangles,).
+            width: of every rectangle, metres.
+            height: of every rectangle, metres.
+
+        Returns:
+            (arrays, rows of rectangles, columns of rectangles).
+        """
+        width, height = max(width, self.width * 1e-5), max(height, self.size[1] * 1e-5)
+        across, down = _densely(self._overlaps(x, width, 1)), _densely(self._overlaps(y, height, 0))
+        return np.stack([down @ each @ across.T for each in values])
 
     def _index(self, x: Array, y: Array) -> tuple[Array, Array]:
         """(row, column) counted from the array's top left corner, cells as units."""

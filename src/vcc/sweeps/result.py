@@ -209,6 +209,10 @@ class Results:
     def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
         """Keep a picture."""
 
+    def room(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:
+        """The memory of some cameras' pictures, one after the other, to make them in; None where there is none."""
+        return None
+
     def commit(self) -> None:
         """What was put is to be there, come what may."""
 
@@ -231,4 +235,14 @@ class InMemory(Results):
 
     def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
         """See `Results`."""
-        self.swept.pictures[place] = values
+        if not np.may_share_memory(values, self.swept.pictures):  # else it was made there
+            self.swept.pictures[place] = values
+
+    def room(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:
+        """See `Results`."""
+        pictures = self.swept.pictures
+        first, count = numbers[0], len(numbers)
+        if list(numbers) != list(range(first, first + count)):
+            return None
+        made: NDArray[np.float32] = pictures.reshape(-1, *pictures.shape[len(self.swept.shape) :])
+        return made[first : first + count]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from os import PathLike
@@ -19,7 +19,7 @@ from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
 from vcc.base.progress import Progress, tell
 from vcc.base.remarks import Remarks
-from vcc.camera import Camera, captured_together
+from vcc.camera import Camera, each_captured
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.plan.how import How, Options
 from vcc.run.executors import Work as Task
@@ -31,13 +31,13 @@ from vcc.sweeps.keeping import InStore
 from vcc.sweeps.metrics import KNOWN, Metric, metrics_in_words, metrics_of, numbers_of, row_of
 from vcc.sweeps.result import InMemory, Results, Sweep
 
-BATCH_BYTES = 2**28
+BATCH_BYTES = 2**29
 """Of the pictures that are made together, about; each of them takes some more while it is made."""
 SHARE_A_READING = 16
 """Cameras that are made together of a light field on disk, at least: so it is not read for each of them."""
 MOST_TOGETHER = 1024
 """Pictures that are made together, at most: progress is told, and results are kept, after each batch."""
-BATCH_SAMPLES = 6 * 10**9
+BATCH_SAMPLES = 10**10
 """Samples that are gone through for pictures that are made together, about: some seconds' work."""
 
 
@@ -191,7 +191,9 @@ class Work(Brief):
         """Make the pictures that are not there yet, and tell what is not told of those that are."""
         todo, untold, remarks = results.left(), results.untold(self.metrics), Remarks()
         done, total = len(self.cameras) - len(todo) - len(untold), len(self.cameras)
-        made = self.made_here(todo, remarks) if executor is None else self.made_by(executor, todo, remarks)
+        made = (
+            self.made_here(todo, results, remarks) if executor is None else self.made_by(executor, todo, remarks)
+        )
         for count in chain(self.told(results, untold), self.put(results, set(todo), made)):
             results.commit()
             done += count
@@ -213,12 +215,12 @@ class Work(Brief):
                 results.put(number, values, numbers)
             yield len(lacking)
 
-    def made_here(self, todo: Sequence[int], remarks: Remarks) -> Iterator[Rows]:
+    def made_here(self, todo: Sequence[int], results: Results, remarks: Remarks) -> Iterator[Rows]:
         """The pictures of cameras, some at a time."""
         for batch in self.batches(todo):
             with remarks.gathered():
-                rows = rows_of(self, batch)
-            yield rows
+                for row in rows_of(self, batch, results.room):
+                    yield [row]
 
     def made_by(self, executor: Any, todo: Sequence[int], remarks: Remarks) -> Iterator[Rows]:
         """The same by an executor, as they come.
@@ -239,29 +241,42 @@ class Work(Brief):
                 yield rows
 
 
-Rows = list[tuple[int, NDArray[np.float32] | None, dict[str, float]]]
-"""Of some cameras: the camera's number, its picture where pictures are kept, and what is told of it."""
+Row = tuple[int, NDArray[np.float32] | None, dict[str, float]]
+"""Of a camera: its number, its picture where pictures are kept, and what is told of it."""
+Rows = list[Row]
 
 
-def rows_of(work: Work, batch: Sequence[int]) -> Rows:
-    """The pictures of some cameras, with what is told of them.
+Room = Callable[[Sequence[int]], NDArray[np.float32] | None]
+"""Gives memory to make pictures of cameras in, by their numbers, or None."""
+
+
+def rows_of(work: Work, batch: Sequence[int], room: Room = lambda numbers: None) -> Iterator[Row]:
+    """The pictures of some cameras, with what is told of them, as they are made.
+
+    Args:
+        work: what is to be done.
+        batch: the numbers of these cameras.
+        room: to make pictures in.
 
     Raises:
         InputError: what a camera or a metric refuses, with the camera's values.
     """
-    images = captured_together([work.cameras[number] for number in batch], work.light_field, work.how)
-    rows: Rows = []
-    for number, image in zip(batch, images, strict=True):
-        with checks.within(work.cameras.said(number)):
-            rows.append((number, image.to_numpy() if work.pictures else None, row_of(image, work.metrics)))
-    return rows
+
+    def room_of(places: Sequence[int]) -> NDArray[np.float32] | None:
+        return room([batch[place] for place in places])
+
+    cameras = [work.cameras[number] for number in batch]
+    for place, image in each_captured(cameras, work.light_field, work.how, room=room_of):
+        with checks.within(work.cameras.said(batch[place])):
+            row = batch[place], image.to_numpy() if work.pictures else None, row_of(image, work.metrics)
+        yield row
 
 
 def rows_elsewhere(shared: tuple[Work, int], batch: Sequence[int]) -> tuple[Rows, Remarks]:
     """The same as a task, and what is remarked, unless it is said in the process that asks."""
     (work, asking), remarks = shared, Remarks()
     if os.getpid() == asking:
-        return rows_of(work, batch), remarks
+        return list(rows_of(work, batch)), remarks
     with remarks.gathered():
-        rows = rows_of(work, batch)
+        rows = list(rows_of(work, batch))
     return rows, remarks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,13 +58,24 @@ def tap_places(views: int, division: CellDivision) -> tuple[NDArray[np.int64], A
 
 
 def divide_views(
-    planes: list[Plane], path_planes: list[Plane], between: BetweenViews, refine: int | str
+    planes: list[Plane],
+    path_planes: list[Plane],
+    between: BetweenViews,
+    refine: int | str,
+    lost: Callable[[Plane, Array, Array], float] = detail_lost,
 ) -> CellDivision:
     """How a view's cell is divided so that fine masks keep their detail.
 
     Where a cell's picture is spread over more than a pixel, what a mask does inside the cell must fall where it
     belongs. Elsewhere it adds up in one place, and the mean over the cell says it all for one mask; but the mean
     of two masks' product is not the product of their means where both are finer than the cell.
+
+    Args:
+        planes: of masks that are not against the sensor.
+        path_planes: those in mid-path.
+        between: what is between views.
+        refine: "auto", or what was asked for.
+        lost: finds `detail_lost`.
     """
     if refine != "auto":
         return CellDivision(1, False)
@@ -71,7 +83,7 @@ def divide_views(
     for plane in planes:
         cell = np.abs(plane.view_step(between.motion)).sum(axis=1)
         while divide < min(LARGEST_REFINEMENT, max(between.gap_filled)):
-            if detail_lost(plane, np.zeros(2), cell / divide) < FINE_DETAIL_IN_VIEW:
+            if lost(plane, np.zeros(2), cell / divide) < FINE_DETAIL_IN_VIEW:
                 break
             divide *= 2
     if divide > 1:
@@ -81,11 +93,11 @@ def divide_views(
         return CellDivision(1, False)
 
     def correlated(parts: int) -> float:
-        lost = sorted(
-            detail_lost(plane, np.zeros(2), np.abs(plane.view_step(between.motion)).sum(axis=1) / parts)
+        shares = sorted(
+            lost(plane, np.zeros(2), np.abs(plane.view_step(between.motion)).sum(axis=1) / parts)
             for plane in path_planes
         )
-        return math.sqrt(max(lost[-2], 0.0) * max(lost[-1], 0.0))  # what is counted on cells may be below 0
+        return math.sqrt(max(shares[-2], 0.0) * max(shares[-1], 0.0))  # what is counted on cells may be below 0
 
     left = correlated(1)
     while left > CORRELATED and divide < LARGEST_CHOSEN_REFINEMENT:
@@ -95,12 +107,23 @@ def divide_views(
 
 
 def divide_samples(
-    planes: list[Plane], between: BetweenViews, views: tuple[float, float], refine: int | str
+    planes: list[Plane],
+    between: BetweenViews,
+    views: tuple[float, float],
+    refine: int | str,
+    lost: Callable[[Plane, Array, Array], float] = detail_lost,
 ) -> int:
     """Into how many parts a sample is divided each way, so that a mask near the sensor stays sharp.
 
     A sample's light lands on the pixels as one footprint, mask and all: detail of the mask that the
     aperture's penumbra leaves and the footprint would blur needs finer samples.
+
+    Args:
+        planes: of masks in mid-path.
+        between: what is between views.
+        views: (rows, columns) of the grid of views.
+        refine: "auto", or what was asked for.
+        lost: finds `detail_lost`.
     """
     if isinstance(refine, int):
         return refine
@@ -109,7 +132,7 @@ def divide_samples(
         penumbra = np.abs(plane.view_step(between.motion)) @ np.array([views[1], views[0]])
         sample = 2 * np.abs(plane.sample_step).sum(axis=1)
         while fine < LARGEST_CHOSEN_REFINEMENT:
-            if detail_lost(plane, penumbra, sample / fine) < FINE_DETAIL_IN_SAMPLE:
+            if lost(plane, penumbra, sample / fine) < FINE_DETAIL_IN_SAMPLE:
                 break
             fine *= 2
     return fine

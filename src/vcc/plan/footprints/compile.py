@@ -8,6 +8,7 @@ the masks and the projection become one sum.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -22,11 +23,11 @@ from vcc.fields.grid import Grid, Sample
 from vcc.optics.train import Stage, Train
 from vcc.plan.decisions import ANEW, Decisions, plan_again
 from vcc.plan.footprints import against_sensor as masks
-from vcc.plan.footprints.cells import divide_samples, divide_views, tap_places
+from vcc.plan.footprints.cells import CellDivision, divide_samples, divide_views, tap_places
 from vcc.plan.footprints.coverage import missing_rays
 from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
 from vcc.plan.footprints.linear_in_cells import by_masks_against_sensor, by_view_planes
-from vcc.plan.footprints.mask_textures import ROUNDING, mask_in_path, mask_lookup
+from vcc.plan.footprints.mask_textures import ROUNDING, Textured, mask_as_met, mask_in_path
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Aperture, Plane, depends_on_view_only, tap_origin
 from vcc.plan.footprints.shares import SMALLEST_STEP
@@ -85,6 +86,7 @@ class Compiled(Brief):
         shares: of the light of views, that these taps have.
         tap: where their samples (0, 0) fall on the sensor, pixels.
         alone: whether nothing else in the plan depends on what these masks let through.
+        in_path: the masks in mid-path.
     """
 
     plan: Plan
@@ -92,6 +94,36 @@ class Compiled(Brief):
     shares: Array
     tap: Array
     alone: bool
+    in_path: InPath
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InPath(Brief):
+    """Masks in mid-path, and what was decided for their sake.
+
+    Args:
+        all: planes of masks that are not against the sensor.
+        planes: those in mid-path.
+        textures: how theirs were made.
+        between: what is between views.
+        views: size of the grid of views, see `divide_samples`.
+        divided: how cells of views are, and into how many parts samples are.
+    """
+
+    all: list[Plane]
+    planes: list[Plane]
+    textures: tuple[Textured, ...]
+    between: BetweenViews
+    views: tuple[float, float]
+    divided: tuple[CellDivision, int]
+
+    def same_by(self, lost: Callable[[Plane, Array, Array], float], how: How) -> bool:
+        """Whether the same would have been decided of other patterns of the same size; see `divide_views`."""
+        division = divide_views(self.all, self.planes, self.between, how.refine, lost)
+        own, fine = self.divided
+        return (division.parts, division.spread) == (own.parts, own.spread) and fine == divide_samples(
+            self.planes, self.between, self.views, how.refine, lost
+        )
 
 
 def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisions = ANEW) -> Compiled:
@@ -152,8 +184,8 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
 
     tap = tap_origin(on_sensor, origin, index, shift, between.motion)
     points = grid.sample == "point" and fine == 1
-    lookups = tuple(
-        mask_lookup(
+    met = tuple(
+        mask_as_met(
             plane,
             index,
             shift + off_middle,
@@ -166,6 +198,7 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         )
         for n, plane in enumerate(path_planes)
     )
+    lookups = tuple(lookup for lookup, _ in met)
     missing, reason = missing_rays(view_planes, grid.shape, samples, weights, tap, step, sensor.shape)
     core = Footprints(
         raster_shape=sensor.shape,
@@ -208,7 +241,8 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
     as_met = replace(aperture, index=index, shift=shift)
     # Gaps between views' pictures that are filled ask for parts of cells where a mask is fine.
     alone = not path_planes and (how.refine != "auto" or max(between.gap_filled) <= 1)
-    return Compiled(plan, as_met, (row_share[:, None] * column_share[None, :])[keep], tap, alone)
+    in_path = InPath(planes, path_planes, tuple(kept for _, kept in met), between, grid.extent, (division, fine))
+    return Compiled(plan, as_met, (row_share[:, None] * column_share[None, :])[keep], tap, alone, in_path)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.plan.footprints.planes import Plane
+from vcc.shapes.patterns import Cells, is_grid
 
 Array = NDArray[np.float64]
 
@@ -18,9 +19,22 @@ def missing_rays(
     tap: Array,
     step: Array,
     sensor_shape: tuple[int, int],
+    outside_views: float | None = None,
 ) -> tuple[float, str]:
-    """The share of rays that the open aperture sends to the sensor and the light field does not hold."""
-    outside_views = _aperture_outside_views(view_planes, shape)
+    """The share of rays that the open aperture sends to the sensor and the light field does not hold.
+
+    Args:
+        view_planes: masks at the views.
+        shape: of the light field.
+        samples: (rows, columns) of a view.
+        weights: of the taps.
+        tap: where their samples (0, 0) fall on the sensor.
+        step: from sample to sample there.
+        sensor_shape: (rows, columns).
+        outside_views: the share of the aperture outside the grid of views, if it is known; else it is found.
+    """
+    if outside_views is None:
+        outside_views = _aperture_outside_views(view_planes, shape)
     outside_pictures = _sensor_outside_views(samples, weights, tap, step, sensor_shape)
     missing = 1 - (1 - outside_views) * (1 - outside_pictures)
     reasons = []
@@ -31,10 +45,46 @@ def missing_rays(
     return (missing if missing > 1e-9 else 0.0), "; ".join(reasons)
 
 
+def outside_views_of(plane: Plane, cells: Cells, values: Array, shape: tuple[int, ...]) -> list[float] | None:
+    """The share of each of several apertures that lies outside the grid of views.
+
+    Args:
+        plane: the only one at the views.
+        cells: its pattern.
+        values: several arrays in their place, (arrays, rows, columns).
+        shape: of the light field.
+
+    Returns:
+        None where they have to be found one by one.
+    """
+    (x, y), *_ = _looked_at([plane], shape)
+    if not is_grid(x, y):
+        return None
+    across, down = _inside([plane], shape)
+    # Each cell is met by some of the places: by so many along columns, times so many along rows.
+    rows, columns = cells.cells_at(x.ravel(), y.ravel())
+    (all_down, in_down), (all_across, in_across) = (
+        (np.bincount(at[at >= 0], minlength=n), np.bincount(at[(at >= 0) & inside.ravel()], minlength=n))
+        for at, inside, n in ((rows, down, values.shape[1]), (columns, across, values.shape[2]))
+    )
+    total, held = values @ all_across @ all_down, values @ in_across @ in_down
+    return [float(1 - part / all) if all > 0 else 0.0 for part, all in zip(held, total, strict=True)]
+
+
 def _aperture_outside_views(planes: list[Plane], shape: tuple[int, ...]) -> float:
-    bounded = [plane for plane in planes if np.isfinite(plane.pattern.size).all()]
-    if not bounded:
+    if not any(np.isfinite(plane.pattern.size).all() for plane in planes):
         return 0.0
+    open_here = np.ones((128, 128))
+    for plane, (x, y) in zip(planes, _looked_at(planes, shape), strict=True):
+        open_here = open_here * plane.pattern(x, y)
+    across, down = _inside(planes, shape)
+    total = open_here.sum()
+    return float(1 - (open_here * (across & down)).sum() / total) if total > 0 else 0.0
+
+
+def _views_looked_at(planes: list[Plane], shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Views (across, down) by which 128×128 places of the smallest of planes are met."""
+    bounded = [plane for plane in planes if np.isfinite(plane.pattern.size).all()]
     plane = min(bounded, key=lambda p: p.pattern.size[0] * p.pattern.size[1])
     points = (np.arange(128) + 0.5) / 128 - 0.5
     x, y = points * plane.pattern.size[0], points * plane.pattern.size[1]
@@ -42,20 +92,26 @@ def _aperture_outside_views(planes: list[Plane], shape: tuple[int, ...]) -> floa
         x, y = x[None, :], y[:, None]  # a row and a column of places say it all
     else:
         x, y = np.meshgrid(x, y)
-    to_view = np.linalg.inv(plane.at_index[:, :2])
-    samples = (shape[2], shape[3])
-    view = _through(to_view, x - plane.middle_of_view(samples)[0], y - plane.middle_of_view(samples)[1])
-    open_here = np.ones((128, 128))
-    for other in planes:
-        across, down = _through(other.at_index[:, :2], *view)
-        middle = other.middle_of_view(samples)
-        open_here = open_here * other.pattern(across + middle[0], down + middle[1])
+    middle = plane.middle_of_view((shape[2], shape[3]))
+    return _through(np.linalg.inv(plane.at_index[:, :2]), x - middle[0], y - middle[1])
+
+
+def _looked_at(planes: list[Plane], shape: tuple[int, ...]) -> list[tuple[Array, Array]]:
+    """Places (x, y) on each plane that are looked at."""
+    view = _views_looked_at(planes, shape)
+    places = []
+    for plane in planes:
+        across, down = _through(plane.at_index[:, :2], *view)
+        middle = plane.middle_of_view((shape[2], shape[3]))
+        places.append((across + middle[0], down + middle[1]))
+    return places
+
+
+def _inside(planes: list[Plane], shape: tuple[int, ...]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which of these places lie within the grid of views, (across, down)."""
+    across, down = _views_looked_at(planes, shape)
     # Half a raster step of grace: an aperture as wide as the grid misses nothing.
-    inside = np.logical_and(
-        *(abs(v - (n - 1) / 2) <= n / 2 for v, n in zip(view, (shape[1], shape[0]), strict=True))
-    )
-    total = open_here.sum()
-    return float(1 - (open_here * inside).sum() / total) if total > 0 else 0.0
+    return abs(across - (shape[1] - 1) / 2) <= shape[1] / 2, abs(down - (shape[0] - 1) / 2) <= shape[0] / 2
 
 
 def _through(matrix: NDArray[np.floating], x: Array, y: Array) -> tuple[Array, Array]:

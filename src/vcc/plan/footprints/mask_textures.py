@@ -35,6 +35,8 @@ TEXTURE_FILTER = 5
 """Weights on each side of a texture's filter, beside those that the box of a sample takes."""
 AROUND = 2
 """Points of a texture around what is looked up: those of splines, and what the filter leaves beside an edge."""
+SPLINE = 1.5
+"""Points of a texture on each side that a look-up by quadratic B-splines takes."""
 ROUNDING = 1e-6
 """Points or pixels, over a whole view, that are rounding."""
 ROOM = 0.1
@@ -82,6 +84,27 @@ def mask_lookup(
 ) -> MaskLookup:
     """The mask averaged over a sample's footprint, as a texture, and where each sample reads it.
 
+    Args: see `mask_as_met`.
+
+    Raises:
+        InputError: samples that meet the mask beyond the points that were kept.
+    """
+    return mask_as_met(plane, index, shift, motion, samples, divide, fine, over_samples, decisions)[0]
+
+
+def mask_as_met(
+    plane: Plane,
+    index: Array,
+    shift: Array,
+    motion: Array,
+    samples: tuple[int, int],
+    divide: int,
+    fine: int,
+    over_samples: bool = True,
+    decisions: Decisions = ANEW,
+) -> tuple[MaskLookup, Textured]:
+    """What `mask_lookup` gives, and how its texture was made.
+
     Args:
         plane: the mask.
         index: of the views, (rows of taps, columns of taps, 2).
@@ -121,13 +144,14 @@ def mask_lookup(
             lambda cells, weights: texture_back(plane, kept, weights[0], cells),
         )
     )
-    return MaskLookup(
+    lookup = MaskLookup(
         texture=texture,
         column=(place[..., 0] - column) / spacing[0],
         row=(place[..., 1] - row) / spacing[1],
         step=cleaned(plane.sample_step / spacing[:, None], samples, decisions),
         label=plane.label,
     )
+    return lookup, kept
 
 
 def _lattice(
@@ -229,6 +253,26 @@ class Textured(Brief):
     lattice: Lattice
     boxes: tuple[Array, Array]
     decisions: Decisions
+
+    def of(self, pattern: Pattern) -> NDArray[np.floating]:
+        """The texture of another pattern, (rows, columns)."""
+        return _texture(pattern, self.lattice, self.boxes, self.decisions)
+
+    def seen(self, axis: int, place: Array) -> tuple[Array, Array]:
+        """From where to where a pattern counts in what is looked up at places of the texture.
+
+        Args:
+            axis: 0 of (x, y), or 1.
+            place: columns of the texture, or rows.
+
+        Returns:
+            The lowest and the highest x, or y, on the mask, metres.
+        """
+        spacing = self.lattice.spacing[axis]
+        middle = (place + self.lattice.first[axis]) * spacing
+        wide = max(self.boxes[0][axis], self.boxes[1][axis])
+        reach = (SPLINE + self.lattice.beside[axis]) * spacing + wide / 2
+        return middle - reach, middle + reach
 
 
 def texture_back(plane: Plane, kept: Textured, weights: Array, cells: Cells) -> Array:

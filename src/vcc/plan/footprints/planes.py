@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 
@@ -14,13 +15,15 @@ from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.footprints.means import Boxes, mean_over
 from vcc.plan.footprints.means_back import mean_back
 from vcc.shapes.mean_back import holds
-from vcc.shapes.patterns import Cells, Pattern
+from vcc.shapes.patterns import Cells, Pattern, is_grid
 from vcc.shapes.sheets import Product, in_one_plane, product_of_means
 
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Of a cell: less light is what areas that cancel leave, and its middle would jump about."""
+ARRAYS_AT_ONCE = 64
+"""Arrays of cells that are looked at together."""
 PARTS_OF_A_CELL = 6
 """Parts each way by which the open part of a view's cell is found."""
 
@@ -76,7 +79,10 @@ class Plane(Brief):
         """The taps' cells on a plane that tells views apart only; see `tap_origin`."""
         place = tap_origin(self.at_index, self.middle_of_view(samples), index, shift, motion)
         width, height = np.abs(self.view_step(motion)).sum(axis=1) / divide
-        return Boxes(place[..., 0], place[..., 1], float(width), float(height))
+        x, y = place[..., 0], place[..., 1]
+        if (x == x[:1]).all() and (y == y[:, :1]).all() and x.ndim == 2:
+            x, y = x[:1], y[:, :1]  # a row and a column of places say it all
+        return Boxes(x, y, float(width), float(height))
 
     def view_step(self, motion: Array) -> Array:
         """2×2: metres moved here per view, a point of the scene being followed."""
@@ -168,6 +174,17 @@ class Aperture(Brief):
         """The weights of `open_parts` alone."""
         return self._open_shares(_product(self.parts()) if len(self.planes) > 1 else np.ones(1))
 
+    def open_shares_of(self, cells: Cells, values: Array) -> Array | None:
+        """`open_shares` with several arrays (arrays, rows, columns) in the place of the only plane's cells.
+
+        Returns:
+            (arrays, rows of taps, columns of taps); None where they have to be found one by one.
+        """
+        if len(self.planes) != 1 or self.planes[0].pattern is not cells:
+            return None
+        x, y, width, height = self._boxes(self.planes[0])
+        return cells.means(values, x.ravel(), y.ravel(), width, height) if is_grid(x, y) else None
+
     def _open_shares(self, shares: Array) -> Array:
         # Apart from each other: what several leave of a cell is not the product of their shares.
         return shares.mean(axis=(2, 3)) if len(self.planes) > 1 else self.whole_cells()[0]
@@ -251,29 +268,52 @@ def _means_around(values: Array, length: float) -> Array:
 
 def detail_lost(plane: Plane, known: Array, added: Array) -> float:
     """The share of a pattern's variance that averaging over ``added`` takes away after ``known``, metres."""
+
+    def looked_at(x: Array, y: Array, cell: tuple[float, float]) -> Array:
+        return np.broadcast_to(_fine_means(plane.pattern, x[None, :], y[:, None], *cell), (y.size, x.size))[None]
+
+    return float(_details_lost(plane.pattern.size, looked_at, known, added)[0])
+
+
+def details_lost(cells: Cells, values: Array, known: Array, added: Array) -> Array:
+    """`detail_lost` of each of several arrays, (arrays, rows, columns), in the place of an array of cells."""
+
+    def of_some(some: Array) -> Array:
+        return _details_lost(cells.size, lambda x, y, cell: cells.means(some, x, y, *cell), known, added)
+
+    return np.concatenate([of_some(some) for some in np.array_split(values, -(-len(values) // ARRAYS_AT_ONCE))])
+
+
+def _details_lost(
+    size_of_pattern: tuple[float, float],
+    looked_at: Callable[[Array, Array, tuple[float, float]], Array],
+    known: Array,
+    added: Array,
+) -> Array:
+    """`detail_lost` of patterns of one size; ``looked_at`` finds means over small cells, (patterns, y, x)."""
     if (added <= 0).all():
-        return 0.0
-    bounded = np.isfinite(plane.pattern.size)
-    size = np.minimum(plane.pattern.size, 1.0) if bounded.all() else np.full(2, 64 * max(*known, *added))
+        return np.zeros(len(looked_at(np.zeros(1), np.zeros(1), (1.0, 1.0))))
+    bounded = np.isfinite(size_of_pattern)
+    size = np.minimum(size_of_pattern, 1.0) if bounded.all() else np.full(2, 64 * max(*known, *added))
     fine = np.maximum(np.maximum(known, added) / 8, size / 512)
     counts = np.maximum(np.ceil(size / fine).astype(int), 8)
     cell = size / counts
     x, y = (((np.arange(count) + 0.5) / count - 0.5) * side for count, side in zip(counts, size, strict=True))
     # Averaged once as finely as it is looked at, and these means averaged further.
-    values = np.broadcast_to(_fine_means(plane.pattern, x[None, :], y[:, None], *cell), counts[::-1])
-    whole = values.var()
-    if whole < 1e-12:
-        return 0.0
-    values = np.clip(values, 0.0, 1.0)
+    values = looked_at(x, y, (float(cell[0]), float(cell[1])))
+    whole = values.var(axis=(1, 2))
+    by_row = np.clip(values, 0.0, 1.0).transpose(1, 0, 2)
     # A pattern without bounds goes on beyond what is looked at: only what lies within is compared.
     reach = np.ceil(np.where(bounded, 0.0, np.hypot(known, added) / 2 / cell)).astype(int)
     across, down = (slice(n, max(count - n, n + 1)) for n, count in zip(reach, counts, strict=True))
 
-    def variance(box: Array) -> float:
+    def variance(box: Array) -> Array:
         # What is twice as wide as the pattern holds all of it wherever it lies: what is wider has less on average.
         wide, high = np.clip(box, cell, 2 * size) / cell
         share = float(np.prod(np.minimum(1.0, 2 * size / np.maximum(box, cell))))
-        means = _means_around(_means_around(values, float(high))[down].T, float(wide))[across]
-        return share**2 * float(means.var())
+        down_done = _means_around(by_row, float(high))[down]
+        means = _means_around(down_done.transpose(2, 1, 0), float(wide))[across]
+        return np.asarray(share**2 * means.var(axis=(0, 2)))
 
-    return (variance(known) - variance(np.hypot(known, added))) / float(whole)
+    even = whole < 1e-12
+    return np.where(even, 0.0, (variance(known) - variance(np.hypot(known, added))) / np.where(even, 1.0, whole))

@@ -1,0 +1,123 @@
+"""Pictures as sums of a few pictures (`vcc.plan.footprints.mixtures`): products of matrices, piece by piece.
+
+By compiled loops, and not by a library's: those bring threads of their own, which wait for each other by turning.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+from vcc.base.workers import Workers
+from vcc.engines import many_kernels
+from vcc.engines.vector_sums import SHORTEST
+from vcc.plan.footprints.mixtures import Mixture
+
+PIECE = 2**10
+"""Values of a picture that are made at once, at most, or a row of it: as many of the few stay in the cache."""
+AT_ONCE = 2**25
+"""Bytes of pictures that are made together."""
+FEWEST = 8
+"""Pictures that are made together at least."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Piece(Brief):
+    """A rectangle of the sensor whose pixels take the same numbers.
+
+    Args:
+        rows: of pixels.
+        columns: of pixels.
+        values: of the few pictures there, (pictures, values).
+        taken: which number counts for each of them.
+    """
+
+    rows: slice
+    columns: slice
+    values: NDArray[np.float32]
+    taken: NDArray[np.int64]
+
+
+class Mixer:
+    """What makes the pictures of a mixture.
+
+    Args:
+        mixture: how they are made.
+        pictures: those that its plans make, (rows, columns[, channels]).
+        threads: how many work at once. The same bytes for any number.
+        room: where pictures of cameras go, see `vcc.run.drive.recorded_mixed`; None makes room here.
+    """
+
+    def __init__(
+        self,
+        mixture: Mixture,
+        pictures: Sequence[NDArray[np.float32]],
+        threads: int,
+        room: Callable[[Sequence[int]], NDArray[np.float32] | None] | None = None,
+    ) -> None:
+        self.shape, self.threads = pictures[0].shape, threads
+        self.members, self.room = mixture.members, room
+        members, _, width = mixture.numbers.shape
+        self.numbers = mixture.numbers.reshape(members, -1).astype(np.float32)
+        across = _even(mixture.across, self.shape[1])
+        widest = max(columns.stop - columns.start for columns in across) * math.prod(self.shape[2:])
+        self.bands = [
+            [self._piece(mixture, pictures, rows, columns, width) for columns in across]
+            for rows in _even(mixture.down, max(PIECE // widest, 1))
+        ]
+
+    def _piece(
+        self, mixture: Mixture, pictures: Sequence[NDArray[np.float32]], rows: slice, columns: slice, width: int
+    ) -> Piece:
+        taken = mixture.down[rows.start][:, None] * width + mixture.across[columns.start]
+        few = [picture[rows, columns].reshape(-1) for picture in pictures]
+        values = np.zeros((len(few), max(few[0].size, SHORTEST)), dtype=np.float32)
+        values[:, : few[0].size] = few
+        return Piece(rows, columns, values, taken.reshape(-1))
+
+    def pictures(self) -> Iterator[NDArray[np.float32]]:
+        """The pictures of all members, in their order; some are made together and share their memory."""
+        members = len(self.numbers)
+        count = max(AT_ONCE // (4 * math.prod(self.shape)), FEWEST)
+        with Workers(self.threads) as pool:
+            # Some are made while those before them are looked at.
+            made, done = self._begun(pool, 0, count)
+            for first in range(count, members + count, count):
+                before, ready = made, done
+                made, done = self._begun(pool, first, count)
+                list(ready)
+                yield from before
+
+    def _begun(self, pool: Workers, first: int, count: int) -> tuple[NDArray[np.float32], Iterator[None]]:
+        """Some of the pictures, and what says when they are done."""
+        numbers = self.numbers[first : first + count]
+        made = self.room(self.members[first : first + count]) if self.room is not None and len(numbers) else None
+        if made is None:
+            made = np.empty((len(numbers), *self.shape), dtype=np.float32)
+        channels = math.prod(self.shape[2:])
+        lines = made.reshape(len(made), self.shape[0], self.shape[1] * channels)
+
+        def mix(band: Sequence[Piece]) -> None:
+            for piece in band:
+                rows, columns = piece.rows, piece.columns
+                place = (rows.start, rows.stop), (columns.start * channels, columns.stop * channels)
+                many_kernels.mix_piece(piece.values, piece.taken, numbers, lines, *place)
+
+        return made, pool.map(mix, self.bands if made.size else ())
+
+
+def _even(taken: NDArray[np.int64], most: int) -> list[slice]:
+    """Rows or columns of pixels in runs, at most so long, that take the same numbers."""
+    changes = np.flatnonzero((taken[1:] != taken[:-1]).any(axis=1)) + 1
+    ends = [0, *changes.tolist(), len(taken)]
+    return [
+        slice(start, min(start + most, stop))
+        for first, stop in pairwise(ends)
+        for start in range(first, stop, most)
+    ]
