@@ -22,6 +22,7 @@ import vcc
 from tests.bench.hostile import ASKED
 from tests.bench.on_bench import CAMERA, NOWHERE, PIXELS, START, Client, noise, offered
 from vcc.bench import offered as offered_there
+from vcc.bench import picture as picture_there
 from vcc.bench import session as session_there
 from vcc.bench.document import Document
 from vcc.bench.offered import Field
@@ -492,6 +493,15 @@ def test_few_rays_through_lenslets_look_at_views_with_pixels_twice_as_coarse():
     assert made.core.views == wanted.core.views == (4, 4, 12, 12)
     assert made.core.index_from_ray.isclose(wanted.core.index_from_ray)
     np.testing.assert_allclose(made.core.motion, wanted.core.motion, atol=1e-9)
+
+
+def test_a_plan_is_given_up_where_its_picture_is_no_longer_wanted(monkeypatch):
+    def progress(done, total):
+        raise session_there.Superseded
+
+    monkeypatch.setattr(picture_there, "drive", None)  # is never reached
+    with pytest.raises(session_there.Superseded):
+        take(START.train(NOWHERE).train, Field(noise()), START, WHOLE, progress)
 
 
 # --- sequences ---

@@ -16,8 +16,9 @@ import pytest
 import vcc
 from tests.physics.random_cameras import drawn
 from vcc import patterns
+from vcc.base.values import content
 from vcc.plan.choice import compile_best
-from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.decisions import ANEW, Decisions, WhileWanted
 from vcc.plan.footprints.means import mean_over
 from vcc.plan.how import How
 from vcc.run.drive import drive
@@ -175,6 +176,14 @@ def test_pictures_are_those_of_plans_that_nobody_keeps(method):
         for decisions in (None, Decisions())
     )
     np.testing.assert_allclose(kept, plain, atol=2e-6 * plain.max())
+
+
+@pytest.mark.parametrize("method", ["footprints", "rays"])
+def test_whether_a_plan_is_still_wanted_is_asked_between_its_steps(method):
+    camera, how, asked = camera_with_a_mask(CELLS), How(method=method), []
+    plan = compile_best(camera, GRID, how, WhileWanted(lambda: asked.append(None)))
+    assert content(plan.core) == content(compile_best(camera, GRID, how).core)
+    assert len(asked) > 10
 
 
 def test_more_cells_may_seem_to_be_seen_than_are():

@@ -24,6 +24,7 @@ from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
+from vcc.plan.decisions import WhileWanted
 from vcc.plan.model import Plan
 from vcc.plan.rays.compile import DEFAULT_SAMPLES
 from vcc.plan.rays.model import Rays
@@ -220,7 +221,7 @@ def take(
         field: before it.
         document: which views, and whether electronics record the picture.
         fineness: a coarse picture has no noise: it has other pixels than the sensor's.
-        progress: called with (done, total); what it raises ends the work.
+        progress: called with (done, total), while it is planned, too; what it raises ends the work.
 
     Raises:
         InputError: what the camera refuses of this light field, or electronics that cannot record it.
@@ -228,7 +229,8 @@ def take(
     began = time.perf_counter()
     light_field = document.aperture.placed(light_field_of(field, document.views, fineness, progress))
     camera = train if fineness.pixels == 1 else coarser_sensor(train, fineness.pixels)
-    plan = compile_best(camera, light_field.grid)
+    wanted = None if progress is None else WhileWanted(functools.partial(progress, 0, 1))
+    plan = compile_best(camera, light_field.grid, None, wanted)
     if fineness.rays is not None and isinstance(plan.core, Rays):
         if isinstance(plan.core.aim, CellWindows):
             wide = replace(fineness, pixels=min(2 * fineness.pixels, COARSEST))

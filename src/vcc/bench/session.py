@@ -532,7 +532,8 @@ class Session:
                 waited += let_pass()
 
             taken = take(described.train, field, document, fineness, progress)
-        return replace(taken, seconds=taken.seconds - waited)
+        seconds = taken.seconds - waited
+        return replace(taken, seconds=seconds, planning=min(taken.planning, seconds))
 
     @contextmanager
     def _all_cores(self) -> Iterator[Progress]:

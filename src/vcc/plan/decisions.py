@@ -189,5 +189,29 @@ class _Anew(Decisions):
         return make()
 
 
+class WhileWanted(_Anew):
+    """Decisions that nobody keeps, of a plan that may be given up between them.
+
+    Args:
+        check: called before each; what it raises ends the planning.
+    """
+
+    def __init__(self, check: Callable[[], None]) -> None:
+        super().__init__()
+        self._check = check
+
+    def keep(
+        self, name: str, decide: Callable[[], Decided], alike: Callable[[Decided, Decided], bool] = same
+    ) -> Decided:
+        """What is decided now, if the plan is wanted."""
+        self._check()
+        return decide()
+
+    def made(self, name: str, key: Callable[[], Hashable], make: Callable[[], Decided]) -> Decided:
+        """What is made now, if the plan is wanted."""
+        self._check()
+        return make()
+
+
 ANEW: Decisions = _Anew()
 """What plans are made with that nothing has to follow."""

@@ -169,15 +169,15 @@ def _on_lattice(kernel: Kernel, steps_from_slopes: Array, sharp: bool, decisions
     slopes, shares = kernel.quadrature()
     places = slopes @ steps_from_slopes.T
     wanted = shares @ places**2 - (shares @ places) ** 2
-    filters = []
+    made = weights
     for axis in (0, 1):
         along = weights.sum(axis=axis)
         step = np.arange(len(along)) - len(along) // 2
         added = along @ step**2 - (along @ step) ** 2 - wanted[axis]
         losses = min(max(12 * added, 0.0), 3.0)
         beside = decisions.keep(f"filter along axis {axis}", partial(weights_beside, losses, 1.0))
-        filters.append(along_axis(losses, 1.0, beside=beside))
-    return _filtered(_filtered(weights, filters[1], 0), filters[0], 1)
+        made = _filtered(made, along_axis(losses, 1.0, beside=beside), 1 - axis)
+    return made
 
 
 def _filtered(weights: Array, along: Array, axis: int) -> Array:
