@@ -22,15 +22,16 @@ pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 CELLS = np.random.default_rng(3).random((9, 9))
 
 
-def camera(z=FOCUS, diameter=7 * mm, cells=None, at=0.96 * FOCUS):
+def camera(z=FOCUS, diameter=7 * mm, cells=None, at=0.96 * FOCUS, off=0):
     elements = [vcc.Lens(focal_length=50 * mm, diameter=diameter)]
     if cells is not None:
         elements.append(vcc.Mask(cells, width=20 * mm, z=at))
-    return vcc.Camera(elements, vcc.Sensor(z, (12, 14), FOCUS * 3e-3))
+    return vcc.Camera(elements, vcc.Sensor(z, (12, 14), FOCUS * 3e-3, decentre=(off * FOCUS * 3e-3, 0.0)))
 
 
 CAMERAS = {
     "places": [camera(z * FOCUS) for z in (0.96, 0.99, 1.0, 1.03)],
+    "sensors that see other pixels": [camera(z * FOCUS, off=off) for z, off in ((1, 0), (0.8, -2), (1.2, 5))],
     "stops, which look at other views": [camera(diameter=d * mm) for d in (3, 7, 11)],
     "masks in mid-path": [camera(cells=each) for each in (CELLS, 1 - CELLS, CELLS[::-1])],
     "masks at the views": [camera(cells=each, at=0.0) for each in (CELLS, 1 - CELLS)],

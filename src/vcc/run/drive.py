@@ -37,7 +37,7 @@ from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
 from vcc.run.blocks import SUMS, Blocks, Need, cut_evenly
 from vcc.run.executors import Tree, Work, crew, memory_of_task
-from vcc.run.needed import needed
+from vcc.run.needed import needed, needed_by_all
 from vcc.run.sent import Carried, Sent
 
 SHARED = 0.5
@@ -197,8 +197,7 @@ def each_recorded(plans: Iterable[Plan], samples: Samples, how: How) -> Iterator
     )
     if isinstance(plans, Sequence) or not alone:
         listed = list(plans)
-        drives = [Drive(*needed(plan, samples), how) for plan in listed]
-        yield from zip(listed, recorded_together(drives) if drives else (), strict=True)
+        yield from zip(listed, recorded_together(_drives(listed, samples, how)) if listed else (), strict=True)
         return
     begun: deque[tuple[list[Drive], Future[list[Recorded]]]] = deque()
     before: Drive | None = None
@@ -216,6 +215,12 @@ def each_recorded(plans: Iterable[Plan], samples: Samples, how: How) -> Iterator
             begun.append((group, pool.submit(_recorded_by_one_thread, group)))
         while begun:
             yield from _taken(*begun.popleft())
+
+
+def _drives(plans: Sequence[Plan], samples: Samples, how: How) -> list[Drive]:
+    """Plans on their way, of the samples that any of them needs."""
+    cut, part = needed_by_all(plans, samples)
+    return [Drive(plan, part, how) for plan in cut]
 
 
 def _groups(drives: Iterable[Drive]) -> Iterator[list[Drive]]:
@@ -261,7 +266,7 @@ def recorded_mixed(
         room: gives the memory (cameras, rows, columns[, channels]) in which the pictures of some cameras are to be
             made, by their numbers, if there is any; new memory takes long.
     """
-    found = recorded_together([Drive(*needed(plan, samples), how) for plan in mixture.plans])
+    found = recorded_together(_drives(mixture.plans, samples, how))
     mixed = late.module("vcc.engines.mixed")
     mixer = mixed.Mixer(mixture, [each.values for each in found], how.workers, room)
     for values, (missing, reason) in zip(mixer.pictures(), mixture.missing, strict=True):
@@ -499,11 +504,11 @@ class Drive:
         return self.plan.core.used_views(self.samples.grid.shape)
 
     def takes(self) -> Any:
-        """What the blocks of samples on disk are made to be before they are looked at; None where that is another
-        thing for each plan, or a matter of several rounds."""
+        """Which samples are read, and what is done with their blocks before they are looked at; None where that is
+        another thing for each plan, or a matter of several rounds."""
         if self.in_memory or self.crew is not None or self.how.tolerance is not None or self.plan.views_between:
             return None
-        return self.plan.before, self.plan.core.border, self.plan.by_rays, self.kind, self.limit
+        return self.samples, self.plan.before, self.plan.core.border, self.plan.by_rays, self.kind, self.limit
 
     @property
     def most_at_once(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -67,13 +68,24 @@ def needed(plan: Plan, samples: Samples) -> tuple[Plan, Samples]:
         plan: of pictures. By rays, which may look anywhere, and where views in between are made, it stays.
         samples: for which it is made. Those in memory stay.
     """
-    if samples.whole() is not None or plan.by_rays or plan.views_between is not None:
-        return plan, samples
+    (cut,), part = needed_by_all([plan], samples)
+    return cut, part
+
+
+def needed_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan], Samples]:
+    """Several plans and the samples of which they make pictures, cut to the pixels that any of these needs.
+
+    Args:
+        plans: as for `needed`; where one of them stays, all do.
+        samples: likewise.
+    """
+    if samples.whole() is not None or any(plan.by_rays or plan.views_between is not None for plan in plans):
+        return list(plans), samples
     grid = samples.grid
-    pixels = plan.used_pixels(grid.shape)
+    pixels = _of_any([plan.used_pixels(grid.shape) for plan in plans], grid.shape)
     some = (pixels[..., 1] > pixels[..., 0]).all(axis=-1)
     if not some.any():
-        return plan, samples
+        return list(plans), samples
     (top, bottom), (left, right) = zip(
         pixels[some][..., 0].min(axis=0), pixels[some][..., 1].max(axis=0), strict=True
     )
@@ -81,5 +93,13 @@ def needed(plan: Plan, samples: Samples) -> tuple[Plan, Samples]:
         Block.all_of(grid.shape), pixel_rows=(int(top), int(bottom)), pixel_columns=(int(left), int(right))
     )
     piece, _ = replace(grid, disparities=Disparities()).piece(block.slices)
-    cut = replace(plan, core=plan.core.part(plan.block(block)), grid_shape=piece.shape[:4])
+    cut = [replace(plan, core=plan.core.part(plan.block(block)), grid_shape=piece.shape[:4]) for plan in plans]
     return cut, Needed(samples, block, pixels, piece)
+
+
+def _of_any(several: Sequence[NDArray[np.intp]], shape: tuple[int, ...]) -> NDArray[np.intp]:
+    """From where to where the pixels go that any of several needs, as `Plan.used_pixels` has them for one."""
+    pixels = np.stack(several)
+    none = (pixels[..., 1] <= pixels[..., 0]).any(axis=-1, keepdims=True)
+    firsts = np.where(none, shape[2:4], pixels[..., 0]).min(axis=0)
+    return np.stack([firsts, np.where(none, 0, pixels[..., 1]).max(axis=0)], axis=-1)
