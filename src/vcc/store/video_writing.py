@@ -117,7 +117,7 @@ class VideoWriter:
     ) -> Iterator[StoreWriter]:
         """A frame to write view by view, which need not fit into memory; it is there when the block is over.
 
-        ::
+        Here, views in any order:
 
             with video.frame(0.04, cameras, (*cameras.shape, 3), "float16") as frame:
                 for row, column in frame.missing():
@@ -248,7 +248,7 @@ def create_video(
 ) -> VideoWriter:
     """A video to append frames to: a new one, or one that is there and goes on.
 
-    ::
+    So that work goes on where it stopped:
 
         with vcc.store.create_video("scene.zarr") as video:
             for n in range(len(video), 240):
