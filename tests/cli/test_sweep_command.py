@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import csv
+import random
+import signal
+import subprocess
+import sys
+import time
 
 import imagecodecs
 import numpy as np
 import pytest
+import xarray
 
 import vcc
 from tests.command_line import CAMERA, KNOWN, refused, run, write_views
 from vcc.run import sent
-from vcc.sweeps import open_sweep
+from vcc.sweeps import open_sweep, sweeping
 
 MASK = """
 [[elements]]
@@ -94,12 +100,51 @@ def test_a_metric_is_added_to_a_finished_sweep(folder):
     assert open_sweep("all.zarr").table["sharpness"].min() > 0
 
 
+KILLED = """
+import sys, time
+from vcc.cli import app
+from vcc.sweeps import keeping, sweeping
+sweeping.MOST_TOGETHER, keeping.NOTED_EVERY = 3, 0.0
+sweeping.tell = lambda progress, done, total: time.sleep(600 if done > 21 else 0)  # who kills it is in time
+app.run(sys.argv[1:])
+"""
+
+
+def test_a_sweep_that_is_killed_goes_on(folder, monkeypatch):
+    monkeypatch.setattr(sweeping, "MOST_TOGETHER", 3)
+    (folder / "files" / "camera.toml").write_text(CAMERA)
+    values = ["--set", "sensor.z=51mm:53mm:30", "--sharpness"]
+    assert run(*sweep(*values, "-o", "whole.zarr")).exit_code == 0
+    whole, kept, some = open_sweep("whole.zarr"), folder / "all.zarr", random.Random(time.time_ns()).randint(1, 20)
+    process = subprocess.Popen([sys.executable, "-c", KILLED, *sweep(*values, "-o", "all.zarr")])
+    while len(list(kept.glob("pictures/c/*/*/*/*"))) < some and process.poll() is None:
+        time.sleep(0.003)
+    process.kill()
+    assert process.wait() == -signal.SIGKILL
+    with xarray.open_dataset(kept, engine="zarr", consolidated=False) as data:
+        assert int(data.done.sum()) >= some - 3 - 3  # but for those at work, and those not yet noted
+        np.testing.assert_array_equal(data.pictures.values[data.done], np.asarray(whole.pictures)[data.done])
+    assert run(*sweep(*values, "-o", "all.zarr")).exit_code == 0
+    again = open_sweep(kept)
+    assert np.asarray(again.pictures).tobytes() == np.asarray(whole.pictures).tobytes()
+    assert {name: each.tolist() for name, each in again.table.columns.items()} == {
+        name: each.tolist() for name, each in whole.table.columns.items()
+    }
+    assert not [each for each in kept.rglob("*") if "partial" in each.name]
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["--set", "sensr.z=1mm:2mm:3", "-o", "a.zarr"], "no parameter 'sensr.z'; did you mean sensor.z"),
         (["--set", "sensor.z:3", "-o", "a.zarr"], 'it is a name and values, like "sensor.z=50mm:54mm:40"'),
-        (["--set", "sensor.z=50:54:3", "-o", "a.zarr"], 'write a length like "50 mm"'),
+        (
+            ["--set", "sensor.z=50:54:3", "-o", "a.zarr"],
+            'to another, in so many values, like "50mm:54mm:40"',
+        ),
+        (["--set", "sensor.z=50mm:nan mm:3", "-o", "a.zarr"], "a range goes from one length to another"),
+        (["--set", "sensor.z=50mm:54mm:2.5", "-o", "a.zarr"], 'from 1 to 1000000, not "2.5"'),
+        (["--set", "sensor.z=,", "-o", "a.zarr"], "sensor.z has no values"),
         (["--set", "sensor.z=51mm", "--set", "sensor.z=52mm", "-o", "a.zarr"], "sensor.z is given more than once"),
         (["--set", "sensor.z=51mm", "-o", "a.png"], "end its name in .zarr, .csv, .parquet"),
         (["--set", "sensor.z=51mm", "-o", "a.csv", "--sheet", "a.png"], "a table alone keeps none"),

@@ -227,6 +227,7 @@ def test_a_part_and_the_whole_cannot_both_change(field):
         (["sharpnes"], "no metric 'sharpnes': there is sharpness"),
         ([lambda image: 1], "a lambda has no name"),
         ({"mean": sharpness}, "two columns of a table cannot both be 'mean'"),
+        ({"sensor.z": sharpness}, "two columns of a table cannot both be 'sensor.z'"),
         ({"pair": lambda image: (1, 2)}, r"sensor.z 52 mm: the metric pair gives \(1, 2\)"),
         ({"psnr": PSNR(np.ones((2, 2)))}, r"target has the shape \(2, 2\), and the picture \(20, 24, 3\)"),
         ("sharpness", r"write \['sharpness'\]"),

@@ -18,6 +18,7 @@ from vcc.base.errors import InputError
 from vcc.camera import Camera
 from vcc.files.camera_reading import Beside
 from vcc.learn.parameters import Parameter, check_apart, place, takes_fractions, with_values
+from vcc.optics.sensor import Sensor
 from vcc.sweeps.values import Varied, range_of, taking, varied
 
 Kind = Literal["grid", "list", "random", "sobol"]
@@ -196,16 +197,24 @@ class Cameras(Brief, Sequence[Camera]):
         Raises:
             InputError: what a camera refuses, with its values.
         """
+        _ = self.sensors
+
+    @cached_property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The sensors of all cameras; those that stay as they are are one thing."""
+        found = []
         for number in range(len(self)):
             with checks.within(self.said(number)):
-                self[number]
+                found.append(self[number].sensor)
+        return tuple(found)
 
     def frames(self) -> NDArray[np.float64]:
         """From (column, row, 1) to (x, y, 1) on the sensors: (3, 3), or (…, 3, 3) where they differ."""
-        frames = [camera.sensor.frame.matrix for camera in self]
-        if all(np.array_equal(frame, frames[0]) for frame in frames):
-            return np.array(frames[0])
-        return np.stack(frames).reshape(*self.shape, 3, 3)
+        different = {id(sensor): sensor.frame.matrix for sensor in self.sensors}
+        first = different[id(self.sensors[0])]
+        if all(np.array_equal(frame, first) for frame in different.values()):
+            return np.array(first)
+        return np.stack([different[id(sensor)] for sensor in self.sensors]).reshape(*self.shape, 3, 3)
 
     def alike(self) -> list[int]:
         """The numbers of all cameras, those next to each other that differ only in what patterns let through."""

@@ -38,7 +38,14 @@ PLACES = ("y", "x")
 """Of rows and of columns on the sensor, metres."""
 NOTED_EVERY = 2.0
 """Seconds after which it is noted what is done: so much work a kill can undo, at most, beside what is at work."""
-IN_WORDS = {"mean": "mean irradiance", "missing_rays": "share of the rays asked for that the light field lacks"}
+IN_WORDS = {
+    "mean": "mean irradiance",
+    "missing_rays": "share of the rays asked for that the light field lacks",
+    "sampling_error": "root mean square error of sampling by rays, in units of the picture",
+    DONE: "whether the picture is there",
+    FRAME: "from (column, row, 1) to (x, y, 1) on the sensor, metres",
+}
+"""What arrays hold, for xarray."""
 
 
 class InStore(Results):
@@ -284,8 +291,14 @@ def _make(
             _array(group, each.name, each.coordinates, axes, {"units": each.unit} if each.unit else {})
         for name, numbers in swept.numbers.items():
             _number(group, swept, name, numbers)
-        _array(group, DONE, swept.done, swept.axes, _remark(swept))
-        _array(group, FRAME, swept.frames, (*(swept.axes if swept.frames.ndim > 2 else ()), "to", "from"), {})
+        _number(group, swept, DONE, swept.done)
+        _array(
+            group,
+            FRAME,
+            swept.frames,
+            (*(swept.axes if swept.frames.ndim > 2 else ()), "to", "from"),
+            {"long_name": IN_WORDS[FRAME]},
+        )
         if picture is not None:
             made = _make_pictures(group, swept, picture)
         if picture is not None and values is not None:
@@ -316,7 +329,7 @@ def _remark(swept: Sweep) -> dict[str, str]:
     return {"coordinates": " ".join(each.name for each in swept.coordinates)} if swept.together else {}
 
 
-def _number(group: Any, swept: Sweep, name: str, values: NDArray[np.float64]) -> None:
+def _number(group: Any, swept: Sweep, name: str, values: NDArray[Any]) -> None:
     """The array of what is told of each picture by one name."""
     words = {"long_name": IN_WORDS[name]} if name in IN_WORDS else {}
     _array(group, name, values, swept.axes, _remark(swept) | words)

@@ -95,6 +95,7 @@ def sweep(
     work = Work(listed, light_field, How.of(how, options), metrics_of(metrics), pictures)
     if pictures and output is None:
         work.check_memory()
+    work.check_names()
     listed.check()
     with work.results(output) as results:
         work.run(results, executor, progress)
@@ -119,13 +120,23 @@ class Work(Brief):
     metrics: Mapping[str, Metric]
     pictures: bool
 
+    def check_names(self) -> None:
+        """Refuse a metric that is called as a parameter is: both are columns of one table.
+
+        Raises:
+            InputError: one is.
+        """
+        for name in self.metrics:
+            if name in (each.name for each in self.cameras.varied):
+                raise InputError(f"two columns of a table cannot both be {name!r}: name the metric otherwise")
+
     def picture_shape(self) -> tuple[int, ...]:
         """The shape of all pictures.
 
         Raises:
             InputError: they have different ones.
         """
-        shapes = {camera.sensor.shape: number for number, camera in enumerate(self.cameras)}
+        shapes = {sensor.shape: number for number, sensor in enumerate(self.cameras.sensors)}
         if len(shapes) > 1:
             (one, first), (other, second) = list(shapes.items())[:2]
             raise InputError(

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base import checks, units
+from vcc.base import units
 from vcc.base.describe import Brief, in_brief, kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
 from vcc.files.camera_families import PATTERN_NAMES, needed, parameters_of
@@ -31,6 +31,8 @@ MOST_VALUES = 10**6
 SI = {"length": "m", "angle": "rad", "time": "s", None: ""}
 """Units of coordinates."""
 
+_EXAMPLES = {"length": "50mm:54mm:40", "angle": "0deg:30deg:7", "time": "1ms:5ms:5", None: "0.5:1:6"}
+"""Ranges in words, by what is in them."""
 _OPENS, _CLOSES = "[{(", "]})"
 
 
@@ -146,17 +148,32 @@ def taking(train: Train, name: str, numbers: Sequence[float]) -> Varied:
 
 def _range_in(given: str, found: Parameter) -> list[float] | None:
     """Numbers in even steps, of words like ``"50mm:54mm:40"``; None for other words."""
+    if ":" not in given or not _is_number(found):
+        return None
     parts = [part.strip() for part in given.split(":")]
-    if len(parts) == 2 and _quantities(parts, found) is not None:
+    ends = _quantities(parts[:2], found)
+    if ends is None or len(parts) > 3:
+        kind = _dimension(found) or "number"
+        raise InputError(
+            f'{found.name} is "{given}": a range goes from one {kind} to another, in so many values, like '
+            f'"{_EXAMPLES[_dimension(found)]}"'
+        )
+    if len(parts) == 2:
         raise InputError(
             f'{found.name} is "{given}", which does not say how many values there are: write "{given}:20", or '
             "draw from it by a random or Sobol' design"
         )
-    if len(parts) != 3 or (ends := _quantities(parts[:2], found)) is None:
-        return None
-    many = int(parts[2]) if re.fullmatch(r"\d{1,9}", parts[2]) else parts[2]
-    count = checks.whole_number_between(f'how many values "{given}" has', many, 1, MOST_VALUES)
-    return [float(each) for each in np.linspace(ends[0], ends[1], count)]
+    if not (re.fullmatch(r"\d{1,9}", parts[2]) and 1 <= int(parts[2]) <= MOST_VALUES):
+        raise InputError(
+            f'{found.name} is "{given}": how many values it has is a whole number from 1 to {MOST_VALUES}, not '
+            f'"{parts[2]}"'
+        )
+    return [float(each) for each in np.linspace(ends[0], ends[1], int(parts[2]))]
+
+
+def _is_number(found: Parameter) -> bool:
+    """Whether a parameter takes numbers, with a unit or without."""
+    return _dimension(found) is not None or type(found.value) in (int, float)
 
 
 def _quantities(parts: Sequence[Any], found: Parameter) -> list[float] | None:
