@@ -131,6 +131,10 @@ def test_the_table_is_written_and_read(field, tmp_path):
     assert [row["code.pattern"] for row in rows] == ["mura", "circle"] * 3
     assert [float(row["sensor.z [m]"]) for row in rows] == swept.table["sensor.z"].tolist()
     assert [float(row["mean"]) for row in rows] == swept.table["mean"].tolist()
+    lines = repr(swept.table).splitlines()
+    assert lines[0].split() == ["sensor.z", "[m]", "code.pattern", "mean", "missing_rays", "sampling_error"]
+    assert lines[3].split()[:2] == ["0.053", "mura"]
+    assert len(lines) == 7
     arro3 = pytest.importorskip("arro3.io")
     swept.table.save(tmp_path / "table.parquet")
     read = arro3.read_parquet(tmp_path / "table.parquet").read_all()

@@ -17,6 +17,12 @@ from vcc.base.errors import InputError
 from vcc.files.atomic import atomic_path
 
 ENDINGS = (".csv", ".parquet")
+SHOWN = 12
+"""Rows that are printed; the others are counted."""
+
+
+def _short(value: Any) -> str:
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,6 +51,14 @@ class Table(Brief):
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
+
+    def __repr__(self) -> str:
+        shown = [list(map(_short, column[:SHOWN].tolist())) for column in self.columns.values()]
+        rows = [self.headings, *map(list, zip(*shown, strict=True))]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ["  ".join(word.rjust(width) for word, width in zip(row, widths, strict=True)) for row in rows]
+        more = [f"… {len(self) - SHOWN} more rows"] if len(self) > SHOWN else []
+        return "\n".join([*lines, *more])
 
     @property
     def headings(self) -> list[str]:
