@@ -84,7 +84,7 @@ def needed_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan], 
     grid = samples.grid
     pixels = _of_any([plan.used_pixels(grid.shape) for plan in plans], grid.shape)
     some = (pixels[..., 1] > pixels[..., 0]).all(axis=-1)
-    if not some.any():
+    if not some.any() or (pixels[some] == [[0, grid.shape[2]], [0, grid.shape[3]]]).all():
         return list(plans), samples
     (top, bottom), (left, right) = zip(
         pixels[some][..., 0].min(axis=0), pixels[some][..., 1].max(axis=0), strict=True
