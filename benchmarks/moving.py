@@ -61,7 +61,7 @@ class Case:
         noted = Noted(self.moving.camera, self.moving.courses, self.moving.shutter)
         noted.times.clear()
         noted.capture(self.light_field, EXPOSURE, **self.options)
-        return [self.moving.at(time) for time in noted.times]
+        return [self.moving.at(time) for time in noted.times if time > 0]  # at 0 s it is only looked at
 
     def loop(self, cameras: list[vcc.Camera]) -> None:
         options = {name: value for name, value in self.options.items() if name != "time_tolerance"}

@@ -17,12 +17,10 @@ from vcc.advice.explain import Explanation, wrapped
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
-from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.progress import Progress, tell
 from vcc.base.remarks import Remarks
 from vcc.camera import Camera, captured_together
-from vcc.fields.grid import Block
-from vcc.fields.samples import InMemory, Samples
+from vcc.fields.samples import Samples
 from vcc.image import Image
 from vcc.learn.parameters import place, replaced
 from vcc.motion.courses import Course, course, pieces
@@ -202,8 +200,7 @@ class MovingCamera(Brief):
             time_tolerance: refine until the estimated error of the mean over time, root mean square over the
                 pixels, is at most this share of the picture's mean, with up to 729 moments of each part.
             executor: as in `vcc.Camera.capture`: who runs the blocks of a stored light field, for one moment after
-                the other. None makes the pictures here; light fields on disk that take at most half of
-                ``memory_limit`` are then read once for all moments that are made together.
+                the other. None makes the pictures here; each block is then read once for moments made together.
             progress: called with (done, total) in parts of the exposure.
             options: as in `vcc.Camera.capture`.
 
@@ -375,20 +372,11 @@ class _Work:
         """The pictures of cameras before one light field, by rays of their own numbers."""
         cameras, seeds = [camera for camera, _ in states], [self._how.seed + number for number in numbers]
         if self._executor is None and len(cameras) > 1:
-            return captured_together(cameras, self._read(samples), self._how, seeds=seeds)
+            return captured_together(cameras, samples, self._how, seeds=seeds)
         return [
             camera.capture(samples, replace(self._how, seed=seed), executor=self._executor)
             for camera, seed in zip(cameras, seeds, strict=True)
         ]
-
-    def _read(self, samples: Samples) -> Samples:
-        """Samples that several cameras look at, read where there is room for them."""
-        room = MEMORY_LIMIT // 4 if self._how.memory_limit is None else self._how.memory_limit
-        grid = samples.grid
-        if samples.whole() is not None or 2 * math.prod(grid.shape) * grid.kind.itemsize > room:
-            return samples
-        samples.check_complete()
-        return InMemory.of(samples.read(Block.all_of(grid.shape)), grid)
 
     def _forget(self) -> None:
         """Let go of the pictures that were wanted least lately, and see how many are made together."""
