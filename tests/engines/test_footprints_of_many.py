@@ -13,6 +13,7 @@ import pytest
 
 from tests.engines.test_footprint_numbers import Drawn
 from vcc.engines import array_api, numba_cpu, reference
+from vcc.engines.footprints_of_many import rasters_by_turns
 from vcc.engines.many_kernels import SPAN
 from vcc.plan.footprints.model import Footprints
 
@@ -73,6 +74,21 @@ def test_textures_of_a_mask(name: str) -> None:
 def test_codes_without_masks_in_mid_path() -> None:
     drawn = Drawn(masks=0, kind="uint8")
     assert_each_as_alone(with_other_weights(drawn.core()), drawn.values())
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_places_by_turns_are_the_same_to_the_bit(name: str) -> None:
+    drawn = PLANS[name]
+    core, values = drawn.core(), drawn.values()
+    rows, columns = core.raster_shape
+    moved = replace(core, x=core.x + 0.3, y=core.y - 1.2, step=core.step * 1.01)
+    larger = replace(core, raster_shape=(rows + 70, columns + 3), weights=core.weights * 0.5)
+    found = rasters_by_turns([core, moved, larger], values)
+    assert found is not None
+    for one, raster in zip((core, moved, larger), found, strict=True):
+        assert raster.tobytes() == numba_cpu.footprints(one, values, threads=1).values.tobytes()
+    assert rasters_by_turns([core, replace(core, view_rows=core.view_rows[::-1])], values) is None
+    assert rasters_by_turns([Drawn(refine=3).core()], Drawn(refine=3).values()) is None
 
 
 def test_what_differs_in_more_runs_one_after_the_other() -> None:

@@ -26,6 +26,8 @@ from vcc.engines.vector_sums import EIGHT, SHORTEST
 from vcc.engines.vector_weights import MASKS
 from vcc.plan.footprints.model import Footprints
 
+IN_CACHE = 32
+"""Rows of the picture for which all views of a column stay in the second-level cache, about."""
 FEWEST = 2
 """Rasters that are worth more than one after the other."""
 
@@ -75,6 +77,41 @@ def rasters(
             _OfWeights(cores, channels, pool) if differing < 0 else _OfTextures(cores, differing, channels, pool)
         )
         return made.rasters(values, progress)
+
+
+def rasters_by_turns(cores: Sequence[Footprints], values: NDArray[Any]) -> list[NDArray[np.float32]] | None:
+    """The raster (rows, columns, channels) of each core, by this thread, to the bit as by itself.
+
+    All of them take a band of samples in turn, while it is in the cache.
+
+    Args:
+        cores: what is computed.
+        values: the samples, (v, u, t, s[, channels]).
+
+    Returns:
+        None where rows and columns do not part, samples are divided, or views are taken otherwise.
+    """
+    first, channels = cores[0], values.shape[4] if values.ndim == 5 else 1
+    for core in cores:
+        same = np.array_equal(core.view_rows, first.view_rows) and np.array_equal(
+            core.view_columns, first.view_columns
+        )
+        if not (same and core.separable and core.refine == 1):
+            return None
+    pitch = max(first.samples[1], -(-SHORTEST // channels)) * channels
+    with Workers(1) as pool:
+        made = [ByColumns(core, channels, pool) for core in cores]
+        shape = [(-(-core.raster_shape[0] // EIGHT), core.raster_shape[1] * channels, EIGHT) for core in cores]
+        tiles = [np.zeros(each, dtype=np.float32) for each in shape]
+        turns = [bands(core.raster_shape[0], IN_CACHE) for core in cores]
+        for samples, taken in blocks(first, values, True):
+            masks = [each.masks.at(taken[0], pitch) for each in made]
+            for n in range(max(map(len, turns))):
+                for one, own, met, out in zip(made, turns, masks, tiles, strict=True):
+                    if n < len(own):
+                        one.add(samples, taken, None, met, out, own[n])
+        found = [one.untiled(out) for one, out in zip(made, tiles, strict=True)]
+    return [raster.reshape(*core.raster_shape, channels) for raster, core in zip(found, cores, strict=True)]
 
 
 class _Many:

@@ -32,6 +32,7 @@ from vcc.fields.sampled import has_values, to_dtype, to_numpy
 from vcc.fields.samples import Samples
 from vcc.plan.depth_rule import ViewsBetween
 from vcc.plan.footprints.mixtures import Mixture
+from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
@@ -241,7 +242,11 @@ def _recorded_by_one_thread(drives: Sequence[Drive]) -> list[Recorded]:
     alone = [copy(each) for each in drives]
     for each in alone:
         each.threads = 1
-    found = alone[0].engine.together([each.core for each in alone], alone[0].prepared, threads=1)
+    cores = [each.core for each in alone]
+    found = alone[0].engine.together(cores, alone[0].prepared, threads=1)
+    if found is None and len(cores) > 1 and all(isinstance(core, Footprints) for core in cores):
+        by_turns = late.module("vcc.engines.footprints_of_many").rasters_by_turns(cores, alone[0].prepared)
+        found = None if by_turns is None else list(map(Partial, by_turns))
     if found is None:
         found = [each.rounds() for each in alone]
     return list(map(Drive.finished, alone, found))
