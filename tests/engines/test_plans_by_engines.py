@@ -201,12 +201,12 @@ def limits(plan: Plan, samples: FromAnArray, how: How) -> Iterator[int]:
     need, (_, wide, rows, _) = way.need, way.samples.grid.shape[:4]
     whole, border = need.view * need.times, 1 + need.border
     kept = 0.0 if plan.views_between is None else 0.25  # goes to views that are read again
-    for samples_there in (
-        3 * need.view + whole * border * (wide + need.border),
-        3 * need.view + whole * border * border,
-        need.view / rows * 4 * (3 + need.times * border * border),
-    ):
-        yield int((need.fixed + samples_there) / (1 - kept)) + 8
+    for samples_there in (whole * border * (wide + need.border), whole * border * border):
+        beside = need.fixed + samples_there
+        # One view at a time is read within so little, or two, which take more.
+        reading = need.with_readers(way.threads, beside + 3 * need.view).reading
+        yield int((beside + reading) / (1 - kept)) + 8
+    yield int((need.fixed + need.view / rows * 4 * (3 + need.times * border * border)) / (1 - kept)) + 8
 
 
 @pytest.mark.parametrize("engine", ENGINES)
