@@ -43,7 +43,8 @@ class Affine:
             raise InputError(f"an affine map is a 5×5 or 3×3 matrix, not {'×'.join(map(str, matrix.shape))}")
         if not np.isfinite(matrix).all():
             raise InputError(f"an affine map needs finite numbers, not\n{matrix}")
-        if not np.array_equal(matrix[-1], np.eye(len(matrix))[-1]):
+        # As a list, since plans make very many maps and arrays so small are slow.
+        if matrix[-1].tolist() != [*[0.0] * (len(matrix) - 1), 1.0]:
             raise InputError(f"the last row of an affine map is 0 … 0 1, not {matrix[-1]}")
         matrix.flags.writeable = False
         object.__setattr__(self, "matrix", matrix)
@@ -178,7 +179,7 @@ class Affine:
         """Whether the map can be undone, judged free of the units of its rows and columns."""
         linear = self.linear
         for axis in (0, 1):
-            norms = np.linalg.norm(linear, axis=axis, keepdims=True)
+            norms = np.sqrt((linear * linear).sum(axis=axis, keepdims=True))
             if not norms.all():
                 return False
             linear = linear / norms
@@ -192,8 +193,10 @@ class Affine:
         """
         if not self.is_invertible():
             raise InputError(f"this affine map has no inverse:\n{self!r}")
-        linear = np.linalg.inv(self.linear)
-        return Affine.from_parts(linear, -linear @ self.offset)
+        matrix = np.eye(len(self.matrix))
+        matrix[:-1, :-1] = linear = np.linalg.inv(self.linear)
+        matrix[:-1, -1] = -linear @ self.offset
+        return Affine(matrix)
 
     def __matmul__(self, other: Affine) -> Affine:
         """This map after ``other``."""

@@ -264,6 +264,9 @@ def pair(name: str, value: Any, what: str) -> tuple[float, float]:
 
 # --- what learns ---
 
+PLAIN = np.ndarray, np.float64, float, int
+"""Types of nearly all that is given, none of which learns."""
+
 
 def plain(name: str, value: object) -> None:
     """Refuse arrays of other libraries that carry a gradient, which elements would lose without a word.
@@ -278,6 +281,8 @@ def plain(name: str, value: object) -> None:
     Raises:
         InputError: it is one, or holds one.
     """
+    if type(value) in PLAIN:
+        return
     if isinstance(value, tuple | list):
         for part in value:
             plain(name, part)

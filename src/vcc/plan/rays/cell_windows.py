@@ -230,5 +230,9 @@ def _areas(windows: CellWindows, sensor: Sensor) -> Array:
     x, y = x.reshape(-1, 1), y.reshape(-1, 1)
     row, column = windows.around(x[:, 0], y[:, 0])
     points = np.stack([(np.arange(POINTS) + 0.5) / (POINTS / 2) - 1, np.zeros(POINTS)], axis=-1)
-    _, _, area = windows.aimed(x[..., None], y[..., None], row[..., None], column[..., None], points)
-    return np.asarray(area.mean(axis=2))
+    areas = np.zeros(row.shape)
+    meets = windows.meets(x, y, row, column)  # a fifth of them, as a rule
+    here = np.nonzero(meets)[0]
+    _, _, area = windows.aimed(x[here], y[here], row[meets][:, None], column[meets][:, None], points)
+    areas[meets] = area.mean(axis=1)
+    return areas

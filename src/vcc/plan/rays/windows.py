@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 SMALLEST_GAIN = 1e-12
 """Gains of cells are kept from 0, where a whole cell looks at one place: its bounds are then far outside."""
+MARGIN = 1 + 1e-6
+"""By how much more than they reach images and openings are taken to meet, which rounding cannot exceed."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,6 +127,11 @@ class CellOpening(Brief):
     borders: Array
     radius: float
 
+    @property
+    def highest(self) -> float:
+        """The largest y in it, from the cell's centre."""
+        return self.radius if np.isfinite(self.radius) else float(self.half[1])
+
     def rows(self, away: Array) -> tuple[Array, Array]:
         """The lowest and the highest y in it, from the cell's centre, at x = ``away`` from there."""
         low, high = np.full(away.shape, -np.inf), np.full(away.shape, np.inf)
@@ -216,6 +223,16 @@ class CellWindows:
         low = np.maximum(middle_y - chord, centres[1] + lowest)
         tall = np.maximum(np.minimum(middle_y + chord, centres[1] + highest) - low, 0.0)
         return a, low + tall * (0.5 + 0.5 * points[..., 1]), wide * tall
+
+    def meets(self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether the stop's image seen from x, y can meet a cell's opening; where not, no light comes through."""
+        kind = row % self.cells.powers.shape[0], column % self.cells.powers.shape[1]
+        half = self.opening.half[0], self.opening.highest
+        found = np.ones(row.shape, dtype=np.bool_)
+        for n, (place, centre) in enumerate(zip((x, y), self.cells.lattice.centre_of(row, column), strict=True)):
+            middle, image_half = self.image(n, place, centre, kind)
+            found &= np.abs(middle - centre) <= (image_half + half[n]) * MARGIN
+        return found
 
     def image(
         self, n: int, place: Array, centre: Array, kind: tuple[NDArray[np.int64], NDArray[np.int64]]
