@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -259,9 +260,10 @@ def _means_around(values: Array, length: float) -> Array:
     padded[whole + 1 : whole + 1 + rows] = values
     means = padded[:rows] + padded[2 * whole + 2 :]
     means *= cut
-    sums = np.cumsum(padded, axis=0, out=padded)
-    means += sums[2 * whole + 1 : -1]
-    means -= sums[:rows]
+    for above, sums in pairwise(padded):
+        sums += above  # NumPy's own running sums go down column by column, which takes several times as long
+    means += padded[2 * whole + 1 : -1]
+    means -= padded[:rows]
     means /= length
     return means
 
