@@ -100,6 +100,7 @@ def make(path: Path, gigabytes: float) -> vcc.store.StoredLightField:
 def made(folder: Path, gigabytes: float, keep: bool) -> Any:
     """A store, made or there, and its path; deleted afterwards unless it is to be kept."""
     path = folder / "vcc-cluster.zarr"
+    folder.mkdir(parents=True, exist_ok=True)
     free = shutil.disk_usage(folder).free / 1e9 - 2
     if not path.exists() and free < gigabytes * 1.02:
         print(f"{free:.0f} GB are free beside 2 to spare: the store is made as large as that, not {gigabytes:g}")

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from typing import Any, Literal, Self, TypeVar, Unpack
-
-import numpy as np
-from numpy.typing import NDArray
 
 from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
 from vcc.advice.darkness import why_dark, why_darker
@@ -31,7 +28,7 @@ from vcc.plan.how import OF_THE_RUN, How, Options
 from vcc.plan.model import Plan
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
-from vcc.run.drive import Recorded, drive, each_recorded, recorded_mixed
+from vcc.run.drive import Recorded, Room, drive, each_recorded, recorded_mixed
 from vcc.run.expose import Exposure
 from vcc.run.operator import Operator
 from vcc.run.operators import carried_to
@@ -405,20 +402,20 @@ def each_captured(
     how: How,
     *,
     seeds: Sequence[int] | None = None,
-    room: Callable[[Sequence[int]], NDArray[np.float32] | None] | None = None,
+    room: Room | None = None,
 ) -> Iterator[tuple[int, Image]]:
     """What `Camera.capture` gives of one light field for several cameras, which share what they can of the work.
 
     Cameras that differ in the cells of one mask alone, and are many, are made of a few pictures
-    (`vcc.plan.footprints.mixtures`). Others are planned each by itself, while those before them are at work, and
-    `vcc.run.drive.each_recorded` says what they share.
+    (`vcc.plan.footprints.mixtures`). Others are planned each by itself, and share what
+    `vcc.run.drive.each_recorded` says.
 
     Args:
         cameras: in memory for some hundred bytes each; their pictures are made as they are asked for.
         light_field: as in `Camera.capture`.
         how: likewise.
         seeds: of rays, one for each camera; None takes that of ``how`` for all.
-        room: where some of the pictures may be made, see `vcc.run.drive.recorded_mixed`.
+        room: where some of the pictures may be made.
 
     Returns:
         Each camera's number and picture, as they are made.
@@ -452,7 +449,8 @@ def each_captured(
         how,
         None if seeds is None else [seeds[number] for number in left],
     )
-    recorded_each = each_recorded(plans, light_field, how)
+    room_of = room and (lambda places: room([left[place] for place in places]))
+    recorded_each = each_recorded(plans, light_field, how, room_of)
     for number, (plan, one) in zip(left, recorded_each, strict=True):
         for caution in plan.cautions:
             warn_of_result(caution)

@@ -5,16 +5,14 @@ The oracle is `Camera.capture` by the engine `reference`, in double precision.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 import vcc
+from tests.sweeps.rounding import gain
 from vcc.camera import captured_together
 from vcc.plan.choice import mixture_of
 from vcc.plan.how import How
-from vcc.plan.operators import AlongAxes
 from vcc.units import mm
 
 MASKS = 50
@@ -54,12 +52,6 @@ def cameras(z, cells=(9, 11), decentre=(0.0, 0.0), width=26 * mm, stop=False, pi
     sensor = vcc.Sensor(54 * mm, (14, 16), pitch, decentre=(0.3 * mm, 0.0))
     masks = [vcc.Mask(code, width, z=z, decentre=decentre, name="code") for code in codes]
     return [vcc.Camera([vcc.Lens(50 * mm), *others, mask], sensor) for mask in masks]
-
-
-def gain(plan):
-    """By how much sharpening multiplies what is rounded before it, pixel by pixel apart: in the mean square."""
-    filters = [each for each in plan.after if isinstance(each, AlongAxes)]
-    return math.prod(float(np.linalg.norm(each.down) * np.linalg.norm(each.across)) for each in filters)
 
 
 @pytest.mark.filterwarnings("ignore::vcc.ResultWarning")

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+
+_this_thread = threading.local()
+
+
+def _begin() -> None:
+    _this_thread.works = True
 
 
 class Workers(ThreadPoolExecutor):
     """A pool of threads. What goes wrong ends the work: what has not begun does not begin.
+
+    A pool of one thread that a thread of another pool asks for is that thread itself: to hand work over and wait
+    for it would cost a turn each of the lock that all threads of Python share.
 
     After Ctrl-C nobody waits for the pieces at work, which are short, or, where code is compiled, cannot be broken
     off.
@@ -20,8 +31,20 @@ class Workers(ThreadPoolExecutor):
     """
 
     def __init__(self, threads: int) -> None:
-        super().__init__(threads)
+        super().__init__(threads, initializer=_begin)
         self.ended = np.zeros(1, dtype=np.bool_)
+        self._is_this_thread = threads == 1 and getattr(_this_thread, "works", False)
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        """See `concurrent.futures.Executor.submit`."""
+        if not self._is_this_thread:
+            return super().submit(function, *args, **options)
+        done: Future[Any] = Future()
+        try:
+            done.set_result(function(*args, **options))
+        except Exception as error:
+            done.set_exception(error)
+        return done
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

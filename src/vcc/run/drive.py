@@ -9,9 +9,7 @@ each the share that is there, and each block meets the same rays.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -53,6 +51,10 @@ TOGETHER_BYTES = 2**25
 """Bytes of their rasters."""
 MUCH_UNSEEN = 0.01
 """Share of the samples between views that no view shows, from which on a warning says it."""
+
+Room = Callable[[Sequence[int]], NDArray[np.float32] | None]
+"""Gives the memory (cameras, rows, columns[, channels]) in which pictures of some cameras, by their numbers, are
+made, if there is any; new memory takes long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,17 +183,20 @@ def recorded_together(drives: Sequence[Drive]) -> list[Recorded]:
         return list(pool.map(Drive.finished, drives, rasters))
 
 
-def each_recorded(plans: Iterable[Plan], samples: Samples, how: How) -> Iterator[tuple[Plan, Recorded]]:
+def each_recorded(
+    plans: Iterable[Plan], samples: Samples, how: How, room: Room | None = None
+) -> Iterator[tuple[Plan, Recorded]]:
     """What `drive` gives of several plans of one light field, one after the other.
 
     Plans that are there already, a sequence, and plans of samples that are read share what `rounds_of` shares. Of
-    samples in memory others are run as they come, some side by side, each by one thread, while those after them
-    are planned.
+    samples in memory others are run as they come, some side by side, each by one thread. Nobody plans meanwhile:
+    planning and running that wait for Python's lock in turn take longer than one after the other.
 
     Args:
         plans: all that is done by one engine.
         samples: as in `drive`.
         how: likewise.
+        room: where pictures are put by the threads that make them, where these are several.
     """
     alone = (
         chosen(how.engine, samples.whole()) == "numba" and samples.whole() is not None and how.tolerance is None
@@ -200,22 +205,28 @@ def each_recorded(plans: Iterable[Plan], samples: Samples, how: How) -> Iterator
         listed = list(plans)
         yield from zip(listed, recorded_together(_drives(listed, samples, how)) if listed else (), strict=True)
         return
-    begun: deque[tuple[list[Drive], Future[list[Recorded]]]] = deque()
     before: Drive | None = None
+    first = 0
     with Workers(how.workers) as pool:
-        for group in _groups(Drive(plan, samples, how) for plan in plans):
-            while begun and (len(begun) > how.workers or not group[0].by_one_thread):
-                yield from _taken(*begun.popleft())
-            if not group[0].by_one_thread:
-                yield group[0].plan, group[0].recorded()
+        for crowd in _crowds(Drive(plan, samples, how) for plan in plans):
+            if not crowd[0].by_one_thread:
+                yield crowd[0].plan, crowd[0].recorded()
+                first += 1
                 continue
-            if before is None or group[0].plan.before != before.plan.before:
-                before = group[0]
-            for one in group:
+            if before is None or crowd[0].plan.before != before.plan.before:
+                before = crowd[0]
+            for one in crowd:
                 one.prepared = before.prepared  # once for all
-            begun.append((group, pool.submit(_recorded_by_one_thread, group)))
-        while begun:
-            yield from _taken(*begun.popleft())
+            each = -(-len(crowd) // how.workers)
+            starts = range(0, len(crowd), each)
+            groups = [crowd[start : start + each] for start in starts]
+            places = [
+                room and room(range(first + start, first + start + len(group)))
+                for start, group in zip(starts, groups, strict=True)
+            ]
+            first += len(crowd)
+            found = [one for group in pool.map(_recorded_by_one_thread, groups, places) for one in group]
+            yield from zip((one.plan for one in crowd), found, strict=True)
 
 
 def _drives(plans: Sequence[Plan], samples: Samples, how: How) -> list[Drive]:
@@ -224,21 +235,26 @@ def _drives(plans: Sequence[Plan], samples: Samples, how: How) -> list[Drive]:
     return [Drive(plan, part, how) for plan in cut]
 
 
-def _groups(drives: Iterable[Drive]) -> Iterator[list[Drive]]:
-    """Plans on their way in groups that one thread runs together; each by itself of those that all threads run."""
-    group: list[Drive] = []
+def _crowds(drives: Iterable[Drive]) -> Iterator[list[Drive]]:
+    """Plans on their way in crowds that are run side by side; each by itself of those that all threads run."""
+    crowd: list[Drive] = []
     for made in drives:
-        joined = group and made.by_one_thread and group[0].by_one_thread and len(group) < group[0].fellows
-        if group and not (joined and made.plan.before == group[0].plan.before):
-            yield group
-            group = []
-        group.append(made)
-    if group:
-        yield group
+        joined = crowd and made.by_one_thread and crowd[0].by_one_thread
+        if crowd and not (
+            joined and made.plan.before == crowd[0].plan.before and len(crowd) < made.threads * made.fellows
+        ):
+            yield crowd
+            crowd = []
+        crowd.append(made)
+    if crowd:
+        yield crowd
 
 
-def _recorded_by_one_thread(drives: Sequence[Drive]) -> list[Recorded]:
-    """What several plans give of the same samples; the bytes are the same for any number of threads."""
+def _recorded_by_one_thread(drives: Sequence[Drive], places: NDArray[np.float32] | None) -> list[Recorded]:
+    """What several plans give of the same samples, their pictures in places where there are any.
+
+    The bytes are the same for any number of threads.
+    """
     alone = [copy(each) for each in drives]
     for each in alone:
         each.threads = 1
@@ -249,18 +265,19 @@ def _recorded_by_one_thread(drives: Sequence[Drive]) -> list[Recorded]:
         found = None if by_turns is None else list(map(Partial, by_turns))
     if found is None:
         found = [each.rounds() for each in alone]
-    return list(map(Drive.finished, alone, found))
-
-
-def _taken(drives: Sequence[Drive], found: Future[list[Recorded]]) -> Iterator[tuple[Plan, Recorded]]:
-    return zip((each.plan for each in drives), found.result(), strict=True)
+    made = list(map(Drive.finished, alone, found))
+    if places is None:
+        return made
+    for place, one in zip(places, made, strict=True):
+        place[...] = one.values
+    return [replace(one, values=place) for place, one in zip(places, made, strict=True)]
 
 
 def recorded_mixed(
     mixture: Mixture,
     samples: Samples,
     how: How,
-    room: Callable[[Sequence[int]], NDArray[np.float32] | None] | None = None,
+    room: Room | None = None,
 ) -> Iterator[Recorded]:
     """What `drive` gives of several cameras whose pictures are sums of a few.
 
@@ -268,8 +285,7 @@ def recorded_mixed(
         mixture: how.
         samples: as in `drive`.
         how: likewise.
-        room: gives the memory (cameras, rows, columns[, channels]) in which the pictures of some cameras are to be
-            made, by their numbers, if there is any; new memory takes long.
+        room: where pictures are made.
     """
     found = recorded_together(_drives(mixture.plans, samples, how))
     mixed = late.module("vcc.engines.mixed")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from os import PathLike
@@ -22,6 +22,7 @@ from vcc.base.remarks import Remarks
 from vcc.camera import Camera, each_captured
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.plan.how import How, Options
+from vcc.run.drive import Room
 from vcc.run.executors import Work as Task
 from vcc.run.executors import crew, memory_of_task
 from vcc.run.sent import check_may_be_sent
@@ -255,10 +256,6 @@ class Work(Brief):
 Row = tuple[int, NDArray[np.float32] | None, dict[str, float]]
 """Of a camera: its number, its picture where pictures are kept, and what is told of it."""
 Rows = list[Row]
-
-
-Room = Callable[[Sequence[int]], NDArray[np.float32] | None]
-"""Gives memory to make pictures of cameras in, by their numbers, or None."""
 
 
 def rows_of(work: Work, batch: Sequence[int], room: Room = lambda numbers: None) -> Iterator[Row]:
