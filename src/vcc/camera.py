@@ -26,9 +26,10 @@ from vcc.optics.train import Train
 from vcc.plan.choice import compile_best, compiled_each, mixture_of
 from vcc.plan.how import OF_THE_RUN, How, Options
 from vcc.plan.model import Plan
+from vcc.plan.protocol import Room
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
-from vcc.run.drive import Recorded, Room, drive, each_recorded, recorded_mixed
+from vcc.run.drive import Recorded, drive, each_recorded, recorded_mixed
 from vcc.run.expose import Exposure
 from vcc.run.operator import Operator
 from vcc.run.operators import carried_to

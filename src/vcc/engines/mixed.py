@@ -6,7 +6,7 @@ By compiled loops, and not by a library's: those bring threads of their own, whi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -18,6 +18,7 @@ from vcc.base.workers import Workers
 from vcc.engines import many_kernels
 from vcc.engines.vector_sums import SHORTEST
 from vcc.plan.footprints.mixtures import Mixture
+from vcc.plan.protocol import Room
 
 PIECE = 2**10
 """Values of a picture that are made at once, at most, or a row of it: as many of the few stay in the cache."""
@@ -51,7 +52,7 @@ class Mixer:
         mixture: how they are made.
         pictures: those that its plans make, (rows, columns[, channels]).
         threads: how many work at once. The same bytes for any number.
-        room: where pictures of cameras go, see `vcc.run.drive.recorded_mixed`; None makes room here.
+        room: where pictures of cameras go; None makes room here.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class Mixer:
         mixture: Mixture,
         pictures: Sequence[NDArray[np.float32]],
         threads: int,
-        room: Callable[[Sequence[int]], NDArray[np.float32] | None] | None = None,
+        room: Room | None = None,
     ) -> None:
         self.shape, self.threads = pictures[0].shape, threads
         self.members, self.room = mixture.members, room

@@ -13,6 +13,10 @@ from vcc.base.describe import Brief
 from vcc.base.progress import Progress, part_of
 from vcc.fields.grid import Block
 
+Room = Callable[[Sequence[int]], NDArray[np.float32] | None]
+"""Gives the memory (cameras, rows, columns[, channels]) in which pictures of some cameras, by their numbers, are
+made, if there is any; new memory takes long."""
+
 
 @dataclass(frozen=True, eq=False)
 class Partial:

@@ -33,7 +33,7 @@ from vcc.plan.footprints.mixtures import Mixture
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
-from vcc.plan.protocol import Core, Partial
+from vcc.plan.protocol import Core, Partial, Room
 from vcc.run.blocks import SUMS, Blocks, Need, cut_evenly
 from vcc.run.executors import Tree, Work, crew, memory_of_task
 from vcc.run.needed import needed, needed_by_all
@@ -51,10 +51,6 @@ TOGETHER_BYTES = 2**25
 """Bytes of their rasters."""
 MUCH_UNSEEN = 0.01
 """Share of the samples between views that no view shows, from which on a warning says it."""
-
-Room = Callable[[Sequence[int]], NDArray[np.float32] | None]
-"""Gives the memory (cameras, rows, columns[, channels]) in which pictures of some cameras, by their numbers, are
-made, if there is any; new memory takes long."""
 
 
 @dataclass(frozen=True, eq=False)

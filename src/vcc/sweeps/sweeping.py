@@ -22,7 +22,7 @@ from vcc.base.remarks import Remarks
 from vcc.camera import Camera, each_captured
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.plan.how import How, Options
-from vcc.run.drive import Room
+from vcc.plan.protocol import Room
 from vcc.run.executors import Work as Task
 from vcc.run.executors import crew, memory_of_task
 from vcc.run.sent import check_may_be_sent
