@@ -10,7 +10,7 @@ import pytest
 import vcc
 from vcc.base.units import mm, um
 from vcc.plan.decisions import Decisions
-from vcc.plan.footprints.mask_textures import mask_lookup, texture_error
+from vcc.plan.footprints.mask_textures import mask_as_met, texture_error
 from vcc.plan.footprints.planes import Plane
 from vcc.shapes import patterns
 
@@ -38,7 +38,7 @@ def test_what_is_looked_up_errs_by_what_is_told_of_it(points):
     step, period = 3.0, float(points)  # a sample is as wide as three points, along x alone
     plane = Plane(patterns.CosineSum((period, math.inf)), "", (0, 0), np.diag([0, 0, step, 1e3])[2:], np.zeros(2))
     still = np.zeros((2, 2))
-    lookup = mask_lookup(
+    lookup, _ = mask_as_met(
         plane, np.zeros((1, 1, 2)), np.zeros((1, 1, 2)), still, (5, 400), 1, 1, decisions=Decisions()
     )
     assert lookup.texture.dtype == np.float64

@@ -28,7 +28,7 @@ from vcc.optics.faces import Element
 from vcc.optics.mask import Mask
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
-from vcc.plan.footprints.mask_textures import mask_lookup
+from vcc.plan.footprints.mask_textures import mask_as_met
 from vcc.plan.footprints.planes import Plane, depends_on_view_only
 from vcc.shapes.patterns import Pattern
 
@@ -121,7 +121,7 @@ def _weights(
     if depends_on_view_only(plane, (nt, ns), still):
         shares = plane.pattern.mean(*plane.boxes(index, np.zeros_like(index), still, (nt, ns)))
         return lambda j, i: shares[j, i]
-    lookup = mask_lookup(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
+    lookup, _ = mask_as_met(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
     k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
     # A texture that makes up for being looked up by splines may pass 0 beside an edge; light does not.
     return lambda j, i: np.maximum(lookup.weights(j, i, k, l), 0.0)

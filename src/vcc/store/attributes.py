@@ -14,6 +14,7 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.version import VERSION
 from vcc.fields.grid import Sample
 
 FORMAT_VERSION = 1
@@ -144,6 +145,11 @@ class Attributes(Brief):
     def finished(self, lossy: dict[str, Any] | None) -> Attributes:
         """The same of a store with all its views."""
         return replace(self, complete=True, lossy=lossy)
+
+
+def written_here() -> dict[str, Any]:
+    """The provenance of what nobody says more about."""
+    return {"written_by": f"vcc {VERSION}"}
 
 
 def plain(value: Any, name: str) -> Any:

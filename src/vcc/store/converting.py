@@ -14,12 +14,11 @@ from numpy.typing import DTypeLike, NDArray
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
-from vcc.base.version import VERSION
 from vcc.fields.arrays import one_view
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
 from vcc.files.transfer import decode, encode
-from vcc.store.attributes import DTYPES, Transfer
+from vcc.store.attributes import DTYPES, Transfer, written_here
 from vcc.store.compression import Compression, Pixels
 from vcc.store.reading import StoredLightField
 from vcc.store.writing import write_views
@@ -99,7 +98,7 @@ def as_kept(source: Samples, transfer: Transfer, dtype: DTypeLike | None) -> Kep
     """
     grid = source.grid
     view: View = partial(one_view, source)
-    kind, names, made = grid.kind, None, {"written_by": f"vcc {VERSION}"}
+    kind, names, made = grid.kind, None, written_here()
     if isinstance(source, StoredLightField):
         source.check_complete()
         view = partial(source.stored_view, first=0, stop=grid.shape[2])  # as stored: codes stay codes

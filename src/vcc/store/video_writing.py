@@ -23,13 +23,12 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
 from vcc.base.reading import expanded
-from vcc.base.version import VERSION
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import atomic_path
 from vcc.files.parts import clear_folder, clear_leftovers, part_of, settle, settle_names
 from vcc.files.writer_lock import WriterLock
-from vcc.store.attributes import Transfer, plain
+from vcc.store.attributes import Transfer, plain, written_here
 from vcc.store.compression import Compression, Pixels
 from vcc.store.converting import as_kept
 from vcc.store.reading import restored
@@ -139,7 +138,7 @@ class VideoWriter:
         sizes = tuple(int(size) for size in shape)
         how = self.packing
         common = Common(sizes, np.dtype(dtype), frame, how.transfer, sample, how.channel_names)
-        made = {"written_by": f"vcc {VERSION}"} if provenance is None else dict(provenance)
+        made = None if provenance is None else dict(provenance)
         with self._frame(common, time, {"disparity_range": disparity_range, "provenance": made}) as writer:
             yield writer
 
@@ -290,8 +289,8 @@ def create_video(
     try:
         clear_leftovers(folder, lock.patience)
         if not there:
-            made = {"written_by": f"vcc {VERSION}"} if provenance is None else provenance
-            _begin(folder, VideoAttributes(between or "linear", None, made))
+            made = VideoAttributes(between or "linear", None, written_here() if provenance is None else provenance)
+            _begin(folder, made)
         video = open_video(folder)
         if between not in (None, video.between):
             raise InputError(

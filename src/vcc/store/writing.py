@@ -21,7 +21,6 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.measures import decibels
 from vcc.base.progress import Progress, tell
-from vcc.base.version import VERSION
 from vcc.base.words import first_few
 from vcc.fields.arrays import one_view
 from vcc.fields.disparity import DisparityMaps
@@ -30,7 +29,19 @@ from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import refusal
 from vcc.files.parts import clear_leftovers, part_of, put_in_place
 from vcc.files.writer_lock import WriterLock
-from vcc.store.attributes import ARRAY, AXES, DTYPES, KEY, SETTINGS, Attributes, Transfer, difference, plain, same
+from vcc.store.attributes import (
+    ARRAY,
+    AXES,
+    DTYPES,
+    KEY,
+    SETTINGS,
+    Attributes,
+    Transfer,
+    difference,
+    plain,
+    same,
+    written_here,
+)
 from vcc.store.compression import Compression, Lossless, Lossy, Pixels, layout
 from vcc.store.disparity_maps import keep_maps
 from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata, restored
@@ -311,7 +322,7 @@ def save_store(
         overwrite=overwrite,
         progress=progress,
         disparity=grid.disparities.maps() if grid.disparities.known else None,
-        provenance={"written_by": f"vcc {VERSION}"} if provenance is None else provenance,
+        provenance=written_here() if provenance is None else provenance,
         transfer=transfer,
         channel_names=channel_names,
         chunks=chunks,

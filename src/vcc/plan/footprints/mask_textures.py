@@ -71,27 +71,6 @@ class Lattice(Brief):
         return bool(np.maximum(ratio, 1 / ratio).max() < COARSER)
 
 
-def mask_lookup(
-    plane: Plane,
-    index: Array,
-    shift: Array,
-    motion: Array,
-    samples: tuple[int, int],
-    divide: int,
-    fine: int,
-    over_samples: bool = True,
-    decisions: Decisions = ANEW,
-) -> MaskLookup:
-    """The mask averaged over a sample's footprint, as a texture, and where each sample reads it.
-
-    Args: see `mask_as_met`.
-
-    Raises:
-        InputError: samples that meet the mask beyond the points that were kept.
-    """
-    return mask_as_met(plane, index, shift, motion, samples, divide, fine, over_samples, decisions)[0]
-
-
 def mask_as_met(
     plane: Plane,
     index: Array,
@@ -103,7 +82,7 @@ def mask_as_met(
     over_samples: bool = True,
     decisions: Decisions = ANEW,
 ) -> tuple[MaskLookup, Textured]:
-    """What `mask_lookup` gives, and how its texture was made.
+    """The mask averaged over a sample's footprint: as a texture that each sample reads, and how that was made.
 
     Args:
         plane: the mask.
