@@ -35,9 +35,17 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-5
 """Share of the brightest pixel by which two equal sums may differ."""
-TARGETS = {"lenses": 60.0, "prisms": 60.0, "one mask": 55.0, "two masks": 50.0, "blur": 55.0} | dict.fromkeys(
-    BENT, 50.0
-)
+TARGETS = {
+    "lenses": 60.0,
+    "prisms": 60.0,
+    "turned lenses": 60.0,
+    "one mask": 55.0,
+    "turned mask": 55.0,
+    "two masks": 50.0,
+    "three masks": 50.0,
+    "stop, mask and prism": 50.0,
+    "blur": 55.0,
+} | dict.fromkeys(BENT, 50.0)
 """Brute force by default options, dB; by rays of 256 samples, or what they state."""
 RAYS = 256
 

@@ -35,7 +35,17 @@ FINEST = 5.5
 MARGIN = 4
 """Samples around what the camera's rays ask for: as many as any interpolation or filter may reach."""
 
-AFFINE = ("lenses", "prisms", "one mask", "two masks", "blur")
+AFFINE = (
+    "lenses",
+    "prisms",
+    "one mask",
+    "two masks",
+    "three masks",
+    "stop, mask and prism",
+    "turned lenses",
+    "turned mask",
+    "blur",
+)
 """Kinds of cameras that are made of footprints."""
 BENT = ("facets", "plate", "lenslets", "prism array", "coded diffuser", "diffuser before a mask")
 """Kinds that are traced."""
@@ -178,11 +188,20 @@ class _Drawing:
         self.vergence = 0.0 if self.chance(0.35) else 1 / self.between(0.6, 2.5)  # of the views, at their plane
         self.flown = self.between(5, 25) * mm if self.chance(0.3) else 0.0
         self.half = tuple(n * d / 2 for n, d in zip(self.number, self.spacing, strict=True))
+        self.grid, self.pixels_turned = np.eye(2), np.eye(2)
+        if self.kind.startswith("turned"):
+            angle, shear = self.between(-0.6, 0.6), self.one_of(0.0, self.between(-0.3, 0.3))
+            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            self.grid = turn @ np.array([[1.0, shear], [0.0, 1.0]])
+            if self.chance(0.4):  # the whole light field turned, not its grid of views alone
+                self.grid = self.pixels_turned = turn
+            self.half = (0.65 * self.half[0], 0.65 * self.half[1])  # what fits into the parallelogram
 
     def _optics(self) -> None:
         """What forms the picture: one lens, two, or a thick one; and prisms where the kind says so."""
         z = 0.0 if self.chance(0.4) else self.between(0, 15) * mm
-        rim = 2 * min(self.half) * self.between(0.5, 0.85) if self.chance(0.55) else None
+        chance = {"stop, mask and prism": 0.0, "turned lenses": 1.0, "turned mask": 1.0}.get(self.kind, 0.55)
+        rim = 2 * min(self.half) * self.between(0.5, 0.85) if self.chance(chance) else None
         f = self.between(40, 60) * mm
         off = self.off_axis(0.8 * mm)
         form = self.one_of("thin", "thin", "two", "thick") if self.kind in ("lenses", "prisms") else "thin"
@@ -207,7 +226,7 @@ class _Drawing:
                 deflection = (self.between(-0.02, 0.02), self.between(-0.02, 0.02))
                 # Behind all lenses, or at the lens or before: nothing stands within a thick one.
                 self.optics.append(vcc.Prism(deflection, z=self.one_of(0.0, z, 26 * mm, 30 * mm)))
-        elif rim is None and self.chance(0.4):
+        elif rim is None and self.kind != "stop, mask and prism" and self.chance(0.4):
             self.stop_kind = self.one_of("round", "polygon")
             size = 2 * min(self.half) * self.between(0.5, 0.85)
             pattern: Any = (
@@ -271,12 +290,10 @@ class _Drawing:
     def _cover(self, camera: vcc.Camera) -> tuple[Array, tuple[int, int, int, int]]:
         """The frame at z = 0 and the shape of a light field that holds all rays the camera asks for."""
         frame = np.eye(5)
-        for axis in (0, 1):
-            frame[axis, axis] = self.spacing[axis]
-            frame[axis, 4] = -self.spacing[axis] * (self.number[axis] - 1) / 2
-            frame[2 + axis, axis] = self.spacing[axis] * self.vergence
-            frame[2 + axis, 4] = frame[axis, 4] * self.vergence
-            frame[2 + axis, 2 + axis] = -self.slopes[axis]
+        frame[:2, :2] = self.grid @ np.diag(self.spacing)
+        frame[:2, 4] = -frame[:2, :2] @ (np.array(self.number) - 1) / 2
+        frame[2:4, [0, 1, 4]] = frame[:2, [0, 1, 4]] * self.vergence
+        frame[2:4, 2:4] = -self.pixels_turned @ np.diag(self.slopes)
         flight = np.eye(5)
         flight[0, 2] = flight[1, 3] = self.flown
         frame = flight @ frame
@@ -297,6 +314,10 @@ class _Drawing:
             "prisms": lambda: [],
             "one mask": lambda: [self._mask()],
             "two masks": self._two_masks,
+            "three masks": lambda: [*self._two_masks(), self._mask()],
+            "stop, mask and prism": lambda: [self._stop(), self._mask(), self._prism()],
+            "turned lenses": lambda: [],
+            "turned mask": lambda: [self._mask()],
             "blur": lambda: [self._diffuser()],
             "facets": lambda: [self._facets()],
             "plate": lambda: [self._plate()],
@@ -365,6 +386,17 @@ class _Drawing:
     def _two_masks(self) -> list[Any]:
         first = self._mask()
         return [first, self._mask(first.z if self.chance(0.3) else None)]
+
+    def _stop(self) -> Any:
+        """A hard stop that bounds the light, anywhere: next to the lens, at the views, or deep in the camera."""
+        z = self.one_of(self.lens_z + self.spread(0.01, 3) * mm, self.between(0, 20) * mm, 0.6 * self._place())
+        size = 2 * self._beam(z) * self.between(0.5, 0.8)
+        if self.chance(0.6):
+            return vcc.Mask(patterns.Circle(size), z=z, decentre=self.off_axis(0.1 * size))
+        return vcc.Mask(patterns.Polygon(int(self.rng.integers(3, 9)), size, self.between(0, 1)), z=z)
+
+    def _prism(self) -> Any:
+        return vcc.Prism((self.between(-0.02, 0.02), self.between(-0.02, 0.02)), z=self._place())
 
     def _kernel(self, onto: float) -> Any:
         """A few pixels wide: onto is metres on the sensor per slope."""

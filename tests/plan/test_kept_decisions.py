@@ -22,7 +22,7 @@ from vcc.plan.decisions import ANEW, Decisions, WhileWanted
 from vcc.plan.footprints.means import mean_over
 from vcc.plan.how import How
 from vcc.run.drive import drive
-from vcc.shapes.polygon_areas import polygon_mean
+
 from vcc.shapes.sheets import Product, Shifted
 from vcc.units import mm, um
 
@@ -247,12 +247,12 @@ def test_what_would_be_decided_otherwise_is_named():
 def test_polygons_have_means_in_closed_form():
     """The whole: n/2·R²·sin(2π/n); parts against points a thousand a side, right to their share of the border."""
     hexagon = patterns.Polygon(6, 2.0, 0.3)
-    whole = polygon_mean(hexagon, np.zeros(1), np.zeros(1), 4.0, 4.0)
+    whole = hexagon.mean(np.zeros(1), np.zeros(1), 4.0, 4.0)
     assert whole[0] * 16 == pytest.approx(3 * np.sin(np.pi / 3), rel=1e-12)
     inside = (np.arange(1000) + 0.5) / 1000 - 0.5
     for x, y in np.random.default_rng(0).uniform(-1, 1, (6, 2)):
         points = hexagon(x + 0.5 * inside[None, :], y + 0.3 * inside[:, None]).mean()
-        assert polygon_mean(hexagon, np.array(x), np.array(y), 0.5, 0.3) == pytest.approx(points, abs=2e-3)
+        assert hexagon.mean(np.array(x), np.array(y), 0.5, 0.3) == pytest.approx(points, abs=2e-3)
 
 
 def hill(x, y):

@@ -43,9 +43,8 @@ def trace(channels: int, by_cell: bool) -> Any:
     def kernel(field, sensor, points, aim, steps, pictures, tallies):  # type: ignore[no-untyped-def]
         """As `vcc.engines.ray_kernels.add_tile`, of which the arguments are, for all pixels.
 
-        pictures: (2, rows, columns, channels): what the two halves of a pixel's rays find. tallies: (rows,
-            columns,
-        3): weights of its rays, of the missing ones, how many they are.
+        pictures: (2, rows, columns, channels): what the two halves of a pixel's rays find. tallies: (rows, columns),
+            how many they are.
         """
         x0, y0 = cuda.grid(2)
         wide, high = cuda.gridsize(2)
@@ -63,7 +62,7 @@ def trace(channels: int, by_cell: bool) -> Any:
                 pixel, middle = row * sensor.columns + column, shared.middle_of(sensor, row, column)
                 first = ((np.int64(shared.hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
                 seen = shared.cells_at(by_cell, cells, middle, sensor.sensitive, near)
-                asked, missing, sent = float64(0), float64(0), int64(0)
+                sent = int64(0)
                 for half in range(2):
                     for c in range(channels):
                         total[c] = 0
@@ -81,49 +80,41 @@ def trace(channels: int, by_cell: bool) -> Any:
                             if share[0] > 0:
                                 sent += 1
                                 _take_steps(steps, drawn, rays)
-                                wanted, lacking = look_up(field, there, rays, found)
-                                asked += wanted
-                                missing += lacking
+                                look_up(field, there, rays, found)
                             if p % FLUSHED == FLUSHED - 1 or p == begin + samples // 2 - 1:
                                 for c in range(channels):
                                     total[c] += found[c]
                                     found[c] = 0
                     for c in range(channels):
                         pictures[half, row, column, c] = total[c] * field.scale / samples
-                tallies[row, column, 0], tallies[row, column, 1], tallies[row, column, 2] = asked, missing, sent
+                tallies[row, column] = sent
 
     return kernel
 
 
 @cuda.jit(device=True)
 def look_up(field, samples, rays, found):  # type: ignore[no-untyped-def]
-    """Add what a ray finds to ``found`` (channels), as `vcc.engines.ray_kernels.add_rays` does for many.
-
-    Returns what it weighs, where the grid of views holds it or may end, and what of that the light field lacks.
-    """
-    _, _, index_from_ray, motion, between, ends = field
+    """Add what a ray finds to ``found`` (channels), as `vcc.engines.ray_kernels.add_rays` does for many."""
+    _, _, index_from_ray, motion, between = field
     _, (nv, nu, nt, ns), channels = samples
     weight = rays.share[0]
     if weight == 0:
-        return float64(0), float64(0)
+        return
     _to_indices(index_from_ray, rays, 1)
     i, j, k, l = rays.x[0], rays.y[0], rays.s[0], rays.t[0]
     if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
-        return (weight, weight) if ends else (float64(0), float64(0))
-    missing = float64(0)
-    if not (k >= -0.5 and k <= ns - 0.5 and l >= -0.5 and l <= nt - 0.5):
-        missing = weight
-        # So far outside the pictures all views that a ray is between are dark.
-        dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
-        dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
-        if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
-            return weight, missing
+        return
+    # So far outside the pictures all views that a ray is between are dark.
+    dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
+    dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
+    if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
+        return
     picture = nt * ns * channels
     ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
     if not between:
         base = (int64(cj + 0.5) * nu + int64(ci + 0.5)) * picture
         _add_view(samples, base, k, l, float32(weight), found)
-        return weight, missing
+        return
     i0, j0 = min(int64(ci), max(nu - 2, 0)), min(int64(cj), max(nv - 2, 0))
     fi, fj = ci - i0, cj - j0
     for dj in range(2):
@@ -136,20 +127,18 @@ def look_up(field, samples, rays, found):  # type: ignore[no-untyped-def]
             view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
             base = ((j0 + dj) * nu + i0 + di) * picture
             _add_view(samples, base, view_k, view_l, float32(w), found)
-    return weight, missing
 
 
 @cuda.jit
 def put_together(pictures, tallies, rows):  # type: ignore[no-untyped-def]
-    """Of the two halves their sum and twice their difference; rows[r]: the tallies of a row of pixels, summed."""
+    """Of the two halves their sum and twice their difference; rows[r]: how many rays of a row of pixels there are."""
     y = cuda.grid(1)
     _, high, wide, channels = pictures.shape
     for row in range(y, high, cuda.gridsize(1)):
-        for n in range(3):
-            total = float64(0)
-            for column in range(wide):
-                total += tallies[row, column, n]
-            rows[row, n] = total
+        total = int64(0)
+        for column in range(wide):
+            total += tallies[row, column]
+        rows[row] = total
         for column in range(wide):
             for c in range(channels):
                 one, two = pictures[0, row, column, c], pictures[1, row, column, c]

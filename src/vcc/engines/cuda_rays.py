@@ -27,23 +27,20 @@ def traced(core: Rays, values: Any, beside: int, progress: Progress | None = Non
     """
     tell(progress, 0, 1)
     pictures, tallies = traced_on_gpu(core, values, beside)
-    asked, lacking, rays = brought(tallies).sum(axis=0).tolist()
+    rays = int(brought(tallies).sum())
     tell(progress, 1, 1)
-    return Partial(
-        given_back(pictures[0], values), given_back(pictures[1], values), asked, lacking, int(rays), core.samples
-    )
+    return Partial(given_back(pictures[0], values), given_back(pictures[1], values), rays, core.samples)
 
 
 def traced_on_gpu(core: Rays, values: Any, beside: int) -> tuple[Any, Any]:
-    """The pictures of `vcc.engines.ray_kernels.add_tile`, and tallies of each row of pixels, (rows, 3), on the
-    GPU."""
+    """The pictures of `vcc.engines.ray_kernels.add_tile`, and how many rays each row of pixels has, on the GPU."""
     there = arranged(taken(resident(values)))
     rows, columns = core.raster_shape
     channels = there.shape[4]
     field = looked_up_as(core, there.reshape(math.prod(there.shape)), channels)
     sensor, points, aim, steps = _last_used.of(core)
     pictures = cuda.device_array((2, rows, columns, channels), np.float32)
-    tallies, of_rows = cuda.device_array((rows, columns, 3), np.float64), cuda.device_array((rows, 3), np.float64)
+    tallies, of_rows = cuda.device_array((rows, columns), np.int64), cuda.device_array(rows, np.int64)
     tables = sent_all(field), sensor, points._replace(beside=beside), aim, steps
     launch(kernels.trace(channels, bool(aim.by_cell)), (columns, rows), 0, *tables, pictures, tallies)
     launch(kernels.put_together, (rows,), 0, pictures, tallies, of_rows)

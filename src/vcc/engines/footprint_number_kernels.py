@@ -356,8 +356,10 @@ SHEARED = 10
 
 @_compiled
 def _height(interpolation, a):  # type: ignore[no-untyped-def]
-    """φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 a spline."""
+    """φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 a spline, 4 a box."""
     r = abs(a)
+    if interpolation == 4:
+        return 1.0 if -0.5 <= a < 0.5 else 0.0
     if interpolation == 1:
         return max(1 - r, 0.0)
     if interpolation == 3:

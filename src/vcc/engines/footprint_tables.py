@@ -277,7 +277,7 @@ class Footprint(NamedTuple):
     """What a sample's footprint is along an axis.
 
     Args:
-        interpolation: 0 nearest, 1 linear, 2 cubic, 3 a spline.
+        interpolation: 0 nearest, 1 linear, 2 cubic, 3 a spline, 4 a box.
         reach: samples to each side.
         opening: size of a pixel's sensitive part, in pixels.
     """

@@ -377,9 +377,11 @@ def filter_rows(raster, finish, band, picture):  # type: ignore[no-untyped-def]
 
 @_inlined
 def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
-    """Φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 a spline."""
+    """Φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 a spline, 4 a box."""
     r = abs(a)
-    if interpolation == 1:
+    if interpolation == 4:
+        half = min(r, 0.5)
+    elif interpolation == 1:
         r = min(r, 1.0)
         half = r - r * r / 2
     elif interpolation == 3:

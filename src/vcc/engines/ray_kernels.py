@@ -266,13 +266,12 @@ def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def
 
 
 @_inlined
-def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-def]
+def add_rays(field, rays, n, second, sums):  # type: ignore[no-untyped-def]
     """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
 
-    Rays from ``second`` on belong to the second half. ``tally`` collects the weights of all rays and of those that
-    the light field does not hold. Places are replaced by indices.
+    Rays from ``second`` on belong to the second half. Places are replaced by indices.
     """
-    samples, _, index_from_ray, motion, between, ends = field
+    samples, _, index_from_ray, motion, between = field
     values, (nv, nu, nt, ns), channels = samples
     x, y, s, t, share = rays
     to_indices(index_from_ray, rays, n)
@@ -285,7 +284,6 @@ def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-de
     # So far outside the pictures all views that a ray is between are dark.
     dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
     dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
-    asked = missing = 0.0
     for p in range(n):
         weight = share[p]
         if weight == 0.0:
@@ -293,15 +291,9 @@ def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-de
         half = 1 if p >= second else 0
         i, j, k, l = x[p], y[p], s[p], t[p]
         if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
-            if ends:
-                asked += weight
-                missing += weight
             continue
-        asked += weight
-        if not (k >= -0.5 and k <= ns - 0.5 and l >= -0.5 and l <= nt - 0.5):
-            missing += weight
-            if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
-                continue
+        if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
+            continue
         ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
         if not between:
             i0, j0 = int(ci + 0.5), int(cj + 0.5)
@@ -353,8 +345,6 @@ def add_rays(field, rays, n, second, sums, tally):  # type: ignore[no-untyped-de
                 view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
                 base = (j0 + dj) * row_of_views + (i0 + di) * picture
                 add_view(samples, base, view_k, view_l, np.float32(w), sums[half])
-    tally[0] += asked
-    tally[1] += missing
 
 
 @_compiled
@@ -589,10 +579,10 @@ def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type:
     ``ended[0]`` is true, nobody wants them, and the kernel returns.
 
     Returns:
-        (3,): weights of all rays, of missing rays, how many rays.
+        (1,): how many rays were traced.
     """
     lanes = max(field.samples.channels, LANES)
-    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(3)
+    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(1, np.int64)
     add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, room(), sums)
     return sums[2]
 
@@ -601,7 +591,7 @@ def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type:
 def add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """As `add_tile`, within what `room` gives.
 
-    ``sums``: of a packet, in single precision, and of a pixel, (2, lanes) each; and the tally, (3,).
+    ``sums``: of a packet, in single precision, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
     """
     table, samples, beside, seed = points
     cells = aim.cells
@@ -632,9 +622,9 @@ def add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, within,
                         sent += share[p] > 0.0
                     if sent == 0:
                         continue
-                    tally[2] += sent
+                    tally[0] += sent
                     take_steps(steps, drawn, rays)
-                    add_rays(field, rays, n, samples // 2 - done, sums, tally)
+                    add_rays(field, rays, n, samples // 2 - done, sums)
                     for half in range(2):  # a packet in single precision, the packets in double
                         for lane in range(sums.shape[1]):
                             totals[half, lane] += sums[half, lane]

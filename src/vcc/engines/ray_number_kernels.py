@@ -457,7 +457,7 @@ def image_back(images, cells, cell, sums, own, kinds):  # type: ignore[no-untype
 @_compiled
 def field_back(field, weights, n, index, lit, bar, to_motion, to_scale):  # type: ignore[no-untyped-def]
     """Fill cotangents ``bar`` (5, rays) of indices and shares of rays, by what they find in the light field."""
-    (values, (nv, nu, nt, ns), channels), _, _, motion, between, _ = field
+    (values, (nv, nu, nt, ns), channels), _, _, motion, between = field
     line, picture = ns * channels, nt * ns * channels
     m00, m01, m10, m11 = motion[0, 0], motion[0, 1], motion[1, 0], motion[1, 1]
     dark_k, dark_l = 1.0 + 1.5 * (abs(m00) + abs(m01)), 1.0 + 1.5 * (abs(m10) + abs(m11))

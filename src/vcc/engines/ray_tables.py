@@ -38,7 +38,6 @@ class LightField(NamedTuple):
         index_from_ray: 4×5, indices (i, j, k, l) from rays (x, y, s, t, 1).
         motion: 2×2; a point of the scene is seen in view (i, j) at pixel (k, l) − motion · (i, j).
         between: whether views are interpolated.
-        ends: whether rays outside the grid of views are missing.
     """
 
     samples: Samples
@@ -46,7 +45,6 @@ class LightField(NamedTuple):
     index_from_ray: Array
     motion: Array
     between: bool
-    ends: bool
 
 
 class Sensor(NamedTuple):

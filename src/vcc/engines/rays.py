@@ -40,12 +40,10 @@ def traced(core: Rays, values: Any, double: bool, beside: int, progress: Progres
     samples = xp.reshape(xp.astype(values, working), (-1, channels))
     rows, columns = core.raster_shape
     halves: tuple[list[Any], list[Any]] = [], []
-    asked, lacking, rays = 0.0, 0.0, 0
+    rays = 0
     for pixel in _pieces(core):
         index, share = core.looked_up(pixel, core.block(pixel) ^ beside)
-        inside, held = core.held(index)
-        asked += float((share * (inside | core.views_may_end)).sum())
-        lacking += float((share * (~held) * (inside | core.views_may_end)).sum())
+        inside = core.inside(index)
         rays += int(np.count_nonzero(share))
         found = _found(core, xp, samples, index, share * inside, working)  # (pixels, cells, samples, channels)
         half = core.samples // 2
@@ -53,7 +51,7 @@ def traced(core: Rays, values: Any, double: bool, beside: int, progress: Progres
         halves[1].append(xp.sum(found[:, :, half:, :], axis=(1, 2)) * core.scale)
         tell(progress, int(pixel[-1]) + 1, rows * columns)
     one, two = (xp.reshape(xp.concat(half, axis=0), (rows, columns, channels)) for half in halves)
-    return Partial(one + two, 2 * (one - two), asked, lacking, rays, core.samples)
+    return Partial(one + two, 2 * (one - two), rays, core.samples)
 
 
 def scattered(
@@ -74,7 +72,7 @@ def scattered(
     samples = np.zeros((channels, math.prod(core.views)))
     for pixel in _pieces(core):
         index, share = core.looked_up(pixel, core.block(pixel) ^ beside)
-        inside, _ = core.held(index)
+        inside = core.inside(index)
         for at, weight in _looked_at(core, index, share * inside):
             for channel, line in enumerate(samples):
                 carried = weight * weights[pixel, channel][:, None, None]

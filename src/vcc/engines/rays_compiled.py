@@ -43,17 +43,15 @@ def traced(
     rows, columns = core.raster_shape
     pictures = np.empty((2, rows, columns, channels), dtype=np.float32)
     tiles = [tables.Tile(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)]
-    tally = np.zeros(3)
+    rays = 0
     with Workers(threads) as pool:
         add = partial(
             kernels.add_tile, light_field(core, values, channels), *given(core, beside), pool.ended, pictures
         )
-        # Tallies are summed in the order of tiles: the same sums whatever the number of threads.
         for done, part in enumerate(pool.map(add, tiles), start=1):
-            tally += part
+            rays += int(part[0])
             tell(progress, done, len(tiles))
-    asked, lacking, traced_rays = tally.tolist()
-    return Partial(pictures[0], pictures[1], asked, lacking, int(traced_rays), core.samples)
+    return Partial(pictures[0], pictures[1], rays, core.samples)
 
 
 def given(core: Rays, beside: int) -> tuple[tables.Sensor, tables.Points, tables.Aim, tables.Steps]:
@@ -75,7 +73,6 @@ def looked_up_as(core: Rays, values: Any, channels: int) -> tables.LightField:
         core.index_from_ray.matrix[:4].copy(),
         np.ascontiguousarray(core.motion),
         bool(core.between_views),
-        bool(core.views_may_end),
     )
 
 

@@ -133,7 +133,7 @@ class _Found(Brief):
 def _looked_up_back(core: Rays, samples: Array, weights: Array, rays: Bundle) -> tuple[Bundle, Numbers]:
     """What the light field says of rays at the end of their way, and of the numbers by which it is looked up."""
     index = core.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
-    inside = core.held(index)[0]
+    inside = core.inside(index)
     found = _found(core, samples, weights[:, None, None], index, rays.share * inside * core.scale)
     carried = (rays.share * inside * core.scale)[..., None] * found.to_index
     behind, index_from_ray = moved_back(core.index_from_ray.matrix, rays, carried)

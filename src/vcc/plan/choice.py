@@ -8,6 +8,7 @@ from dataclasses import replace
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.optics.train import Train
+from vcc.plan.coverage import AskedLight, Missing
 from vcc.plan.decisions import ANEW, Decisions, plan_again
 from vcc.plan.depth_rule import denser
 from vcc.plan.footprints.codes import Codes
@@ -37,7 +38,25 @@ def compile_best(train: Train, grid: Grid, how: How | None = None, decisions: De
     kept = ANEW if decisions is None else decisions
     kept.hold("the order of the elements", tuple((element.kind, element.name) for element in train.elements))
     plan = _compiled(train, grid, how or How(), kept)
-    return replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame))
+
+    def lacking() -> tuple[Missing, str]:
+        asked = AskedLight.of(train, grid)
+        return asked.missing, asked.words
+
+    missing, words = kept.keep("rays that are missing", lacking, lambda one, other: True)
+    return _known(plan, train, grid, missing, words)
+
+
+def _known(plan: Plan, train: Train, grid: Grid, missing: Missing, words: str) -> Plan:
+    """A plan with what it was made for, and what its light field lacks."""
+    return replace(
+        plan,
+        grid_shape=grid.shape[:4],
+        missing_rays=missing.share,
+        missing_reason=missing.reason,
+        notes=(*plan.notes, words),
+        made_for=MadeFor(train, grid.frame),
+    )
 
 
 def compiled_each(
@@ -65,14 +84,20 @@ def compiled_each(
     plans = codes.plans(grid, how)
     if plans is None:
         return list(anew)
-    made = zip(trains, plans, strict=True)
-    return [replace(plan, grid_shape=grid.shape[:4], made_for=MadeFor(train, grid.frame)) for train, plan in made]
+    asked = AskedLight.of(codes.base, grid)
+    made = zip(plans, trains, asked.missing_with(codes.number, codes.cells), strict=True)
+    return [_known(plan, train, grid, missing, asked.words) for plan, train, missing in made]
 
 
 def mixture_of(trains: Sequence[Train], grid: Grid, how: How) -> Mixture | None:
     """The pictures of several trains, or of many of them, as sums of fewer pictures; None where that is not so."""
     codes = _codes(trains, how)
-    return None if codes is None else codes.mixture(grid, how)
+    mixture = None if codes is None else codes.mixture(grid, how)
+    if codes is None or mixture is None:
+        return None
+    asked = AskedLight.of(codes.base, grid)
+    missing = asked.missing_with(codes.number, [codes.cells[n] for n in mixture.members])
+    return replace(mixture, missing=tuple(missing))
 
 
 def _codes(trains: Sequence[Train], how: How) -> Codes | None:

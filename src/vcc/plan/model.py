@@ -56,7 +56,7 @@ class Plan(Value, Shown):
         before: what is done to samples before that, in order.
         after: what is done to the raster, in order.
         views_between: how views in between are made before all else, or None; the rest counts what is there then.
-        missing_rays: share of the rays asked for that the light field lacks; None where the run tells.
+        missing_rays: share of the rays asked for that the light field lacks.
         missing_reason: in words.
         expected_ghosting: largest gap in pixels between neighbouring views' pictures of the same thing that is
             left unfilled.
@@ -71,7 +71,7 @@ class Plan(Value, Shown):
     before: tuple[Before, ...] = ()
     after: tuple[After, ...] = ()
     views_between: ViewsBetween | None = None
-    missing_rays: float | None = None
+    missing_rays: float = 0.0
     missing_reason: str = ""
     expected_ghosting: float = 0.0
     cautions: tuple[str, ...] = ()
@@ -173,8 +173,7 @@ class Plan(Value, Shown):
         rows, columns = self.sensor_shape
         lines = [f"Plan for a picture of {rows}×{columns} pixels by {self.core.method}: {self.core!r}"]
         lines += [f"  {words}" for words in self._filters()]
-        if self.missing_rays is not None:
-            lines.append(f"  missing rays: {self.missing_rays:.2%}")
+        lines.append(f"  missing rays: {self.missing_rays:.2%}")
         return "\n".join(lines + [f"  - {note}" for note in self.notes])
 
     def _filters(self) -> list[str]:

@@ -26,16 +26,12 @@ class Partial:
         values: irradiance, (rows, columns, channels), an array of the library of the samples.
         difference: what the two halves of a pixel's rays found, one minus the other, like ``values``; None where
             nothing is sampled.
-        asked: light asked for, in any unit.
-        lacking: of that, what lies beside the light field.
         rays: how many were traced; 0 for footprints.
         samples: rays a pixel; 0 for footprints.
     """
 
     values: Any
     difference: Any = None
-    asked: float = 0.0
-    lacking: float = 0.0
     rays: int = 0
     samples: int = 0
 
@@ -52,16 +48,9 @@ class Partial:
         return Partial(
             values=(self.values + other.values) / 2,
             difference=self.values - other.values,
-            asked=self.asked + other.asked,
-            lacking=self.lacking + other.lacking,
             rays=self.rays + other.rays,
             samples=self.samples + other.samples,
         )
-
-    @property
-    def missing(self) -> float:
-        """The share of the light asked for that the light field does not hold."""
-        return self.lacking / self.asked if self.asked > 0 else 0.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -281,10 +270,6 @@ class Core(Protocol):
 
     def more(self, samples: int) -> Any:
         """With so many rays a pixel, to be taken beside as many that there are; the same where none are traced."""
-        ...
-
-    def alone(self) -> Any:
-        """What tells of all rays without samples, run on a light field of one."""
         ...
 
     def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 TENT = 2
 """Powers of sinc that linear interpolation costs."""
+BOX = 1
+"""The same of samples that fill their cells evenly."""
 MEAN = 1
 """Powers of sinc that a mean over a cell has cost."""
 FREQUENCIES = 96
@@ -113,17 +115,36 @@ def across_plane(losses: list[tuple[float, Array]], half: int) -> Array:
             light that was spread less than it should.
         half: weights on each side of the middle.
     """
-    frequency = (np.arange(24) + 0.5) / 24 - 0.5
-    fx, fy = (axis.ravel() for axis in np.meshgrid(frequency, frequency[12:]))
-    wanted = np.ones(fx.size)
-    for power, (x, y) in losses:
-        wanted = wanted * (gain(power, fx * x + fy * y) if power > 0 else np.sinc(fx * x + fy * y) ** -power)
-    places = [(n, m) for m in range(half + 1) for n in range(-half, half + 1) if m > 0 or n > 0]
+
+    def wanted(fx: Array, fy: Array) -> Array:
+        total = np.ones(fx.size)
+        for power, (x, y) in losses:
+            total = total * (gain(power, fx * x + fy * y) if power > 0 else np.sinc(fx * x + fy * y) ** -power)
+        return total
+
+    return symmetric_plane(wanted, (half, half))
+
+
+def symmetric_plane(wanted: Callable[[Array, Array], Array], beside: tuple[int, int]) -> Array:
+    """The filter of a plane, symmetric about its middle, whose gain comes nearest to what is wanted; its sum is 1.
+
+    Args:
+        wanted: gain as a function of cycles a step along (x, y), 1 at 0.
+        beside: weights on each side of the middle along (x, y).
+
+    Returns:
+        (rows, columns).
+    """
+    wide, high = beside
+    number = 24 * math.ceil(max(beside) / 6)
+    frequency = (np.arange(number) + 0.5) / number - 0.5
+    fx, fy = (axis.ravel() for axis in np.meshgrid(frequency, frequency[number // 2 :]))
+    places = [(n, m) for m in range(high + 1) for n in range(-wide, wide + 1) if m > 0 or n > 0]
     column, row = np.array(places).T
     basis = 2 * np.cos(2 * np.pi * (fx[:, None] * column + fy[:, None] * row)) - 2
     weight = 1 / np.maximum(np.hypot(fx, fy), DETAIL) ** 2
-    side = np.linalg.lstsq(basis * weight[:, None], (wanted - 1) * weight, rcond=1e-10)[0]
-    kernel = np.zeros((2 * half + 1, 2 * half + 1))
-    kernel[half + row, half + column] = kernel[half - row, half - column] = side
-    kernel[half, half] = 1 - 2 * side.sum()
+    side = np.linalg.lstsq(basis * weight[:, None], (wanted(fx, fy) - 1) * weight, rcond=1e-10)[0]
+    kernel = np.zeros((2 * high + 1, 2 * wide + 1))
+    kernel[high + row, wide + column] = kernel[high - row, wide - column] = side
+    kernel[high, wide] = 1 - 2 * side.sum()
     return kernel

@@ -147,7 +147,7 @@ def _over_shared_blocks(drives: Sequence[Drive]) -> list[Partial]:
         those = [n for n, drive in enumerate(drives) if drive.used_in(block)]
         for n, part in zip(those, _parts([drives[n] for n in those], block, values), strict=True):
             trees[n].put(next(numbers[n]), part)
-    return [drive.of_all_rays(_in_double(tree.total)) for drive, tree in zip(drives, trees, strict=True)]
+    return [_in_double(tree.total) for tree in trees]
 
 
 def _parts(drives: Sequence[Drive], block: Block, values: Any) -> list[Partial]:
@@ -286,8 +286,8 @@ def recorded_mixed(
     found = recorded_together(_drives(mixture.plans, samples, how))
     mixed = late.module("vcc.engines.mixed")
     mixer = mixed.Mixer(mixture, [each.values for each in found], how.workers, room)
-    for values, (missing, reason) in zip(mixer.pictures(), mixture.missing, strict=True):
-        yield Recorded(values, missing, reason)
+    for values, missing in zip(mixer.pictures(), mixture.missing, strict=True):
+        yield Recorded(values, missing.share, missing.reason)
 
 
 class Drive:
@@ -451,10 +451,9 @@ class Drive:
         picture = self.picture(found)
         if self.plan.views_between is not None:
             _warn_of_unseen(self.samples)
-        missing = found.missing if self.plan.missing_rays is None else self.plan.missing_rays
         return Recorded(
             picture.astype(np.float32, copy=False) if isinstance(picture, np.ndarray) else picture,
-            missing,
+            self.plan.missing_rays,
             self.plan.missing_reason,
             sampling_error(found),
             found.rays,
@@ -494,16 +493,7 @@ class Drive:
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
             return run(core, self.prepared, progress=progress)
-        return self.of_all_rays(self._over_blocks(listed, beside, progress), beside)
-
-    def of_all_rays(self, total: Partial, beside: int = 0) -> Partial:
-        """The sum of all blocks with what is known of all rays; each block knows of its own only."""
-        if not self.plan.by_rays or self.in_memory:
-            return total
-        # A light field of one sample tells which of all are missing.
-        core, run = self._core_and_run(beside)
-        whole = run(core.alone(), np.zeros((1, 1, 1, 1), self.kind))
-        return replace(total, asked=whole.asked, lacking=whole.lacking, rays=whole.rays)
+        return self._over_blocks(listed, beside, progress)
 
     def _core_and_run(self, beside: int) -> tuple[Core, Callable[..., Partial]]:
         """The core with so many rays beside those taken, and what runs it."""

@@ -161,6 +161,30 @@ def mean_over(
     return Cells(cells, across.length, down.length, middle).mean(x, y, width, height)
 
 
+def _share_by_integral(
+    hole: Circle | Polygon, x: Array, y: Array, width: float, height: float, inner: float
+) -> Array:
+    """The share of rectangles that lies inside a hole around the origin.
+
+    Its rim cuts few of many rectangles: the area is that of these alone.
+
+    Args:
+        hole: whose area is known.
+        x: centres, metres.
+        y: centres, metres, of the same shape.
+        width: of every rectangle, metres.
+        height: of every rectangle, metres.
+        inner: radius of a circle within the hole, metres.
+    """
+    across, down = np.abs(x), np.abs(y)
+    nearest = np.maximum(across - width / 2, 0) ** 2 + np.maximum(down - height / 2, 0) ** 2
+    inside = (across + width / 2) ** 2 + (down + height / 2) ** 2 <= inner**2
+    cut = ~inside & (nearest < hole.diameter**2 / 4)
+    share = np.array(inside, dtype=np.float64)
+    share[cut] = _mean_from_integral(hole._integral, x[cut], y[cut], width, height)
+    return share
+
+
 def _mean_from_integral(
     integral: Callable[[Array, Array], Array], x: Array, y: Array, width: float, height: float
 ) -> Array:
@@ -210,16 +234,8 @@ class Circle(Pattern):
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
         """The share of each rectangle that lies inside the circle, in closed form."""
         floor = self.diameter * 1e-5
-        width, height = max(width, floor), max(height, floor)
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
-        # The rim cuts few of many rectangles: its integral is that of these alone.
-        across, down = np.abs(x), np.abs(y)
-        nearest = np.maximum(across - width / 2, 0) ** 2 + np.maximum(down - height / 2, 0) ** 2
-        inside = (across + width / 2) ** 2 + (down + height / 2) ** 2 <= self.diameter**2 / 4
-        cut = ~inside & (nearest < self.diameter**2 / 4)
-        share = np.array(inside, dtype=np.float64)
-        share[cut] = _mean_from_integral(self._integral, x[cut], y[cut], width, height)
-        return share
+        return _share_by_integral(self, x, y, max(width, floor), max(height, floor), self.diameter / 2)
 
     def _integral(self, x: Array, y: Array) -> Array:
         """Area of the circle left of x and above y."""
@@ -235,9 +251,10 @@ class Circle(Pattern):
         return cut + np.where(y >= 0, 2 * full, 0.0)
 
     def _below_arc(self, a: Array) -> Array:
-        """∫₀ᵃ √(R² − x²) dx."""
+        """∫₀ᵃ √(R² − x²) dx; what rounding leaves of the root counts in both terms, and cancels."""
         radius = self.diameter / 2
-        return np.asarray((a * np.sqrt(np.maximum(radius**2 - a * a, 0)) + radius**2 * np.arcsin(a / radius)) / 2)
+        root = np.sqrt(np.maximum(radius**2 - a * a, 0))
+        return np.asarray((a * root + radius**2 * np.arctan2(a, root)) / 2)
 
 
 @dataclass(frozen=True)
@@ -269,12 +286,50 @@ class Polygon(Pattern):
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """One inside the polygon, zero outside."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        apothem = self.diameter / 2 * math.cos(math.pi / self.sides)
         inside = np.ones(np.broadcast_shapes(x.shape, y.shape), dtype=bool)
         for side in range(self.sides):
             normal = self.rotation + (2 * side + 1) * math.pi / self.sides
-            inside &= x * math.cos(normal) + y * math.sin(normal) <= apothem
+            inside &= x * math.cos(normal) + y * math.sin(normal) <= self._apothem
         return inside.astype(np.float64)
+
+    def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
+        """The share of each rectangle that lies inside the polygon, in closed form."""
+        floor = self.diameter * 1e-5
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        return _share_by_integral(self, x, y, max(width, floor), max(height, floor), self._apothem)
+
+    @property
+    def _apothem(self) -> float:
+        """From the middle to a side, metres."""
+        return self.diameter / 2 * math.cos(math.pi / self.sides)
+
+    def _integral(self, x: Array, y: Array) -> Array:
+        """Area of the polygon left of x and above y.
+
+        By Green's theorem it is ∮ min(x(b), x) db around what lies above y: less x·∮ db = 0, −∮ max(x − x(b), 0) db,
+        side by side a mean of what is linear where it is above 0, times the side's height.
+        """
+        angle = self.rotation + 2 * math.pi * np.arange(self.sides + 1) / self.sides
+        a, b = self.diameter / 2 * np.cos(angle), self.diameter / 2 * np.sin(angle)
+        total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
+        for n in range(self.sides):
+            high = b[n + 1] - b[n]
+            if abs(high) < 1e-12 * self.diameter:
+                continue
+            first, last = np.minimum(b[n], y), np.minimum(b[n + 1], y)
+            slope = (a[n + 1] - a[n]) / high
+            total -= (last - first) * _mean_above_zero(
+                x - a[n] - slope * (first - b[n]), x - a[n] - slope * (last - b[n])
+            )
+        return total
+
+
+def _mean_above_zero(one: Array, other: Array) -> Array:
+    """The mean of max(f, 0) where f goes linearly from one number to another."""
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    crossing = (low < 0) & (high > 0)
+    crossed = np.divide(high * high, 2 * (high - low), out=np.zeros(low.shape), where=crossing)
+    return np.where(crossing, crossed, np.maximum((low + high) / 2, 0.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -270,25 +270,32 @@ def product_of_means(factors: tuple[Pattern, ...], x: Array, y: Array, width: fl
     return np.asarray(total)
 
 
-def clear_over(pattern: Pattern, low: Array, high: Array) -> bool:
-    """Whether a pattern lets all light pass in a rectangle, as far as that can be told from what it is.
+def clear_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:
+    """Whether a pattern lets all light pass in rectangles, as far as that can be told from what it is.
 
     Args:
         pattern: any.
-        low: (x, y) of the rectangle's corner, metres from the pattern's middle.
-        high: (x, y) of the opposite corner.
+        low: (x, y) of the rectangles' corners, metres from the pattern's middle, (..., 2).
+        high: (x, y) of the opposite corners.
     """
+    clear = np.ones(np.shape(low)[:-1], dtype=np.bool_)
     for part in _parts([pattern], (0.0, 0.0)):
-        if isinstance(part, Circle):
-            if np.hypot(*np.maximum(np.abs(low), np.abs(high))) > part.diameter / 2:
-                return False
-        elif isinstance(part, Tiles):
-            inside = part.columns[0] <= low[0] and high[0] <= part.columns[-1]
-            if not (inside and part.rows[0] <= low[1] and high[1] <= part.rows[-1] and (part.values == 1).all()):
-                return False
+        own, middle = (part.pattern, np.array(part.middle)) if isinstance(part, Shifted) else (part, np.zeros(2))
+        if isinstance(own, Circle):
+            farthest = np.maximum(np.abs(low - middle), np.abs(high - middle))
+            clear &= (farthest**2).sum(axis=-1) <= own.diameter**2 / 4
+        elif isinstance(own, Tiles) and (own.values == 1).all():
+            first, last = (np.array([own.columns[end], own.rows[end]]) for end in (0, -1))
+            clear &= ((first <= low) & (high <= last)).all(axis=-1)
         else:
-            return False
-    return True
+            return np.zeros_like(clear)
+    return clear
+
+
+def dark_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:
+    """Whether a pattern lets no light pass in rectangles, as far as its size tells; see `clear_over`."""
+    half = np.array(pattern.size) / 2
+    return np.asarray(((low >= half) | (high <= -half)).any(axis=-1))
 
 
 def in_one_plane(patterns: list[tuple[Pattern, tuple[float, float]]]) -> Pattern:

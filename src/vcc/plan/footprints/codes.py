@@ -18,17 +18,21 @@ from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
 from vcc.optics.mask import Mask
 from vcc.optics.train import Train
+from vcc.plan.footprints.cells import Detail
 from vcc.plan.footprints.compile import Compiled, compiled, used_taps
-from vcc.plan.footprints.coverage import missing_rays, outside_views_of
+from vcc.plan.footprints.detail import detail_lost, details_lost
 from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.footprints.mixtures import Mixture, of_cells, of_views
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.planes import Aperture, Plane, detail_lost, details_lost
+from vcc.plan.footprints.planes import Plane
+from vcc.plan.footprints.together import Looks
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.shapes.mean_back import holds
 from vcc.shapes.patterns import Bounded, Cells, Pattern
 from vcc.shapes.sheets import Product, Shifted
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,12 +44,14 @@ class Codes(Brief):
         base: it with all of these cells open.
         open: the cells of its mask.
         cells: those of each camera.
+        number: of the mask among the elements.
     """
 
     first: Train
     base: Train
     open: Cells
     cells: tuple[Cells, ...]
+    number: int
 
     @classmethod
     def of(cls, trains: Sequence[Train]) -> Codes | None:
@@ -58,7 +64,8 @@ class Codes(Brief):
             found |= {n for n, (one, other) in enumerate(pairs) if one is not other and one != other}
         if len(found) != 1:
             return None
-        masks = [train.elements[next(iter(found))] for train in trains]
+        (number,) = found
+        masks = [train.elements[number] for train in trains]
         cells = [mask.pattern for mask in masks if isinstance(mask, Mask) and _alike(mask, masks[0])]
         listed = tuple(each for each in cells if isinstance(each, Cells))
         if len(listed) < len(masks):
@@ -68,12 +75,12 @@ class Codes(Brief):
             replace(one, pattern=opened) if isinstance(one, Mask) and one is masks[0] else one
             for one in first.elements
         ]
-        return cls(first, Train(elements, first.sensor), opened, listed)
+        return cls(first, Train(elements, first.sensor), opened, listed, number)
 
     def plans(self, grid: Grid, how: How) -> list[Plan] | None:
-        """The plan of each camera; None where each has to be made by itself."""
+        """The plan of each camera, but for what its light field lacks; None where each has to be made by itself."""
         one = self._at_views(grid, how)
-        return None if one is None else [self._plan(one, grid, each) for each in self.cells]
+        return None if one is None else [self._plan(one, each) for each in self.cells]
 
     def mixture(self, grid: Grid, how: How) -> Mixture | None:
         """The pictures of all cameras, or of many, as sums of fewer; None where that is not so."""
@@ -85,13 +92,12 @@ class Codes(Brief):
         assert isinstance(one.plan.core, Footprints)
         if one.plan.core.weights.size > len(self.cells):
             return None
-        weights, missing = np.zeros((len(self.cells), *one.shares.shape)), []
-        known = _Known.of(one.aperture, self.open, np.stack([cells.values for cells in self.cells]), grid)
+        weights = np.zeros((len(self.cells), *one.shares.shape))
+        known = one.aperture.open_shares_of(self.open, np.stack([cells.values for cells in self.cells]))
         for n, cells in enumerate(self.cells):
-            found = self._weighed(one, grid, cells, known[n] if known else None)
-            weights[n][found.taps] = found.weights
-            missing.append(found.missing)
-        return of_views(one.plan, weights, missing)
+            taps, found = self._weighed(one, cells, None if known is None else known[n])
+            weights[n][taps] = found
+        return of_views(one.plan, weights)
 
     @property
     def _folded(self) -> bool:
@@ -110,76 +116,48 @@ class Codes(Brief):
         one = compiled(self.first, grid, how, Blurs(None, None))
         core, own, path = one.plan.core, self.cells[0], one.in_path
         masks = [n for n, plane in enumerate(path.planes) if plane.pattern is own]
-        elsewhere = [plane for plane in path.all if holds(plane.pattern, own)]
+        elsewhere = [plane for plane in (*path.at_views, *path.planes) if holds(plane.pattern, own)]
         if len(masks) != 1 or len(elsewhere) != 1 or not (isinstance(core, Footprints) and core.separable):
             return None
-        lost = _Lost(path.planes[masks[0]], self.cells)
-        members = [n for n in range(len(self.cells)) if path.same_by(lost.of(n), how)]
+        details = _Details(path.planes[masks[0]], self.cells)
+        members = [n for n in range(len(self.cells)) if path.same_by(details.of(n), how)]
         cells = [self.cells[n] for n in members]
         return of_cells(one.plan, masks[0], path.textures[masks[0]], members, cells, len(members))
 
-    def _weighed(self, one: Compiled, grid: Grid, cells: Cells, known: _Known | None = None) -> _Weighed:
-        """What some cells leave of the views; what is known of it already need not be found."""
-        core, aperture = one.plan.core, one.aperture
-        assert isinstance(core, Footprints)
-        planes = [replace(p, pattern=exchanged(p.pattern, self.open, cells)) for p in aperture.planes]
-        shares = known.shares if known else replace(aperture, planes=planes).open_shares()
-        weights = one.shares * shares
-        rows, columns = used_taps(weights)
-        keep = np.ix_(rows, columns)
-        weights = weights[keep]
-        missing = missing_rays(
-            planes,
-            grid.shape,
-            aperture.samples,
-            weights,
-            one.tap[keep],
-            core.step,
-            one.plan.sensor_shape,
-            known.outside if known else None,
-        )
-        return _Weighed(keep, weights, missing)
+    def _weighed(
+        self, one: Compiled, cells: Cells, shares: Array | None = None
+    ) -> tuple[tuple[NDArray[np.intp], ...], Array]:
+        """What some cells leave of the views: an open mesh of the taps that are looked at, and their weights.
 
-    def _plan(self, one: Compiled, grid: Grid, cells: Cells) -> Plan:
-        core, found = one.plan.core, self._weighed(one, grid, cells)
+        Args:
+            one: the plan from which all follow.
+            cells: in the place of those that are open.
+            shares: what is open of views, where it is known already.
+        """
+        if shares is None:
+            planes = [replace(p, pattern=exchanged(p.pattern, self.open, cells)) for p in one.aperture.planes]
+            shares = replace(one.aperture, planes=planes).open_shares()
+        weights = one.shares * shares
+        keep = np.ix_(*used_taps(weights))
+        return keep, weights[keep]
+
+    def _plan(self, one: Compiled, cells: Cells) -> Plan:
+        core, (taps, weights) = one.plan.core, self._weighed(one, cells)
         assert isinstance(core, Footprints)
-        rows, columns = (taps.ravel() for taps in found.taps)
+        rows, columns = (some.ravel() for some in taps)
         changed = replace(
             core,
             view_rows=core.view_rows[rows],
             view_columns=core.view_columns[columns],
-            weights=found.weights,
-            x=core.x[found.taps],
-            y=core.y[found.taps],
+            weights=weights,
+            x=core.x[taps],
+            y=core.y[taps],
         )
-        missing, reason = found.missing
-        return replace(one.plan, core=changed, missing_rays=missing, missing_reason=reason)
+        return replace(one.plan, core=changed)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Known(Brief):
-    """What is found for all cameras at once.
-
-    Args:
-        shares: the open shares of views.
-        outside: the share of the aperture outside the grid of views.
-    """
-
-    shares: NDArray[np.float64]
-    outside: float
-
-    @classmethod
-    def of(cls, aperture: Aperture, cells: Cells, values: NDArray[np.float64], grid: Grid) -> list[_Known]:
-        """For each array in the place of cells; nothing where it has to be found one by one."""
-        shares = aperture.open_shares_of(cells, values)
-        if shares is None:
-            return []
-        outside = outside_views_of(aperture.planes[0], cells, values, grid.shape)
-        return [] if outside is None else [cls(*each) for each in zip(shares, outside, strict=True)]
-
-
-class _Lost:
-    """What averaging takes of the detail of masks that differ in their cells: found for all of them at once.
+class _Details:
+    """What is found of the detail of masks that differ in their cells, for all of them at once.
 
     Args:
         plane: the mask that differs, with the first of its cells.
@@ -190,37 +168,39 @@ class _Lost:
         self.plane, self.cells = plane, np.stack([each.values for each in cells])
         self.found: dict[Any, NDArray[np.float64]] = {}
 
-    def of(self, number: int) -> Callable[[Plane, NDArray[np.float64], NDArray[np.float64]], float]:
-        """`detail_lost` for one of the cameras."""
+    def of(self, number: int) -> Detail:
+        """That of one of the cameras."""
+        return _OneOfMany(self, number)
 
-        def lost(plane: Plane, known: NDArray[np.float64], added: NDArray[np.float64]) -> float:
-            key = id(plane), *known.tolist(), *added.tolist()
-            if key not in self.found:
-                own = self.plane.pattern
-                assert isinstance(own, Cells)
-                self.found[key] = (
-                    details_lost(own, self.cells, known, added)
-                    if plane is self.plane
-                    else np.full(len(self.cells), detail_lost(plane, known, added))
-                )
-            return float(self.found[key][number])
+    def lost(self, plane: Plane, known: Array, added: Array) -> Array:
+        """`detail_lost` of each."""
+        key = id(plane), *known.tolist(), *added.tolist()
+        if key not in self.found:
+            own = self.plane.pattern
+            assert isinstance(own, Cells)
+            self.found[key] = (
+                details_lost(own, self.cells, known, added)
+                if plane is self.plane
+                else np.full(len(self.cells), detail_lost(plane, known, added))
+            )
+        return self.found[key]
 
-        return lost
 
+class _OneOfMany(Detail):
+    def __init__(self, details: _Details, number: int) -> None:
+        self._details, self._number = details, number
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Weighed(Brief):
-    """What a camera's cells leave of the views.
+    def lost(self, plane: Plane, known: Array, added: Array) -> float:
+        return float(self._details.lost(plane, known, added)[self._number])
 
-    Args:
-        taps: those that are looked at, an open mesh of their (rows, columns).
-        weights: of these.
-        missing: the share of the rays that are missing, and why.
-    """
-
-    taps: tuple[NDArray[np.intp], ...]
-    weights: NDArray[np.float64]
-    missing: tuple[float, str]
+    def together(self, looks: Looks) -> Callable[[int], float]:
+        own = self._details.plane
+        values = [looks.values(n) for n in range(len(looks.groups))]
+        place = next(n for n, group in enumerate(looks.groups) if any(plane is own for plane in group))
+        assert isinstance(own.pattern, Cells)
+        cells = replace(own.pattern, values=self._details.cells[self._number])
+        values[place] = cells(*np.moveaxis(looks.places[place][0], -1, 0))
+        return looks.error(values)
 
 
 def exchanged(pattern: Pattern, old: Cells, new: Cells) -> Pattern:

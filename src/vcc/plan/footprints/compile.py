@@ -8,7 +8,6 @@ the masks and the projection become one sum.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -23,20 +22,21 @@ from vcc.fields.grid import Grid, Sample
 from vcc.optics.train import Stage, Train
 from vcc.plan.decisions import ANEW, Decisions, plan_again
 from vcc.plan.footprints import against_sensor as masks
-from vcc.plan.footprints.cells import CellDivision, divide_samples, divide_views, tap_places
-from vcc.plan.footprints.coverage import missing_rays
+from vcc.plan.footprints.aperture import Aperture
+from vcc.plan.footprints.cells import Detail, Geometry, divide_samples, divide_views
 from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
 from vcc.plan.footprints.linear_in_cells import by_masks_against_sensor, by_view_planes
 from vcc.plan.footprints.mask_textures import ROUNDING, Textured, mask_as_met, mask_in_path
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.planes import Aperture, Plane, depends_on_view_only, tap_origin
+from vcc.plan.footprints.planes import Plane, depends_on_view_only, tap_origin
 from vcc.plan.footprints.shares import SMALLEST_STEP
+from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.plan.footprints.words import coarse_textures, notes_of
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews, OnSensor, SwapPixelAxes
 from vcc.plan.parallax_rule import BetweenViews, between_views_of
-from vcc.plan.sharpening import MEAN, TENT, across_plane, along_axis, weights_beside
+from vcc.plan.sharpening import BOX, MEAN, TENT, across_plane, along_axis, weights_beside
 from vcc.shapes.patterns import Open
 
 Array = NDArray[np.float64]
@@ -51,6 +51,8 @@ Beyond that, where a sample is a thousand pixels wide, samples are interpolated 
 41 to 50 dB where sharp pictures have 43 to 45 and linear ones 33 to 39 (cosines of 5.5 samples)."""
 ROOM = 1.25
 """By how much the gap between views may grow within decisions that are kept."""
+MARGIN = 4
+"""Pixels around the sensor within which footprints and filters look at light."""
 LARGEST_RASTER = 2**28
 """Pixels of the sensor and its margin: 1 GiB for each colour channel."""
 
@@ -84,7 +86,6 @@ class Compiled(Brief):
         plan: how to make the picture.
         aperture: the masks at the views, as the plan's taps meet them.
         shares: of the light of views, that these taps have.
-        tap: where their samples (0, 0) fall on the sensor, pixels.
         alone: whether nothing else in the plan depends on what these masks let through.
         in_path: the masks in mid-path.
     """
@@ -92,7 +93,6 @@ class Compiled(Brief):
     plan: Plan
     aperture: Aperture
     shares: Array
-    tap: Array
     alone: bool
     in_path: InPath
 
@@ -102,28 +102,27 @@ class InPath(Brief):
     """Masks in mid-path, and what was decided for their sake.
 
     Args:
-        all: planes of masks that are not against the sensor.
+        at_views: planes of masks at the views.
         planes: those in mid-path.
         textures: how theirs were made.
         between: what is between views.
-        views: size of the grid of views, see `divide_samples`.
+        geometry: of the samples.
         divided: how cells of views are, and into how many parts samples are.
     """
 
-    all: list[Plane]
+    at_views: list[Plane]
     planes: list[Plane]
     textures: tuple[Textured, ...]
     between: BetweenViews
-    views: tuple[float, float]
+    geometry: Geometry
     divided: tuple[CellDivision, int]
 
-    def same_by(self, lost: Callable[[Plane, Array, Array], float], how: How) -> bool:
+    def same_by(self, detail: Detail, how: How) -> bool:
         """Whether the same would have been decided of other patterns of the same size; see `divide_views`."""
-        division = divide_views(self.all, self.planes, self.between, how.refine, lost)
+        division = divide_views(self.at_views, self.planes, self.between, self.geometry, how.refine, detail)
         own, fine = self.divided
-        return (division.parts, division.spread) == (own.parts, own.spread) and fine == divide_samples(
-            self.planes, self.between, self.views, how.refine, lost
-        )
+        samples, _ = divide_samples(self.planes, self.between, self.geometry, how.refine, detail)
+        return division.like(own) and fine == samples
 
 
 def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisions = ANEW) -> Compiled:
@@ -157,41 +156,40 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
     view_planes = [plane for plane, so in zip(planes, at_views, strict=True) if so]
     path_planes = [plane for plane, so in zip(planes, at_views, strict=True) if not so]
 
+    geometry = Geometry(
+        grid.shape[:2], grid.extent, samples, on_sensor, origin, sensor.shape, MARGIN + max(between.gap_filled)
+    )
     division = decisions.keep(
         "parts of views' cells",
-        lambda: divide_views(planes, path_planes, between, how.refine),
-        lambda one, other: (one.parts, one.spread) == (other.parts, other.spread),
+        lambda: divide_views(view_planes, path_planes, between, geometry, how.refine),
+        CellDivision.like,
     )
-    divide = division.parts
-    fine = decisions.keep(
-        "parts of samples", lambda: divide_samples(path_planes, between, grid.extent, how.refine)
+    fine, spilt = decisions.keep(
+        "parts of samples",
+        lambda: divide_samples(path_planes, between, geometry, how.refine),
+        lambda one, other: one[0] == other[0],
     )
-    rows, row_shift, row_share = tap_places(grid.shape[0], division)
-    columns, column_shift, column_share = tap_places(grid.shape[1], division)
-    index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
-    shift = np.stack(np.broadcast_arrays(column_shift[None, :], row_shift[:, None]), axis=-1)
-
-    aperture = Aperture(view_planes, index, shift, between.motion, samples, divide, decisions)
+    taps = Taps.of(grid.shape[:2], division)
+    aperture = Aperture(view_planes, taps, between.motion, samples, decisions)
     parts = decisions.made(
         "what is open of views",
         lambda: tuple(content((plane.pattern, plane.at_index, plane.offset)) for plane in view_planes),
         aperture.open_parts,
     )
-    weights = row_share[:, None] * column_share[None, :] * parts.weights
-    used_rows, used_columns = used_taps(weights, decisions)
-    keep = np.ix_(used_rows, used_columns)
-    index, shift, weights, off_middle = index[keep], shift[keep], weights[keep], parts.middle[keep]
+    weights = taps.shares * parts.weights
+    used = used_taps(weights, decisions)
+    keep = np.ix_(*used)
+    weights, off_middle, kept_taps = weights[keep], parts.middle[keep], taps.some(*used)
 
-    tap = tap_origin(on_sensor, origin, index, shift, between.motion)
+    tap = tap_origin(on_sensor, origin, kept_taps.index, kept_taps.shift, between.motion)
     points = grid.sample == "point" and fine == 1
     met = tuple(
         mask_as_met(
             plane,
-            index,
-            shift + off_middle,
+            kept_taps,
+            off_middle,
             between.motion,
             samples,
-            divide,
             fine,
             not points,
             decisions.of(mask_in_path(n)),
@@ -199,13 +197,12 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         for n, plane in enumerate(path_planes)
     )
     lookups = tuple(lookup for lookup, _ in met)
-    missing, reason = missing_rays(view_planes, grid.shape, samples, weights, tap, step, sensor.shape)
     core = Footprints(
         raster_shape=sensor.shape,
         interpolation=_sharp_footprint(step, fine, decisions) if sharp else how.interpolation,
         scale=grid.sample_volume / (sensor.pitches[0] * sensor.pitches[1]),
-        view_rows=rows[used_rows],
-        view_columns=columns[used_columns],
+        view_rows=kept_taps.rows,
+        view_columns=kept_taps.columns,
         weights=weights,
         x=tap[..., 0],
         y=tap[..., 1],
@@ -217,32 +214,30 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
     )
     sharpened = _Sharpened.of(core, grid.sample, decisions) if sharp else _Sharpened(core)
     detail = masks.detail(sensor, against_sensor, decisions) if sharp else None
-    guard, after = _after(between, divide, blurs, sharpened, train, detail is not None, decisions)
+    guard, after = _after(between, division.parts, blurs, sharpened, train, detail is not None, decisions)
     before: list[Before] = [] if blurs.views is None else [BlurViews(blurs.views)]
     if swapped:
         before.append(SwapPixelAxes())
     transmission = masks.transmission(sensor, against_sensor, decisions)
     if guard or transmission is not None:
         after.append(OnSensor(guard, transmission, detail))
-    decisions.note(by_view_planes(aperture, row_share[:, None] * column_share[None, :], keep, path_planes))
+    decisions.note(by_view_planes(aperture, keep, path_planes))
     decisions.note(by_masks_against_sensor(sensor, against_sensor, len(after) - 1, detail is not None, decisions))
-    notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, fine, swapped)
+    notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, (fine, spilt), swapped)
     plan = Plan(
         sensor_shape=sensor.shape,
         grid_shape=given.shape[:4],
         core=sharpened.core.guarded(guard),
         before=tuple(before),
         after=tuple(after),
-        missing_rays=missing,
-        missing_reason=reason,
         expected_ghosting=between.gap_left,
         notes=notes + coarse_textures(lookups) + blurs.notes,
     )
-    as_met = replace(aperture, index=index, shift=shift)
     # Gaps between views' pictures that are filled ask for parts of cells where a mask is fine.
-    alone = not path_planes and (how.refine != "auto" or max(between.gap_filled) <= 1)
-    in_path = InPath(planes, path_planes, tuple(kept for _, kept in met), between, grid.extent, (division, fine))
-    return Compiled(plan, as_met, (row_share[:, None] * column_share[None, :])[keep], tap, alone, in_path)
+    alone = not path_planes and (how.refine == 1 or max(between.gap_filled) <= 1)
+    as_met = replace(aperture, taps=kept_taps)
+    in_path = InPath(view_planes, path_planes, tuple(kept for _, kept in met), between, geometry, (division, fine))
+    return Compiled(plan, as_met, kept_taps.shares, alone, in_path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +271,8 @@ class _Sharpened:
         losses = TENT + (MEAN if sample == "mean" else 0)
         if core.refine > 1:
             core = replace(core, sharpen_samples=along_axis(losses, 1.0))
-            losses = TENT + MEAN
+            losses = BOX + MEAN
+        footprint = BOX if core.interpolation == "box" else TENT
         step = core.step / core.refine
         (xk, xl), (yk, yl) = step
         if not (xl or yk):
@@ -294,9 +290,9 @@ class _Sharpened:
         # Light is spread along the samples' columns on the sensor, and across at fixed rows of pixels; a pixel's
         # mean is taken along the columns, too.
         shear = xl / yl
-        spread = [(float(TENT), np.array([xk - shear * yk, 0.0])), (float(TENT), np.array([xl, yl]))]
+        spread = [(float(footprint), np.array([xk - shear * yk, 0.0])), (float(footprint), np.array([xl, yl]))]
         spread += [(1.0, core.opening * np.array([shear, 1.0])), (-1.0, core.opening * np.array([0.0, 1.0]))]
-        if losses > TENT:
+        if losses > footprint:
             spread += [(float(MEAN), step[:, 0]), (float(MEAN), step[:, 1])]
         half = decisions.keep(
             "weights of the filter that gives sharpness back",
@@ -334,10 +330,15 @@ def _after(
 
 
 def _sharp_footprint(step: Array, fine: int, decisions: Decisions) -> str:
-    """The footprint that is sharpened: a tent, which is quick; a spline where pixels would see a tent's bends."""
+    """The footprint that is sharpened: a tent, which is quick; a spline where pixels would see a tent's bends.
+
+    Samples that are divided fill their own cells, for a mask cuts them off there.
+    """
     parted = not (step[0, 1] or step[1, 0])
     finer = max(abs(step[0, 0]), abs(step[1, 1])) > FINER_PIXELS
-    return decisions.keep("footprint of samples", lambda: "spline" if fine == 1 and parted and finer else "linear")
+    return decisions.keep(
+        "footprint of samples", lambda: "box" if fine > 1 else "spline" if parted and finer else "linear"
+    )
 
 
 def _without_transposition(

@@ -129,7 +129,7 @@ def _passes_all(train: Train, stage: Stage, grid: Grid) -> bool:
     arriving = stage.arriving @ grid.frame
     centre = arriving(middle[None])[0][:2] - stage.element.decentre
     reach = np.abs(arriving.linear[:2]) @ half + slack[:2]
-    return clear_over(stage.faces.pattern, centre - reach, centre + reach)
+    return bool(clear_over(stage.faces.pattern, centre - reach, centre + reach))
 
 
 def meets_views_in_points(train: Train, grid: Grid, n: int) -> bool:

@@ -13,24 +13,25 @@ from numpy.typing import NDArray
 from vcc.optics.sensor import Sensor
 from vcc.plan.decisions import Decisions, Linear
 from vcc.plan.footprints.against_sensor import detail_back, transmission_back
+from vcc.plan.footprints.aperture import Aperture, OpenParts
 from vcc.plan.footprints.mask_textures import LATTICE, mask_in_path
-from vcc.plan.footprints.planes import Aperture, OpenParts, Plane
+from vcc.plan.footprints.planes import Plane
 from vcc.shapes.mean_back import holds, is_values
 
 Array = NDArray[np.float64]
 
 
-def by_view_planes(aperture: Aperture, shares: Array, keep: Any, path_planes: list[Plane]) -> Linear:
+def by_view_planes(aperture: Aperture, keep: Any, path_planes: list[Plane]) -> Linear:
     """How taps' weights, and where they meet masks in mid-path, follow the cells of masks at the views.
 
     Args:
         aperture: these masks.
-        shares: of the light of views, that all taps have.
         keep: which of the taps there are.
         path_planes: the masks in mid-path: light through a part of a tap's cell meets them around its middle.
     """
 
     def back(cells: Any, weights: list[Any]) -> Any:
+        shares = aperture.taps.shares
         of_taps = OpenParts(np.zeros(shares.shape), np.zeros((*shares.shape, 2)))
         of_taps.weights[keep] = weights[0] * shares[keep]
         for n, plane in enumerate(path_planes):

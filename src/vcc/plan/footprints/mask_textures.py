@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +16,9 @@ from vcc.plan.decisions import ANEW, Decisions, Linear, plan_again
 from vcc.plan.footprints.means import Boxes, mean_over
 from vcc.plan.footprints.means_back import mean_back
 from vcc.plan.footprints.model import MaskLookup
-from vcc.plan.footprints.planes import Plane, tap_origin
-from vcc.plan.sharpening import symmetric
+from vcc.plan.footprints.planes import Plane, along_axes, tap_origin
+from vcc.plan.footprints.taps import Taps
+from vcc.plan.sharpening import symmetric, symmetric_plane
 from vcc.shapes.mean_back import holds, is_values
 from vcc.shapes.patterns import Cells, Pattern
 
@@ -35,6 +38,8 @@ TEXTURE_FILTER = 5
 """Weights on each side of a texture's filter, beside those that the box of a sample takes."""
 AROUND = 2
 """Points of a texture around what is looked up: those of splines, and what the filter leaves beside an edge."""
+APART = 4
+"""Rows of a texture between what a tap looks up and the texture of taps of another level."""
 SPLINE = 1.5
 """Points of a texture on each side that a look-up by quadratic B-splines takes."""
 ROUNDING = 1e-6
@@ -48,6 +53,25 @@ COARSER = 1.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Footing(Brief):
+    """How a mask is averaged over the footprints of samples in taps of one level.
+
+    A footprint is a parallelogram of the cell of a view's part, and of a sample's: a mean along four sides. Where
+    all lie along the axes that is a mean over two boxes, of which the wider one is taken by the pattern's own means
+    and the other by filters of the texture. Where they do not, all is done by a filter.
+
+    Args:
+        by_views: along (x, y), whether the box of a view's part is the wider one; None where sides are turned.
+        beside: weights of the filters along (x, y) on each side of their middles.
+        top: row of the texture at which that of these taps begins.
+    """
+
+    by_views: NDArray[np.bool_] | None
+    beside: tuple[int, int]
+    top: int = 0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Lattice(Brief):
     """Where the points of a mask's texture stand, on the mask, and how long the filters are that make it.
 
@@ -55,29 +79,26 @@ class Lattice(Brief):
         first: numbers (x, y) of the first point; number 0 stands at the mask's middle.
         last: of the last point.
         spacing: (x, y) of the points, metres.
-        by_views: along (x, y), whether the box of a view's part is the wider one, that patterns are averaged over.
-        beside: weights of the filters along (x, y) on each side of their middles.
+        footings: of the taps of each level; their textures stand one below the other.
     """
 
     first: Array
     last: Array
     spacing: Array
-    by_views: NDArray[np.bool_]
-    beside: tuple[int, int]
+    footings: tuple[Footing, ...]
 
     def like(self, other: Lattice) -> bool:
         """Whether one serves as well as the other."""
         ratio = self.spacing / other.spacing
-        return bool(np.maximum(ratio, 1 / ratio).max() < COARSER)
+        return len(self.footings) == len(other.footings) and bool(np.maximum(ratio, 1 / ratio).max() < COARSER)
 
 
 def mask_as_met(
     plane: Plane,
-    index: Array,
-    shift: Array,
+    taps: Taps,
+    off_middle: Array,
     motion: Array,
     samples: tuple[int, int],
-    divide: int,
     fine: int,
     over_samples: bool = True,
     decisions: Decisions = ANEW,
@@ -86,11 +107,10 @@ def mask_as_met(
 
     Args:
         plane: the mask.
-        index: of the views, (rows of taps, columns of taps, 2).
-        shift: of the taps from them, in views.
+        taps: of the plan.
+        off_middle: how far the open part of each tap's cell lies from its middle, in views, (rows, columns, 2).
         motion: see `tap_origin`.
         samples: (rows, columns) of a view.
-        divide: parts of a view's cell, each way.
         fine: parts of a sample, each way.
         over_samples: whether to average over the sample's cell besides that of the view: samples that are points
             meet the mask in a point.
@@ -99,21 +119,20 @@ def mask_as_met(
     Raises:
         InputError: samples that meet the mask beyond the points that were kept.
     """
-    place = tap_origin(plane.at_index, plane.offset, index, shift, motion)
-    view_part = np.abs(plane.view_step(motion)).sum(axis=1) / divide
-    sample_part = np.abs(plane.sample_step).sum(axis=1) / fine * over_samples
-    footprint = np.hypot(view_part, sample_part)
-    bound = np.array(plane.pattern.size) / 2 + footprint
-    region = _region(place, plane.sample_step, samples, bound)
-    boxes = (view_part, sample_part)
-    lattice = _lattice(region, bound, boxes, decisions)
-    (column, row), spacing = lattice.first * lattice.spacing, lattice.spacing
+    place = tap_origin(plane.at_index, plane.offset, taps.index, taps.shift + off_middle, motion)
+    sample_sides = plane.sample_step / fine * over_samples
+    sides = [np.hstack([plane.view_step(motion) / parts, sample_sides]) for _, parts in taps.levels()]
+    lattice = _lattice(place, plane, taps, samples, sides, decisions)
+    spacing = lattice.spacing
     texture = decisions.made(
         "texture",
-        lambda: (content(plane.pattern), content(lattice), content(boxes)),
-        lambda: _texture(plane.pattern, lattice, boxes, decisions),
+        lambda: (content(plane.pattern), content(lattice), content(tuple(sides))),
+        lambda: _texture(plane.pattern, lattice, sides, decisions),
     )
-    kept = Textured(lattice, boxes, decisions)
+    tops = np.zeros((*place.shape[:2], 1))
+    for (mesh, _), footing in zip(taps.levels(), lattice.footings, strict=True):
+        tops[mesh] = footing.top
+    kept = Textured(lattice, tuple(sides), tops[..., 0], decisions)
     decisions.note(
         Linear(
             lambda thing, field: is_values(thing, field) and holds(plane.pattern, thing),
@@ -125,8 +144,8 @@ def mask_as_met(
     )
     lookup = MaskLookup(
         texture=texture,
-        column=(place[..., 0] - column) / spacing[0],
-        row=(place[..., 1] - row) / spacing[1],
+        column=place[..., 0] / spacing[0] - lattice.first[0],
+        row=place[..., 1] / spacing[1] - lattice.first[1] + kept.tops,
         step=cleaned(plane.sample_step / spacing[:, None], samples, decisions),
         label=plane.label,
     )
@@ -134,16 +153,26 @@ def mask_as_met(
 
 
 def _lattice(
-    region: tuple[Array, Array], bound: Array, boxes: tuple[Array, Array], decisions: Decisions
+    place: Array,
+    plane: Plane,
+    taps: Taps,
+    samples: tuple[int, int],
+    sides: list[Array],
+    decisions: Decisions,
 ) -> Lattice:
-    """The lattice for a region: one, whatever part of the mask is needed: pieces of a light field read alike.
+    """The lattice of a mask's texture: one, whatever part of it is needed: pieces of a light field read alike.
 
     Args:
-        region: lowest and highest (x, y) that are read, metres.
-        bound: half the size (x, y) of what there is to read.
-        boxes: sizes (x, y) over which patterns are averaged: of a view's part, and of a sample's.
-        decisions: the lattice is kept, with room around the region.
+        place: at which sample (0, 0) of each tap meets the mask, (rows of taps, columns of taps, 2), metres.
+        plane: the mask.
+        taps: of the plan.
+        samples: (rows, columns) of a view.
+        sides: of the footprints of samples in taps of each level, (2, 4): of a view's part, and of a sample.
+        decisions: the lattice is kept, with room around what is read.
     """
+    footprint = [np.sqrt((each**2).sum(axis=1)) for each in sides]
+    bound = np.array(plane.pattern.size) / 2 + np.max(footprint, axis=0)
+    region = _region(place, plane.sample_step, samples, bound)
 
     def ends(spacing: Array, low: Array, high: Array) -> tuple[Array, Array]:
         first = np.floor(low / spacing) - AROUND
@@ -152,15 +181,17 @@ def _lattice(
     def decided() -> Lattice:
         low, high = region
         room = ROOM * decisions.lasting
-        spacing = _spacing(np.hypot(*boxes), np.minimum(2 * bound, high - low))
+        spacing = _spacing(np.min(footprint, axis=0), np.minimum(2 * bound, high - low))
         low, high = (
             np.maximum(low - room * (high - low), -(1 + room) * bound),
             np.minimum(high + room * (high - low), (1 + room) * bound),
         )
-        wider = boxes[0] >= boxes[1]
-        narrow = np.minimum(*boxes) * (1 + room) / spacing
-        beside = (TEXTURE_FILTER + math.ceil(narrow[0] / 2), TEXTURE_FILTER + math.ceil(narrow[1] / 2))
-        return Lattice(*ends(spacing, low, high), spacing, wider, beside)
+        first, last = ends(spacing, low, high)
+        footings = [_footing(each, spacing, 1 + room) for each in sides]
+        tops = _tops(place, plane.sample_step, samples, taps, spacing[1], (first[1], last[1]))
+        return Lattice(
+            first, last, spacing, tuple(replace(f, top=top) for f, top in zip(footings, tops, strict=True))
+        )
 
     lattice = decisions.keep(LATTICE, decided, Lattice.like)
     if decisions.lasting:
@@ -168,6 +199,46 @@ def _lattice(
         if (first < lattice.first).any() or (last > lattice.last).any():
             raise plan_again("where samples meet a mask")
     return lattice
+
+
+def _footing(sides: Array, spacing: Array, room: float) -> Footing:
+    """How a texture is averaged over footprints of these sides."""
+    if not along_axes(sides):
+        reach = np.abs(sides).sum(axis=1) / 2 / spacing * room
+        return Footing(None, (TEXTURE_FILTER + math.ceil(reach[0]), TEXTURE_FILTER + math.ceil(reach[1])))
+    view, sample = _boxes(sides)
+    narrow = np.minimum(view, sample) * room / spacing
+    beside = (TEXTURE_FILTER + math.ceil(narrow[0] / 2), TEXTURE_FILTER + math.ceil(narrow[1] / 2))
+    return Footing(view >= sample, beside)
+
+
+def _boxes(sides: Array) -> tuple[Array, Array]:
+    """Sizes (x, y) of the boxes of a view's part and of a sample, whose sides lie along the axes."""
+    return np.abs(sides[:, :2]).sum(axis=1), np.abs(sides[:, 2:]).sum(axis=1)
+
+
+def _tops(
+    place: Array, step: Array, samples: tuple[int, int], taps: Taps, spacing: float, ends: tuple[float, float]
+) -> list[int]:
+    """Rows at which the textures of taps of each level begin: so far apart that no tap meets those of others.
+
+    Args:
+        place: see `_lattice`.
+        step: 2×2, from sample to sample.
+        samples: (rows, columns) of a view.
+        taps: of the plan.
+        spacing: of rows of the texture.
+        ends: numbers of its first and its last row.
+    """
+    rows, tops = round(ends[1] - ends[0]) + 1, [0]
+    reads = []
+    for mesh, _ in taps.levels():
+        (_, low), (_, high) = _region(place[mesh], step, samples, np.full(2, np.inf))
+        room = ROOM * (high - low)
+        reads.append(((low - room) / spacing - ends[0], (high + room) / spacing - ends[0]))
+    for (_, highest), (lowest, _) in pairwise(reads):
+        tops.append(tops[-1] + APART + math.ceil(max(highest, rows - min(lowest, 0.0))))
+    return tops
 
 
 def _region(place: Array, step: Array, samples: tuple[int, int], bound: Array) -> tuple[Array, Array]:
@@ -193,25 +264,23 @@ def _spacing(footprint: Array, extent: Array) -> Array:
 
 
 def _texture(
-    pattern: Pattern, lattice: Lattice, boxes: tuple[Array, Array], decisions: Decisions
+    pattern: Pattern, lattice: Lattice, sides: Sequence[Array], decisions: Decisions
 ) -> NDArray[np.floating]:
-    """Means of a pattern over two boxes, one after the other, at points of a lattice: (rows, columns).
-
-    The wider box is taken by the pattern's own means, the other by a filter of the texture.
+    """Means of a pattern over footprints of samples, at points of a lattice: (rows, columns).
 
     Args:
         pattern: of the mask.
         lattice: its points.
-        boxes: sizes (x, y) of that of a view's part and of that of a sample's, metres.
+        sides: see `_lattice`.
         decisions: where these are kept, in double precision.
     """
-    x, y, (width, height), filters = _averaged(lattice, boxes)
-    means = np.empty((y.size, x.size), dtype=np.float64 if decisions.lasting else np.float32)
-    across = x[None, :]
-    for n, some in enumerate(_rows_at_once(y.size, x.size)):
-        part = decisions.of(f"part {n}")
-        means[some] = mean_over(pattern, across, y[some, None], width, height, part)
-    return _filtered(means, filters)
+    found: list[NDArray[np.floating]] = []
+    for number, (footing, each) in enumerate(zip(lattice.footings, sides, strict=True)):
+        averaging = _Averaging.of(lattice, footing, each)
+        means = averaging.means(pattern, decisions.of(f"level {number}") if number else decisions)
+        gap = footing.top - sum(map(len, found))
+        found += [np.zeros((gap, means.shape[1]), dtype=means.dtype), means]
+    return np.concatenate(found[1:]) if len(found) > 2 else found[1]
 
 
 def mask_in_path(n: int) -> str:
@@ -225,32 +294,35 @@ class Textured(Brief):
 
     Args:
         lattice: its points.
-        boxes: sizes (x, y) over which the pattern was averaged: of a view's part, and of a sample's, metres.
+        sides: of the footprints over which the pattern was averaged, of taps of each level, metres.
+        tops: row at which the texture of each tap begins, (rows of taps, columns of taps).
         decisions: about it.
     """
 
     lattice: Lattice
-    boxes: tuple[Array, Array]
+    sides: tuple[Array, ...]
+    tops: Array
     decisions: Decisions
 
     def of(self, pattern: Pattern) -> NDArray[np.floating]:
         """The texture of another pattern, (rows, columns)."""
-        return _texture(pattern, self.lattice, self.boxes, self.decisions)
+        return _texture(pattern, self.lattice, self.sides, self.decisions)
 
     def seen(self, axis: int, place: Array) -> tuple[Array, Array]:
         """From where to where a pattern counts in what is looked up at places of the texture.
 
         Args:
             axis: 0 of (x, y), or 1.
-            place: columns of the texture, or rows.
+            place: columns of the texture, or rows, counted from those at which a tap's begins.
 
         Returns:
             The lowest and the highest x, or y, on the mask, metres.
         """
         spacing = self.lattice.spacing[axis]
         middle = (place + self.lattice.first[axis]) * spacing
-        wide = max(self.boxes[0][axis], self.boxes[1][axis])
-        reach = (SPLINE + self.lattice.beside[axis]) * spacing + wide / 2
+        wide = max(float(np.abs(each[axis]).sum()) for each in self.sides)
+        beside = max(footing.beside[axis] for footing in self.lattice.footings)
+        reach = (SPLINE + beside) * spacing + wide / 2
         return middle - reach, middle + reach
 
 
@@ -263,36 +335,78 @@ def texture_back(plane: Plane, kept: Textured, weights: Array, cells: Cells) -> 
         weights: of the texture's points, (rows, columns).
         cells: the very object.
     """
-    from scipy.ndimage import convolve1d
-
-    x, y, size, (across, down) = _averaged(kept.lattice, kept.boxes)
-    # Filters are symmetric: a mean counts in all points that its own filter reaches.
-    wide = np.pad(weights, [(len(along) // 2,) * 2 for along in (down, across)])
-    means = convolve1d(convolve1d(wide, across, axis=1, mode="constant"), down, axis=0, mode="constant")
     total = np.zeros(cells.values.shape)
-    for n, some in enumerate(_rows_at_once(y.size, x.size)):
-        part = kept.decisions.of(f"part {n}")
-        boxes = Boxes(x[None, :], y[some, None], *size)
-        total += mean_back(plane.pattern, boxes, part, means[some], cells)
+    rows = round(kept.lattice.last[1] - kept.lattice.first[1]) + 1
+    for number, (footing, each) in enumerate(zip(kept.lattice.footings, kept.sides, strict=True)):
+        averaging = _Averaging.of(kept.lattice, footing, each)
+        about = kept.decisions.of(f"level {number}") if number else kept.decisions
+        total += averaging.back(plane.pattern, weights[footing.top : footing.top + rows], about, cells)
     return total
 
 
-def _averaged(
-    lattice: Lattice, boxes: tuple[Array, Array]
-) -> tuple[Array, Array, tuple[float, float], list[Array]]:
-    """Places x and y at which a pattern is averaged, over what size, and the filters that means go through."""
-    wide, narrow = (np.where(lattice.by_views == views, *boxes) for views in (True, False))
-    filters = [
-        _filter(float(width), beside)
-        for width, beside in zip(narrow / lattice.spacing, lattice.beside, strict=True)
-    ]
-    x, y = (
-        np.arange(first - beside, last + beside + 1) * apart
-        for first, last, beside, apart in zip(
-            lattice.first, lattice.last, lattice.beside, lattice.spacing, strict=True
+@dataclass(frozen=True, eq=False, repr=False)
+class _Averaging(Brief):
+    """Means of a pattern over rectangles at places, filtered.
+
+    Args:
+        x: places, metres.
+        y: likewise.
+        size: (width, height) of the rectangles.
+        filters: (across, down), or a single one of the plane, (rows, columns), all symmetric about their middles.
+    """
+
+    x: Array
+    y: Array
+    size: tuple[float, float]
+    filters: tuple[Array, ...]
+
+    @classmethod
+    def of(cls, lattice: Lattice, footing: Footing, sides: Array) -> _Averaging:
+        """By which the texture of taps of one level is made."""
+        x, y = (
+            np.arange(first - beside, last + beside + 1) * apart
+            for first, last, beside, apart in zip(
+                lattice.first, lattice.last, footing.beside, lattice.spacing, strict=True
+            )
         )
-    )
-    return x, y, (float(wide[0]), float(wide[1])), filters
+        if footing.by_views is None:
+            width, height = map(float, lattice.spacing)
+            return cls(
+                x, y, (width, height), (_filter_of_plane(sides / lattice.spacing[:, None], footing.beside),)
+            )
+        boxes = _boxes(sides)
+        wide, narrow = (np.where(footing.by_views == views, *boxes) for views in (True, False))
+        across, down = (
+            _filter(float(width), beside)
+            for width, beside in zip(narrow / lattice.spacing, footing.beside, strict=True)
+        )
+        return cls(x, y, (float(wide[0]), float(wide[1])), (across, down))
+
+    def means(self, pattern: Pattern, decisions: Decisions) -> NDArray[np.floating]:
+        """The means, without the margin that filters take."""
+        found = np.empty((self.y.size, self.x.size), dtype=np.float64 if decisions.lasting else np.float32)
+        across = self.x[None, :]
+        for n, some in enumerate(_rows_at_once(self.y.size, self.x.size)):
+            part = decisions.of(f"part {n}")
+            found[some] = mean_over(pattern, across, self.y[some, None], *self.size, part)
+        return _filtered(found, self.filters)
+
+    def back(self, pattern: Pattern, weights: Array, decisions: Decisions, cells: Cells) -> Array:
+        """From weights of the means to weights of the cells of a pattern."""
+        # Filters are symmetric: a mean counts in all points that its own filter reaches.
+        beside = [(n // 2,) * 2 for n in _reach(self.filters)]
+        wide = np.pad(weights, [(2 * low, 2 * high) for low, high in beside])
+        means = _filtered(wide, self.filters)
+        total = np.zeros(cells.values.shape)
+        for n, some in enumerate(_rows_at_once(self.y.size, self.x.size)):
+            boxes = Boxes(self.x[None, :], self.y[some, None], *self.size)
+            total += mean_back(pattern, boxes, decisions.of(f"part {n}"), means[some], cells)
+        return total
+
+
+def _reach(filters: tuple[Array, ...]) -> tuple[int, int]:
+    """(rows, columns) of what filters take together."""
+    return filters[0].shape if len(filters) == 1 else (len(filters[1]), len(filters[0]))  # type: ignore[return-value]
 
 
 def _rows_at_once(rows: int, columns: int) -> list[NDArray[np.int64]]:
@@ -310,6 +424,21 @@ def _filter(box: float, beside: int) -> Array:
     return symmetric(lambda frequency: np.sinc(box * frequency) * _given_back(frequency), beside)
 
 
+def _filter_of_plane(sides: Array, beside: tuple[int, int]) -> Array:
+    """The filter (rows, columns) that makes means over parallelograms of means over the cells of a texture.
+
+    Args:
+        sides: (2, any number), along which to average, one after the other, in points of the texture.
+        beside: weights on each side of its middle along (x, y).
+    """
+
+    def wanted(fx: Array, fy: Array) -> Array:
+        means = np.sinc(fx[:, None] * sides[0] + fy[:, None] * sides[1]).prod(axis=1)
+        return np.asarray(means * _given_back(fx) * _given_back(fy) / np.sinc(fx) / np.sinc(fy))
+
+    return symmetric_plane(wanted, beside)
+
+
 def _given_back(frequency: Array) -> Array:
     """The gain before a look-up by quadratic B-splines.
 
@@ -322,10 +451,13 @@ def _given_back(frequency: Array) -> Array:
     return np.asarray(np.polynomial.polynomial.polyval(np.sin(np.pi * frequency) ** 2, GIVEN_BACK))
 
 
-def _filtered(means: NDArray[np.floating], filters: list[Array]) -> NDArray[np.floating]:
-    """Means (rows, columns) filtered along columns and rows, without the margin that this takes."""
+def _filtered(means: NDArray[np.floating], filters: tuple[Array, ...]) -> NDArray[np.floating]:
+    """Means (rows, columns) filtered, without the margin that this takes."""
     from scipy.ndimage import convolve1d
+    from scipy.signal import oaconvolve
 
+    if len(filters) == 1:
+        return np.ascontiguousarray(oaconvolve(means, filters[0].astype(means.dtype), mode="valid"))
     (across, down) = filters
     down_done = convolve1d(means, down, axis=0, mode="constant")[len(down) // 2 : len(means) - len(down) // 2]
     wide = convolve1d(down_done, across, axis=1, mode="constant")

@@ -24,30 +24,17 @@ from vcc.shapes.patterns import (
     RASTER_LIMIT,
     RASTER_PER_CELL,
     Bounded,
-    Circle,
     Pattern,
-    Polygon,
     Raster,
     is_grid,
     overlap_share,
 )
-from vcc.shapes.polygon_areas import polygon_mean
 from vcc.shapes.sheets import Product, Shifted
 
 Array = NDArray[np.float64]
 
 ROOM = 0.25
 """By how much of what they cover rasters reach beyond it on each side, besides a rectangle."""
-
-
-class _SteadyCircle(Circle):
-    """A circle whose areas are right to rounding beside its outermost points, too."""
-
-    def _below_arc(self, a: Array) -> Array:
-        # What rounding leaves of the root counts in both terms, and cancels.
-        radius = self.diameter / 2
-        root = np.sqrt(np.maximum(radius**2 - a * a, 0))
-        return np.asarray((a * root + radius**2 * np.arctan2(a, root)) / 2)
 
 
 class Boxes(NamedTuple):
@@ -82,10 +69,6 @@ def mean_over(
 
 def _mean(pattern: Pattern, boxes: Boxes, decisions: Decisions) -> Array:
     x, y, width, height = boxes
-    if isinstance(pattern, Polygon):
-        return polygon_mean(pattern, *boxes)
-    if type(pattern) is Circle:
-        return _SteadyCircle(pattern.diameter).mean(*boxes)
     if isinstance(pattern, Shifted):
         return _mean(pattern.pattern, boxes._replace(x=x - pattern.middle[0], y=y - pattern.middle[1]), decisions)
     if isinstance(pattern, Bounded):
@@ -153,7 +136,7 @@ def parts_of(boxes: Boxes) -> list[Boxes]:
 def mean_or_value(factor: Pattern, parts: Boxes, decisions: Decisions) -> Array:
     """Means over the parts that points of a raster stand for; without a closed form, values in their middles."""
     plain = factor.pattern if isinstance(factor, Shifted) else factor
-    if isinstance(plain, Polygon) or _closed(plain):
+    if _closed(plain):
         return _mean(factor, parts, decisions)
     return factor(parts.x, parts.y)
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
+from vcc.plan.coverage import Missing
 from vcc.plan.footprints.mask_textures import Textured
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import reach_in_pixels
@@ -38,7 +39,7 @@ class Mixture(Brief):
         numbers: what each camera takes, (members, rows, columns).
         down: for each row of pixels, the row of numbers by which each plan's picture counts, (rows, plans down).
         across: for each column, likewise, (columns, plans across).
-        missing: of each member: the share of the rays that are missing, and why.
+        missing: of each member: what its light field lacks; found by those who know what it asks for.
     """
 
     members: tuple[int, ...]
@@ -46,16 +47,15 @@ class Mixture(Brief):
     numbers: Array
     down: NDArray[np.int64]
     across: NDArray[np.int64]
-    missing: tuple[tuple[float, str], ...]
+    missing: tuple[Missing, ...] = ()
 
 
-def of_views(plan: Plan, weights: Array, missing: Sequence[tuple[float, str]]) -> Mixture:
+def of_views(plan: Plan, weights: Array) -> Mixture:
     """Pictures by a plan that weigh its views otherwise.
 
     Args:
         plan: by footprints.
         weights: (pictures, rows of taps, columns of taps).
-        missing: see `Mixture`.
     """
     core = plan.core
     assert isinstance(core, Footprints)
@@ -68,7 +68,6 @@ def of_views(plan: Plan, weights: Array, missing: Sequence[tuple[float, str]]) -
         weights.reshape(len(weights), 1, -1)[:, :, used],
         np.zeros((rows, 1), dtype=np.int64),
         np.tile(np.arange(len(used)), (columns, 1)),
-        tuple(missing),
     )
 
 
@@ -111,7 +110,6 @@ def of_cells(
         np.stack([each.values for each in cells]),
         down,
         across,
-        ((plan.missing_rays or 0.0, plan.missing_reason),) * len(members),
     )
 
 
@@ -129,7 +127,7 @@ def _windows(
         else (lookup.column, core.x, core.column_step, lookup.step[0, 0])
     )
     along = met_step / step  # points of the texture for each pixel
-    start = (met - along * of_tap)[used] if used.any() else np.zeros(1)
+    start = (met - made.tops * (axis == 0) - along * of_tap)[used] if used.any() else np.zeros(1)
     beside = abs(along) * (guard + reach_in_pixels(core.interpolation, abs(step) / core.refine))
     place = along * (np.arange(pixels) + guard)
     (low, _), (_, high) = (

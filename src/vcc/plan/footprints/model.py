@@ -264,10 +264,6 @@ class Footprints(Value):
         """No rays are traced: nothing is added."""
         return self
 
-    def alone(self) -> Footprints:
-        """Nothing is told by a run without samples."""
-        return self
-
     @property
     def separable(self) -> bool:
         """Whether columns on the sensor follow from columns of the light field alone, and rows from rows.

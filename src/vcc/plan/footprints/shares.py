@@ -25,9 +25,11 @@ from vcc.base.describe import Brief
 
 Array = NDArray[np.float64]
 
-REACH = {"nearest": 0.5, "linear": 1.0, "cubic": 2.0, "spline": 2.0}
+REACH = {"nearest": 0.5, "linear": 1.0, "cubic": 2.0, "spline": 2.0, "box": 0.5}
 """Half the width of each interpolation's footprint, in samples. ``"spline"`` is a cubic B-spline: it does not
-interpolate by itself, but with the filter of the picture that undoes it on the samples (`vcc.plan.sharpening`)."""
+interpolate by itself, but with the filter of the picture that undoes it on the samples (`vcc.plan.sharpening`).
+``"box"`` is for samples that are divided: those are interpolated linearly, and each finer one fills its own cell
+evenly, so that behind a hard edge of a mask no light leaves the cell that let it pass."""
 
 SMALLEST_STEP = 1e-7
 """Plans keep steps from sample to sample at this or above, in pixels: a view that falls into a point falls into
@@ -42,13 +44,15 @@ def cumulative(interpolation: str, a: Any, xp: Any = np) -> Any:
     """Φ(a), the integral of the footprint from −∞ to a, for arrays of any library.
 
     Args:
-        interpolation: ``"linear"`` (a tent), ``"cubic"`` (Catmull-Rom, Keys 1981 with a = −½) or ``"spline"`` (a
-            cubic B-spline).
+        interpolation: ``"linear"`` (a tent), ``"cubic"`` (Catmull-Rom, Keys 1981 with a = −½), ``"spline"`` (a
+            cubic B-spline) or ``"box"``.
         a: positions in samples from the footprint's middle.
         xp: the array namespace of ``a``.
     """
     r = xp.clip(xp.abs(a), 0.0, REACH[interpolation])
-    if interpolation == "linear":
+    if interpolation == "box":
+        half = r
+    elif interpolation == "linear":
         half = r - r * r / 2
     elif interpolation == "spline":
         inner = xp.clip(r, 0.0, 1.0)
@@ -72,7 +76,7 @@ def _outer(r: Any) -> Any:
 def weight(interpolation: str, distance: Any, xp: Any = np) -> Any:
     """φ at a distance in samples: how values between samples are interpolated."""
     r = xp.abs(distance)
-    if interpolation == "nearest":
+    if interpolation in ("nearest", "box"):
         return xp.astype((distance >= -0.5) & (distance < 0.5), xp.float64)
     if interpolation == "linear":
         return xp.clip(1 - r, 0.0, 1.0)
@@ -118,7 +122,7 @@ def share_slopes(
     (φ(c) − φ(a))/2h|b|, to |b| by (c·φ(c) − a·φ(a))/2h|b|, to 2h by (φ(a) + φ(c))/4h|b| − F/2h.
 
     Args:
-        interpolation: ``"linear"``, ``"cubic"`` or ``"spline"``: the borders of ``"nearest"`` have no slope.
+        interpolation: all but ``"nearest"``, whose borders have no slope.
         pixel: see `shares`.
         position: see `shares`.
         step: see `shares`.
@@ -245,12 +249,13 @@ class Division(Brief):
         """``samples`` samples, each divided into ``refine``, interpolated as named.
 
         Args:
-            interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+            interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``; by ``"box"`` linearly.
             samples: how many there are.
             refine: parts of each.
             sharpen: an odd number of weights by which samples are filtered before they are interpolated; a fine
                 sample is then the mean of what is interpolated over its own cell, not its value in the middle.
         """
+        interpolation = "linear" if interpolation == "box" else interpolation
         weights = np.ones(1) if sharpen is None else sharpen
         reach = REACH[interpolation] + len(weights) // 2
         fine = round((samples - 1 + 2 * reach) * refine)

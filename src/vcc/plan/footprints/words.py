@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from vcc.base.affine import Affine
 from vcc.optics.train import Train
-from vcc.plan.footprints.cells import CORRELATED, LARGEST_CHOSEN_REFINEMENT, CellDivision
+from vcc.plan.footprints.cells import ERROR
 from vcc.plan.footprints.mask_textures import texture_error
 from vcc.plan.footprints.model import MaskLookup
 from vcc.plan.footprints.planes import Plane
-from vcc.plan.how import LARGEST_REFINEMENT
+from vcc.plan.footprints.taps import CellDivision
 from vcc.plan.parallax_rule import BetweenViews
 
 COARSE_TEXTURE = 5e-3
@@ -22,7 +24,7 @@ def notes_of(
     against_sensor: list[Plane],
     between: BetweenViews,
     division: CellDivision,
-    fine: int,
+    samples: tuple[int, float],
     swapped: bool,
 ) -> tuple[str, ...]:
     """What was folded, pulled to the samples and to the sensor, and how finely cells are divided."""
@@ -49,22 +51,26 @@ def notes_of(
     if swapped:
         notes.append("pixel rows and columns of the views change places: the frame turns them")
     notes.append(between.reason)
-    parts = division.parts
+    parts, finer = division.parts, division.finer
     if parts > 1:
-        finer = "a mask is" if division.spread else "several masks are"
-        notes.append(f"cells of views divided {parts}×{parts}: {finer} finer than a view's cell")
-    if division.left > CORRELATED:
+        notes.append(f"cells of views divided {parts}×{parts}: a mask is finer than a view's cell")
+    if finer > parts:
+        some, all_views = np.count_nonzero(division.where), division.where.size
+        which = "all views" if some == all_views else f"{some} of {all_views} views"
+        notes.append(f"cells of {which} divided {finer}×{finer}: elements in different planes vary together there")
+    if division.error > ERROR:
         notes.append(
-            f"masks in different planes still vary together inside these cells, by up to {division.left:.0%} of "
-            "their contrast, and are taken as independent there: more views would tell them apart"
+            "elements in different planes still vary together within these cells, and are taken as independent "
+            f"there: an error of up to {division.error:.1%} of the light. More views would make it smaller"
         )
+    fine, spilt = samples
     if fine > 1:
-        further = (
-            f"; finer ones are made when a program asks for them, by up to refine={LARGEST_REFINEMENT}"
-            if fine == LARGEST_CHOSEN_REFINEMENT
-            else ""
+        notes.append(f"samples divided {fine}×{fine}: a mask near the sensor is finer than a sample")
+    if spilt > ERROR:
+        notes.append(
+            f"masks near the sensor are finer than these samples: an error of about {spilt:.1%} of the light beside "
+            "their edges"
         )
-        notes.append(f"samples divided {fine}×{fine}: a mask near the sensor is finer than a sample{further}")
     return tuple(notes)
 
 

@@ -80,23 +80,19 @@ class KeptAim:
         return replace(self, bends=(), towards=None) == replace(other, bends=(), towards=None)
 
 
-def aimed(path: Path) -> tuple[Aimed, Aimed | None]:
-    """Where to aim, and what the camera asks for where that is more; as it was decided, where that is kept.
+def aimed(path: Path) -> Aimed:
+    """Where to aim; as it was decided, where that is kept.
 
     Raises:
         InputError: nothing bounds the rays, or they leave what was kept.
     """
     if not path.decisions.lasting:
         return found(path)
-    asked: list[Aimed | None] = []
 
     def decided() -> KeptAim:
-        taken, more = found(replace(path, decisions=ANEW))
-        asked.append(more)
-        return _kept(path, taken)
+        return _kept(path, found(replace(path, decisions=ANEW)))
 
-    kept = path.decisions.keep("aim of the rays", decided, KeptAim.like)
-    return _as_kept(path, kept), asked[0] if asked else None
+    return _as_kept(path, path.decisions.keep("aim of the rays", decided, KeptAim.like))
 
 
 def _kept(path: Path, taken: Aimed) -> KeptAim:
@@ -189,29 +185,33 @@ def _with_kept_reach(aim: Aim, kept: KeptAim) -> Aim:
     return replace(aim, reach=kept.reach)
 
 
-def found(path: Path) -> tuple[Aimed, Aimed | None]:
-    """Where to aim, and what the camera asks for where that is more.
-
-    A camera asks for all rays that its stops let through. Of those, a light field holds what its views cover:
-    without a stop at the views, the grid of views is taken for one.
+def found(path: Path) -> Aimed:
+    """Where to aim: at all that the camera asks for, or at what of it the light field holds, where that is less.
 
     Raises:
         InputError: nothing bounds the rays.
     """
     asked = settled(path, everything=False)
     narrow = settled(path, everything=True)
-    if _solid_angle(path, narrow.aim) < WORTH_NARROWING * _solid_angle(path, asked.aim):
-        return narrow, asked
-    return asked, None
+    return narrow if _solid_angle(path, narrow.aim) < WORTH_NARROWING * _solid_angle(path, asked.aim) else asked
 
 
-def settled(path: Path, everything: bool) -> Aimed:
-    """The smallest aim, slack and all; see `vcc.plan.rays.strips.bounds`."""
+def settled(path: Path, everything: bool, windows_only: bool = False) -> Aimed:
+    """The smallest aim, slack and all.
+
+    Args:
+        path: from the sensor.
+        everything: see `vcc.plan.rays.strips.bounds`.
+        windows_only: without windows of an array's cells.
+
+    Raises:
+        InputError: nothing bounds the rays.
+    """
     slack, before = Slack.none(path), math.inf
     if _strays_alike(path):
         _, slack = strayed(path, NOWHERE)
     for _ in range(ROUNDS):
-        aim = smallest(path, slack, everything)
+        aim = smallest(path, slack, everything, windows_only)
         regions, further = strayed(path, aim)
         if further.same(slack) and slack.size <= UNBOUNDED:
             return Aimed(aim, regions, slack, everything)  # another round would find the same
@@ -223,7 +223,7 @@ def settled(path: Path, everything: bool) -> Aimed:
         before = slack.size
     else:
         _refuse(path)
-    aim = smallest(path, slack, everything)  # once more, with all that rays can stray by
+    aim = smallest(path, slack, everything, windows_only)  # once more, with all that rays can stray by
     return Aimed(aim, strayed(path, aim)[0], slack, everything)
 
 
@@ -244,7 +244,7 @@ def _refuse(path: Path) -> NoReturn:
     raise InputError(f"no bound can be found for the rays through {', '.join(bending or scattering)}: {why}")
 
 
-def smallest(path: Path, slack: Slack, everything: bool) -> Aim:
+def smallest(path: Path, slack: Slack, everything: bool, windows_only: bool = False) -> Aim:
     """The aim that takes in the smallest solid angle, or parts it where elements are not smooth.
 
     Windows of cells are aimed at where they save rays, and where a pixel's rays are enough for all cells that
@@ -254,7 +254,7 @@ def smallest(path: Path, slack: Slack, everything: bool) -> Aim:
     if not found:
         raise InputError("nothing bounds the rays of this camera: give a lens or a mask a size")
     best = min(found, key=lambda window: window.solid_angle)
-    cells = cell_windows.cell_windows(path, slack.whole, everything)
+    cells = None if windows_only else cell_windows.cell_windows(path, slack.whole, everything)
     return best if cells is None else _parted(path, best, *cells)
 
 

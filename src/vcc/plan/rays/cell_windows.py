@@ -13,7 +13,7 @@ from vcc.base.affine import Affine
 from vcc.optics.deflections import CellDeflection
 from vcc.optics.sensor import Sensor
 from vcc.plan.decisions import Decisions
-from vcc.plan.rays.path import Leg, Path
+from vcc.plan.rays.path import Leg, Path, mixes_axes
 from vcc.plan.rays.strips import Bound, bounds
 from vcc.plan.rays.windows import CellOpening, CellWindows, Sight, Stop
 from vcc.shapes.lattice import CellApertures, Lattice
@@ -96,13 +96,8 @@ def _array(path: Path) -> Leg | None:
         if faces.bending is None and faces.spread is None:
             continue
         alone = isinstance(faces.bending, CellDeflection) and faces.spread is None
-        return leg if alone and not _mixed(leg.from_sensor) else None
+        return leg if alone and not mixes_axes(leg.from_sensor) else None
     return None
-
-
-def _mixed(ray_map: Affine) -> bool:
-    """Whether x and y mix."""
-    return bool(ray_map.matrix[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]].any())
 
 
 def _towards(path: Path, leg: Leg, beyond: list[Bound]) -> Iterator[CellWindows]:
@@ -114,7 +109,7 @@ def _towards(path: Path, leg: Leg, beyond: list[Bound]) -> Iterator[CellWindows]
     to_sensor = leg.from_sensor.inverse()
     for bound in beyond:
         way = bound.from_sensor @ to_sensor
-        sight = None if _mixed(way) else _sight(leg.from_sensor, way, bound.axes)
+        sight = None if mixes_axes(way) else _sight(leg.from_sensor, way, bound.axes)
         if sight is None:
             continue
         # By how much the array itself bends its windows know exactly.

@@ -40,16 +40,12 @@ from vcc.plan.rays.textures import (
 )
 from vcc.plan.rays.windows import Aim, Window
 from vcc.shapes.lattice import CellApertures, CellBlock
-from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern, Polygon
-from vcc.shapes.polygon_areas import polygon_mean
+from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
 from vcc.shapes.sheets import Product
 
 Array = NDArray[np.float64]
 
 DEFAULT_SAMPLES = 64
-ASKING_PIXELS, ASKING_RAYS = 16, 2**16
-"""Pixels a side of the sensor, and rays in all, that tell what the light field lacks beyond the aim: shares are
-right to 1/2√n, 0.2 %, or better."""
 
 
 def compile_rays(
@@ -71,29 +67,18 @@ def compile_rays(
         "parallax along which views are interpolated", lambda: _motion(grid, how), lambda one, other: True
     )
     path = Path(train, grid, motion, how.rays_a_pixel or DEFAULT_SAMPLES, decisions)
-    taken, asked = aimed(path)
+    taken = aimed(path)
     notes = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {taken.aim.words}"]
     core = _core(path, taken, how, notes)
     notes.append(followed)
-    plan = Plan(
+    return Plan(
         sensor_shape=train.sensor.shape,
         grid_shape=grid.shape[:4],
         core=core,
         before=_before(grid, how, notes),
-        missing_reason="they fall outside the grid of views or outside the views' pictures",
         cautions=tuple(_cautions(train)),
         notes=tuple(notes),
     )
-
-    def lacking() -> tuple[float, str] | None:
-        if asked is None:
-            return None
-        missing = _missing(core, replace(path, decisions=ANEW), asked)
-        words = f"the camera asks for light from {asked.aim.words}, of which the light field lacks {missing:.1%}"
-        return missing, words
-
-    more = decisions.keep("rays that are missing", lacking, lambda one, other: (one is None) == (other is None))
-    return plan if more is None else replace(plan, missing_rays=more[0], notes=(*plan.notes, more[1]))
 
 
 def _core(path: Path, taken: Aimed, how: How, notes: list[str]) -> Rays:
@@ -102,7 +87,7 @@ def _core(path: Path, taken: Aimed, how: How, notes: list[str]) -> Rays:
     vertical, horizontal = sensor.pitches
     first = sensor.frame(np.zeros((1, 2)))[0]
     wide, high = path.pixel.tolist()
-    made, index_from_ray = _steps(path, taken, notes)
+    made, index_from_ray = steps_met(path, taken, notes)
     kind = np.float64 if path.decisions.lasting else np.float32
     nv, nu, nt, ns = path.grid.shape[:4]
     return Rays(
@@ -124,7 +109,6 @@ def _core(path: Path, taken: Aimed, how: How, notes: list[str]) -> Rays:
             lambda: (how.seed, content(path.scatters), taken.aim.on_disc),
             partial(table, how.seed, path.scatters, taken.aim.on_disc, kind),
         ),
-        views_may_end=path.stop_at_views,
     )
 
 
@@ -137,28 +121,6 @@ def _before(grid: Grid, how: How, notes: list[str]) -> tuple[Before, ...]:
         + (", and by what their pixels' own averaging took" if grid.sample == "mean" else "")
     )
     return (SharpenViews.of(grid.sample),)
-
-
-def _missing(core: Rays, path: Path, asked: Aimed) -> float:
-    """The share of the light asked for that the light field lacks, where the aim is narrower than that.
-
-    By rays to all that is asked for, from pixels all over the sensor.
-    """
-    made, index_from_ray = _steps(path, asked, [], coarse=True)
-    rows, columns = (np.unique(np.arange(ASKING_PIXELS) * n // ASKING_PIXELS) for n in core.raster_shape)
-    pixel = (rows[:, None] * core.raster_shape[1] + columns).reshape(-1)
-    wide = replace(
-        core,
-        aim=asked.aim,
-        steps=tuple(made),
-        index_from_ray=index_from_ray,
-        points=table(core.seed, path.scatters, asked.aim.on_disc),
-        samples=2 ** int(math.log2(ASKING_RAYS // len(pixel))),
-    )
-    index, share = wide.looked_up(pixel, wide.block(pixel))
-    inside, held = wide.held(index)
-    asked_for = share * (inside | core.views_may_end)
-    return float((asked_for * ~held).sum() / asked_for.sum()) if asked_for.any() else 0.0
 
 
 def _cautions(train: Train) -> Iterator[str]:
@@ -204,7 +166,7 @@ class _Met:
         return self.stage.element.label
 
 
-def _steps(path: Path, taken: Aimed, notes: list[str], coarse: bool = False) -> tuple[list[steps.Step], Affine]:
+def steps_met(path: Path, taken: Aimed, notes: list[str], coarse: bool = False) -> tuple[list[steps.Step], Affine]:
     """What rays meet, and the map from rays behind all that to the light field's indices.
 
     ``coarse`` takes the coarsest textures, for a share of light rather than for a picture.
@@ -282,8 +244,6 @@ def _transmission(pattern: Pattern, met: _Met, notes: list[str]) -> list[steps.S
         return [steps.Cosines(decentre, (across, down), pattern.phase, pattern.harmonics, label)]
 
     def means(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
-        if its.lasting and isinstance(pattern, Polygon):
-            return polygon_mean(pattern, x, y, *spacing)[..., None]
         return means_around(pattern, x, y, spacing)[..., None]
 
     def itself(x: Array, y: Array) -> Array:

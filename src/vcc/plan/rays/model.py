@@ -51,7 +51,6 @@ class Rays(Value):
         seed: of the choice of points for each pixel.
         points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
             (0 … 1, twice, in `DIGITS` binary digits; of a disc −1 … 1), then what diffusers need.
-        views_may_end: rays outside the grid of views are missing: a stop at the views says that they are wanted.
     """
 
     raster_shape: tuple[int, int]
@@ -68,7 +67,6 @@ class Rays(Value):
     samples: int
     seed: int
     points: NDArray[np.float32]
-    views_may_end: bool
 
     method: ClassVar[str] = "rays"
     border: ClassVar[int] = 1
@@ -103,22 +101,6 @@ class Rays(Value):
     def more(self, samples: int) -> Rays:
         """With so many rays a pixel, to be taken beside as many that there are."""
         return replace(self, samples=samples)
-
-    def alone(self) -> Rays:
-        """Rays that look at a light field of one sample as large as all of the light field.
-
-        They tell which share of the light asked for the whole light field holds, with nothing read.
-        """
-        nv, nu, nt, ns = self.views
-        sizes = np.array([nu, nv, ns, nt], dtype=np.float64)
-        onto_one = Affine.from_parts(np.diag(1 / sizes), 0.5 / sizes - 0.5)
-        return replace(
-            self,
-            index_from_ray=onto_one @ self.index_from_ray,
-            views=(1, 1, 1, 1),
-            between_views=False,
-            motion=np.zeros((2, 2)),
-        )
 
     def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """All views may be looked at."""
@@ -208,12 +190,11 @@ class Rays(Value):
         points = np.broadcast_to(points, (*s.shape, points.shape[-1]))
         return Bundle(x, y, s, t, weight / self.samples, points), cells
 
-    def held(self, index: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Which rays, by indices (…, 4) of the light field, fall into the grid of views, and into pictures too."""
-        nv, nu, nt, ns = self.views
-        i, j, k, l = np.moveaxis(index, -1, 0)
-        inside = (i >= -0.5) & (i <= nu - 0.5) & (j >= -0.5) & (j <= nv - 0.5)
-        return inside, inside & (k >= -0.5) & (k <= ns - 0.5) & (l >= -0.5) & (l <= nt - 0.5)
+    def inside(self, index: Array) -> NDArray[np.bool_]:
+        """Which rays, by indices (…, 4) of the light field, fall into the grid of views."""
+        nv, nu = self.views[:2]
+        i, j = index[..., 0], index[..., 1]
+        return np.asarray((i >= -0.5) & (i <= nu - 0.5) & (j >= -0.5) & (j <= nv - 0.5))
 
     def _moved(self, points: NDArray[np.float32], number: NDArray[np.int64]) -> Array:
         """Points (pixels, 1, samples, columns), moved by what is drawn for each number (pixels, cells).

@@ -18,6 +18,9 @@ from vcc.plan.rays.points import FIRST_COLUMNS, columns_of
 
 Array = NDArray[np.float64]
 
+STEEPEST = 1.0
+"""Slope of 45°: what lets steeper light pass does not bound the light of a camera."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Leg(Brief):
@@ -39,11 +42,6 @@ class Leg(Brief):
     from_sensor: Affine
     stop: tuple[Array, Array]
     column: int
-
-    @property
-    def bounds_rays(self) -> bool:
-        """Whether the stop is finite along both axes."""
-        return bool(np.isfinite(self.stop[1] - self.stop[0]).all())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,23 +132,27 @@ class Path(Brief):
         return np.asarray(self.size / 2 + faded)
 
     @cached_property
-    def stop_at_views(self) -> bool:
-        """Whether a stop stands where each view is a point, so that it says which views are wanted."""
-        there = any(leg.bounds_rays and self._tells_views_apart(leg) for leg in self.legs)
-        return self.decisions.hold("a stop at the views", there)
+    def stops_bound(self) -> bool:
+        """Whether stops bound the slopes of rays, so that they say which light is wanted, not the grid of views.
 
-    def _tells_views_apart(self, leg: Leg) -> bool:
-        """Whether all rays of a view meet a leg in one place, but for rounding."""
-        place_from_index = (leg.stage.leaving @ self.grid.frame).linear[:2]
-        cell = np.abs(place_from_index[:, :2]).sum(axis=1)
-        if not (np.abs(place_from_index[:, 2:]) @ self.size[2:] <= 1e-6 * cell).all():
-            return False
-        for before in self.legs[leg.number + 1 :]:  # what bends or scatters there moves rays of a view apart
-            faces = before.stage.faces
-            onward = (leg.from_sensor @ before.from_sensor.inverse()).linear[:2, 2:]
-            if (faces.bending is not None or faces.spread is not None) and onward.any():
-                return False
-        return True
+        A stop so near the sensor that slopes of more than `STEEPEST` pass it bounds nothing that paraxial optics
+        could speak of.
+        """
+        return self.decisions.hold("whether stops bound the light", any(map(_bounds_slopes, self.legs)))
+
+
+def _bounds_slopes(leg: Leg) -> bool:
+    """Whether a stop bounds the slopes of rays from a place on the sensor."""
+    by_slope = leg.from_sensor.linear[:2, 2:]
+    half = (leg.stop[1] - leg.stop[0]) / 2
+    if not np.isfinite(half).all() or abs(np.linalg.det(by_slope)) <= 1e-12 * np.abs(by_slope).max() ** 2:
+        return False
+    return bool((np.abs(np.linalg.inv(by_slope)) @ half <= STEEPEST).all())
+
+
+def mixes_axes(ray_map: Affine) -> bool:
+    """Whether x and y mix."""
+    return bool(ray_map.matrix[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]].any())
 
 
 def _undone(stage: Stage) -> Affine:

@@ -115,7 +115,7 @@ class Strip(Brief):
 def bounds(path: Path, slack: list[Array], everything: bool) -> list[Bound]:
     """What bounds the rays that a camera asks for, or all that bounds those that the light field holds.
 
-    A camera asks for what its stops let through, and the grid of views where no stop stands at the views.
+    A camera asks for what its stops let through, and the grid of views where no stop bounds the light.
 
     Args:
         path: from the sensor.
@@ -123,7 +123,7 @@ def bounds(path: Path, slack: list[Array], everything: bool) -> list[Bound]:
         everything: the views' pictures too, and the grid of views anyway.
     """
     found = [_stop(leg, slack[leg.number], path.decisions) for leg in path.legs]
-    if everything or not path.stop_at_views:
+    if everything or not path.stops_bound:
         found.append(_of_light_field(path, slack, slice(0, 2), GRID_OF_VIEWS))
     if everything:
         found.append(pictures(path, slack))

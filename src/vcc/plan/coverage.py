@@ -1,0 +1,244 @@
+"""Which of the light that a camera asks for a light field lacks.
+
+A camera asks for all light that its stops let through: rays from all over the sensor through every rim and every
+bounded mask, each with the share that all elements leave of it, traced back to the light field. What of it falls
+outside the grid of views, or outside the views' pictures, is missing. Where no stop bounds the slopes of rays, the
+grid of views is the aperture, by convention.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+from vcc.base.errors import InputError
+from vcc.fields.grid import Grid
+from vcc.optics.train import Train
+from vcc.plan.rays.aim import Aimed, settled
+from vcc.plan.rays.compile import steps_met
+from vcc.plan.rays.model import Rays
+from vcc.plan.rays.path import Path, mixes_axes
+from vcc.plan.rays.points import table
+from vcc.plan.rays.windows import Aim, Window
+from vcc.shapes.patterns import Cells
+
+Array = NDArray[np.float64]
+
+RAYS = 2**16
+"""Evenly spread over the sensor and over what bounds the light: shares are right to 0.1 %."""
+BORDER = 1e-6
+"""Of a cell or a sample, by which rays may pass the border: what is as wide as the grid of views misses nothing."""
+WORTH_SAYING = 1e-3
+"""Share of the light from which on a reason names what cuts it."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Missing(Brief):
+    """What a light field lacks.
+
+    Args:
+        share: of the light that the camera asks for.
+        reason: in words; empty where hardly anything is missing.
+    """
+
+    share: float
+    reason: str
+
+    @classmethod
+    def of(cls, asked: float, in_views: float, held: float, stop: str) -> Missing:
+        """From amounts of light: all, that within the grid of views, and that within views' pictures, too.
+
+        Args:
+            asked: in any unit.
+            in_views: likewise.
+            held: likewise.
+            stop: what bounds the light.
+        """
+        if asked <= 0:
+            return cls(0.0, "")
+        outside_views, outside_pictures = (asked - in_views) / asked, (in_views - held) / asked
+        reasons = []
+        if outside_views > WORTH_SAYING:
+            reasons.append(f"{outside_views:.1%} of the light that passes {stop} lies outside the grid of views")
+        if outside_pictures > WORTH_SAYING:
+            reasons.append(f"{outside_pictures:.1%} lies outside the views' pictures")
+        return cls((asked - held) / asked, "; ".join(reasons))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AskedLight(Brief):
+    """The light that a camera asks for.
+
+    Args:
+        path: of the camera.
+        aimed: what bounds the light; None where all light comes from one place.
+        by_views: whether that is the grid of views, as no stop does.
+    """
+
+    path: Path
+    aimed: Aimed | None
+    by_views: bool
+
+    @classmethod
+    def of(cls, train: Train, grid: Grid) -> AskedLight:
+        """That of an optical train before a light field."""
+        path = Path(train, grid, np.zeros((2, 2)), RAYS)
+        try:
+            aimed = settled(path, everything=False, windows_only=True)
+        except InputError:  # rays are not bound by anything: what makes the picture says so
+            return cls(path, None, False)
+        return cls(path, aimed, not path.stops_bound)
+
+    @property
+    def words(self) -> str:
+        """What bounds the light, for an account of a plan."""
+        if self.by_views:
+            return (
+                "no stop bounds the light that reaches the sensor: the grid of views is taken for the aperture. "
+                "Give a lens a diameter to have another"
+            )
+        return f"the camera asks for the light that passes {self._stop}"
+
+    @property
+    def _stop(self) -> str:
+        return self.aimed.aim.words if self.aimed is not None else ""
+
+    @cached_property
+    def missing(self) -> Missing:
+        """What of it the light field lacks."""
+        if self.aimed is None or self._bounds_are_held():
+            return Missing(0.0, "")
+        (index, share), (in_views, in_pictures) = self._traced, self._held
+        share = share * in_views if self.by_views else share
+        return self._missing(share, in_views, in_pictures)
+
+    def missing_with(self, number: int, cells: Sequence[Cells]) -> list[Missing]:
+        """The same with other cells of one size in a mask, whose own are all open, of optics that are affine.
+
+        Args:
+            number: of the mask among the elements.
+            cells: several.
+        """
+        if self.aimed is None or self._bounds_are_held():
+            return [Missing(0.0, "")] * len(cells)
+        (_, share), (in_views, in_pictures) = self._traced, self._held
+        element = self.path.train.elements[number]
+        leg = next(leg for leg in self.path.legs if leg.stage.element is element)
+        x, y = leg.from_sensor(self._rays)[:, :2].T - np.array(element.decentre)[:, None]
+        row, column = cells[0].cells_at(x, y)
+        met = (row >= 0) & (column >= 0)
+        place, shape = (row * cells[0].values.shape[1] + column)[met], cells[0].values.size
+        # Light is linear in the cells: by each of them so much passes.
+        asked, viewed, held = (
+            np.bincount(place, weights=(share * part)[met], minlength=shape)
+            for part in (np.ones(len(share)), in_views, in_views & in_pictures)
+        )
+        asked = viewed if self.by_views else asked
+        return [
+            Missing.of(*(float(amount @ each.values.ravel()) for amount in (asked, viewed, held)), self._stop)
+            for each in cells
+        ]
+
+    def _missing(self, share: Array, in_views: NDArray[np.bool_], in_pictures: NDArray[np.bool_]) -> Missing:
+        amounts = (share.sum(), share[in_views].sum(), share[in_views & in_pictures].sum())
+        return Missing.of(*map(float, amounts), self._stop)
+
+    @cached_property
+    def _core(self) -> Rays:
+        """Rays from all over the sensor, which is one pixel to them, to what bounds the light."""
+        assert self.aimed is not None
+        sensor, path = self.path.train.sensor, self.path
+        steps, index_from_ray = steps_met(path, self.aimed, [], coarse=True)
+        height, width = sensor.size
+        return Rays(
+            raster_shape=(1, 1),
+            first_pixel=sensor.decentre,
+            pitch=(width, height),
+            sensitive=(width, height),
+            aim=self.aimed.aim,
+            steps=tuple(steps),
+            index_from_ray=index_from_ray,
+            motion=np.zeros((2, 2)),
+            between_views=False,
+            views=path.grid.shape[:4],
+            scale=1.0,
+            samples=RAYS,
+            seed=0,
+            points=table(0, path.scatters, self.aimed.aim.on_disc),
+        )
+
+    @cached_property
+    def _traced(self) -> tuple[Array, Array]:
+        """Indices (i, j, k, l) of the light field that rays come from, (n, 4), and what passes of each, (n,)."""
+        index, share = self._core.looked_up(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
+        return index.reshape(-1, 4), share.reshape(-1)
+
+    @cached_property
+    def _rays(self) -> Array:
+        """The rays on the sensor, (n, 4) of (x, y, s, t)."""
+        rays, _ = self._core.aimed(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
+        return np.stack([each.ravel() for each in np.broadcast_arrays(rays.x, rays.y, rays.s, rays.t)], axis=-1)
+
+    @cached_property
+    def _held(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which rays fall into the grid of views, and which into the views' pictures."""
+        index, size = self._traced[0], self.path.size
+        inside = np.abs(index - (size - 1) / 2) <= size / 2 + BORDER
+        return inside[:, :2].all(axis=1), inside[:, 2:].all(axis=1)
+
+    def _bounds_are_held(self) -> bool:
+        """Whether the light field holds all light, by bounds of it that are quickly found."""
+        assert self.aimed is not None
+        extents = _extents(self.path, self.aimed.aim)
+        if extents is None:
+            return False
+        (low, high), size = extents, self.path.size
+        away = np.maximum(high - (size - 1) / 2, (size - 1) / 2 - low)
+        return bool((away <= size / 2 + BORDER)[2 if self.by_views else 0 :].all())
+
+
+def _extents(path: Path, aim: Aim) -> tuple[Array, Array] | None:
+    """The lowest and the highest index (i, j, k, l) of rays that pass all stops, or bounds of them.
+
+    None where something bends or scatters rays otherwise than lenses and prisms do, or x and y mix.
+    """
+    maps = [path.index_from_sensor, *(leg.from_sensor for leg in path.legs)]
+    bent = any(leg.stage.faces.bending is not None or leg.stage.faces.spread is not None for leg in path.legs)
+    if bent or not isinstance(aim, Window) or any(map(mixes_axes, maps)):
+        return None
+    ends = []
+    sensor = path.train.sensor
+    for axis, (middle, length) in enumerate(zip(sensor.decentre, sensor.size[::-1], strict=True)):
+        places = middle + length / 2 * np.array([-1.0, -1.0, 1.0, 1.0])
+        slopes = aim.slope_from_sensor[axis, axis] * places + aim.offset[axis]
+        corners = np.stack([places, slopes + aim.slope_from_point[axis, axis] * np.array([-1.0, 1.0, 1.0, -1.0])])
+        for leg in path.legs:
+            place = leg.from_sensor.matrix[axis, [axis, axis + 2, 4]]
+            for sign, end in zip((-1.0, 1.0), leg.stop, strict=True):
+                corners = _cut(corners, sign * place, sign * end[axis])
+        index = path.index_from_sensor.matrix[[axis, axis + 2]][:, [axis, axis + 2, 4]]
+        found = index[:, :2] @ corners + index[:, 2:]
+        ends.append((found.min(axis=1, initial=np.inf), found.max(axis=1, initial=-np.inf)))
+    low, high = (np.stack([one[n] for one in ends], axis=1).ravel() for n in (0, 1))
+    return low, high
+
+
+def _cut(corners: Array, along: Array, end: float) -> Array:
+    """What of a convex polygon lies where along · (x, s, 1) is at most ``end`` (Sutherland and Hodgman 1974)."""
+    if not np.isfinite(end) or corners.size == 0:
+        return corners
+    beyond = along[:2] @ corners + along[2] - end
+    after, beyond_after = np.roll(corners, -1, axis=1), np.roll(beyond, -1)
+    kept = []
+    for n in range(corners.shape[1]):
+        if beyond[n] <= 0:
+            kept.append(corners[:, n])
+        if (beyond[n] <= 0) != (beyond_after[n] <= 0):
+            share = beyond[n] / (beyond[n] - beyond_after[n])
+            kept.append(corners[:, n] + share * (after[:, n] - corners[:, n]))
+    return np.array(kept).T if kept else np.zeros((2, 0))

@@ -1,0 +1,227 @@
+"""Masks at the views as the taps of a plan meet them: the open share of each cell, and where it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.footprints.means import Boxes, mean_over
+from vcc.plan.footprints.means_back import mean_back
+from vcc.plan.footprints.planes import Plane
+from vcc.plan.footprints.taps import Mesh, Taps
+from vcc.shapes.mean_back import holds
+from vcc.shapes.patterns import Cells, is_grid
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-9
+"""Of a cell: less light is what areas that cancel leave, and its middle would jump about."""
+PARTS_OF_A_CELL = 6
+"""Parts each way by which the open part of a view's cell is found."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OpenParts(Brief):
+    """What of each tap's cell of the aperture is open.
+
+    Args:
+        weights: the open share of each tap's cell, (rows of taps, columns of taps).
+        middle: the middle of the open part, in views from the middle of the cell, (rows, columns, 2) as (i, j).
+    """
+
+    weights: Array
+    middle: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Aperture(Brief):
+    """Planes that tell views apart only, as the taps of a plan meet them.
+
+    Args:
+        planes: one or several.
+        taps: of the plan.
+        motion: of the scene.
+        samples: (rows, columns) of a view.
+        decisions: by which means are taken.
+    """
+
+    planes: list[Plane]
+    taps: Taps
+    motion: Array
+    samples: tuple[int, int]
+    decisions: Decisions = ANEW
+
+    def open_parts(self) -> OpenParts:
+        """What of each tap's cell is open.
+
+        A cell that a rim cuts is lit through a part of it, and what other masks do to that light they do around
+        the middle of that part.
+        """
+        weights = np.ones(self.taps.shares.shape)
+        middle = np.zeros((*weights.shape, 2))
+        for cells in self._cells() if self.planes else ():
+            shares = _product(cells.parts())
+            light, lit = self._light(shares, cells.about)
+            here = np.zeros((*light.shape, 2))
+            here[lit] = (shares[..., None] * cells.inside).sum(axis=(2, 3))[lit] / light[lit][:, None]
+            middle[cells.mesh], weights[cells.mesh] = here, cells.open_shares(shares)
+        return OpenParts(weights, middle)
+
+    def open_shares(self) -> Array:
+        """The weights of `open_parts` alone."""
+        weights = np.ones(self.taps.shares.shape)
+        for cells in self._cells():
+            weights[cells.mesh] = cells.open_shares()
+        return weights
+
+    def open_shares_of(self, cells: Cells, values: Array) -> Array | None:
+        """`open_shares` with several arrays (arrays, rows, columns) in the place of the only plane's cells.
+
+        Returns:
+            (arrays, rows of taps, columns of taps); None where they have to be found one by one.
+        """
+        (here, *others) = self._cells()
+        if others or not here.closed or self.planes[0].pattern is not cells:
+            return None
+        ((boxes, _),) = here.whole(0)
+        if not is_grid(boxes.x, boxes.y):
+            return None
+        return cells.means(values, boxes.x.ravel(), boxes.y.ravel(), boxes.width, boxes.height)
+
+    def back(self, weights: OpenParts, cells: Cells) -> Array:
+        """From weights of `open_parts` to weights of the cells of one of the planes, this very object."""
+        total, middles = np.zeros(cells.values.shape), self.open_parts().middle
+        for here in self._cells():
+            shares = here.parts()
+            light, lit = self._light(_product(shares), here.about)
+            middle, to_middle = middles[here.mesh], weights.middle[here.mesh]
+            from_middle = ((here.inside - middle[:, :, None, None]) * to_middle[:, :, None, None]).sum(axis=-1)
+            of_shares = np.where(
+                lit[..., None, None], from_middle / np.where(lit, light, 1.0)[..., None, None], 0.0
+            )
+            if not here.closed:
+                of_shares = of_shares + weights.weights[here.mesh][..., None, None] / PARTS_OF_A_CELL**2
+            for n, plane in enumerate(self.planes):
+                if not holds(plane.pattern, cells):
+                    continue
+                others = _product([share for m, share in enumerate(shares) if m != n])
+                total += here.back(n, of_shares * others, cells, whole=False)
+                if here.closed:
+                    total += here.back(n, weights.weights[here.mesh], cells, whole=True)
+        return total
+
+    def _cells(self) -> list[_Cells]:
+        """The cells of the taps of each level."""
+        return [_Cells(self, mesh, parts) for mesh, parts in self.taps.levels()]
+
+    def _light(self, shares: Array, about: Decisions) -> tuple[Array, NDArray[np.bool_]]:
+        """The light through each tap's cell, and which taps are lit."""
+        light = shares.sum(axis=(2, 3))
+        least = ROUNDING if about.lasting else 0.0
+        return light, about.keep("taps that are lit", lambda: light > least) & (light > least)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Cells(Brief):
+    """The cells of taps of one level, and what is open of them.
+
+    Args:
+        aperture: whose taps.
+        mesh: an open mesh of their (rows, columns).
+        divide: parts of a view's cell that they are, each way.
+    """
+
+    aperture: Aperture
+    mesh: Mesh
+    divide: int
+
+    @property
+    def about(self) -> Decisions:
+        """Decisions about them."""
+        decisions = self.aperture.decisions
+        return decisions if self.divide == self.aperture.taps.parts[0] else decisions.of("finer")
+
+    @property
+    def inside(self) -> Array:
+        """Middles of the parts of a cell, in views from its own, (parts, parts, 2)."""
+        part = ((np.arange(PARTS_OF_A_CELL) + 0.5) / PARTS_OF_A_CELL - 0.5) / self.divide
+        return np.stack(np.meshgrid(part, part), axis=-1)
+
+    @property
+    def closed(self) -> bool:
+        """Whether what is open of a whole cell is known by itself: through one plane, in cells along its axes.
+
+        What several leave of a cell is not the product of their shares, and means over rectangles that stand for
+        a cell that is turned are those of its parts.
+        """
+        return len(self.aperture.planes) == 1 and len(self.whole(0)) == 1
+
+    def open_shares(self, shares: Array | None = None) -> Array:
+        """The open share of each cell, (rows, columns); ``shares`` are the product of `parts` where it is known."""
+        if self.closed:
+            return self._means(0, self.whole(0), self._of_cells(0))
+        return np.asarray((_product(self.parts()) if shares is None else shares).mean(axis=(2, 3)))
+
+    def parts(self) -> list[Array]:
+        """Each plane's open share of the parts of cells, (rows, columns, parts down, parts across)."""
+        return [self._means(n, self._divided(n), self._of_parts(n)) for n in range(len(self.aperture.planes))]
+
+    def back(self, n: int, weights: Array, cells: Cells, whole: bool) -> Array:
+        """From weights of the open shares of whole cells, or of their parts, to those of a plane's cells."""
+        boxes, about = (self.whole(n), self._of_cells(n)) if whole else (self._divided(n), self._of_parts(n))
+        pattern = self.aperture.planes[n].pattern
+        found = [
+            mean_back(pattern, box, _of_tile(about, tile), share * weights, cells)
+            for tile, (box, share) in enumerate(boxes)
+        ]
+        return np.asarray(np.sum(found, axis=0))
+
+    def whole(self, n: int) -> list[tuple[Boxes, float]]:
+        """The cells on a plane."""
+        return self._boxes(n, self.index, self.shift, self.divide)
+
+    def _divided(self, n: int) -> list[tuple[Boxes, float]]:
+        """The parts of the cells on a plane."""
+        shift = self.shift[:, :, None, None] + self.inside
+        index = np.broadcast_to(self.index[:, :, None, None], shift.shape)
+        return self._boxes(n, index, shift, self.divide * PARTS_OF_A_CELL)
+
+    @property
+    def index(self) -> Array:
+        """Of the views; see `Taps`."""
+        return self.aperture.taps.index[self.mesh]
+
+    @property
+    def shift(self) -> Array:
+        """Of the taps from the views; see `Taps`."""
+        return self.aperture.taps.shift[self.mesh]
+
+    def _boxes(self, n: int, index: Array, shift: Array, parts: int) -> list[tuple[Boxes, float]]:
+        aperture = self.aperture
+        return aperture.planes[n].boxes(index, shift, aperture.motion, aperture.samples, parts)
+
+    def _means(self, n: int, boxes: list[tuple[Boxes, float]], about: Decisions) -> Array:
+        pattern = self.aperture.planes[n].pattern
+        means = [
+            share * mean_over(pattern, *box, _of_tile(about, tile)) for tile, (box, share) in enumerate(boxes)
+        ]
+        return np.asarray(sum(means[1:], start=means[0]))
+
+    def _of_cells(self, n: int) -> Decisions:
+        return self.about.of(f"mask {n + 1} at the views")
+
+    def _of_parts(self, n: int) -> Decisions:
+        return self.about.of(f"parts of mask {n + 1} at the views")
+
+
+def _of_tile(about: Decisions, tile: int) -> Decisions:
+    return about.of(f"rectangle {tile + 1}") if tile else about
+
+
+def _product(shares: list[Array]) -> Array:
+    return reduce(np.multiply, shares, np.ones(1))

@@ -1,0 +1,105 @@
+"""How much of a pattern's detail averaging takes away."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.plan.footprints.planes import Plane
+from vcc.shapes.patterns import Cells, Pattern
+from vcc.shapes.sheets import Product, product_of_means
+
+Array = NDArray[np.float64]
+
+ARRAYS_AT_ONCE = 64
+"""Arrays of cells that are looked at together."""
+
+
+def _fine_means(pattern: Pattern, x: Array, y: Array, width: float, height: float) -> Array:
+    """Means over cells so fine that two edges hardly share one: of a product, the product of means."""
+    if isinstance(pattern, Product) and len(pattern.factors) > 1:
+        return product_of_means(pattern.factors, x, y, width, height)
+    return pattern.mean(x, y, width, height)
+
+
+def _means_around(values: Array, length: float) -> Array:
+    """Means over so many rows, 1 or more, around each row; zeros beyond the first and the last."""
+    if length == 1:
+        return values
+    rows, whole = len(values), int((length - 1) / 2)
+    cut = (length - 1) / 2 - whole  # what counts of the rows at the ends
+    padded = np.zeros((rows + 2 * whole + 2, *values.shape[1:]))
+    padded[whole + 1 : whole + 1 + rows] = values
+    means = padded[:rows] + padded[2 * whole + 2 :]
+    means *= cut
+    for above, sums in pairwise(padded):
+        sums += above  # NumPy's own running sums go down column by column, which takes several times as long
+    means += padded[2 * whole + 1 : -1]
+    means -= padded[:rows]
+    means /= length
+    return means
+
+
+def detail_lost(plane: Plane, known: Array, added: Array) -> float:
+    """The variance that averaging a pattern over ``added`` takes away after ``known``, of its mean squared.
+
+    Its root is the error that a pattern makes where what it does within ``added`` is not told apart.
+
+    Args:
+        plane: of the pattern.
+        known: size (x, y) of the rectangle that the pattern is averaged over anyway, metres.
+        added: of that by which it is averaged besides.
+    """
+
+    def looked_at(x: Array, y: Array, cell: tuple[float, float]) -> Array:
+        return np.broadcast_to(_fine_means(plane.pattern, x[None, :], y[:, None], *cell), (y.size, x.size))[None]
+
+    return float(_details_lost(plane.pattern.size, looked_at, known, added)[0])
+
+
+def details_lost(cells: Cells, values: Array, known: Array, added: Array) -> Array:
+    """`detail_lost` of each of several arrays, (arrays, rows, columns), in the place of an array of cells."""
+
+    def of_some(some: Array) -> Array:
+        return _details_lost(cells.size, lambda x, y, cell: cells.means(some, x, y, *cell), known, added)
+
+    return np.concatenate([of_some(some) for some in np.array_split(values, -(-len(values) // ARRAYS_AT_ONCE))])
+
+
+def _details_lost(
+    size_of_pattern: tuple[float, float],
+    looked_at: Callable[[Array, Array, tuple[float, float]], Array],
+    known: Array,
+    added: Array,
+) -> Array:
+    """`detail_lost` of patterns of one size; ``looked_at`` finds means over small cells, (patterns, y, x)."""
+    if (added <= 0).all():
+        return np.zeros(len(looked_at(np.zeros(1), np.zeros(1), (1.0, 1.0))))
+    bounded = np.isfinite(size_of_pattern)
+    size = np.minimum(size_of_pattern, 1.0) if bounded.all() else np.full(2, 64 * max(*known, *added))
+    fine = np.maximum(np.maximum(known, added) / 8, size / 512)
+    counts = np.maximum(np.ceil(size / fine).astype(int), 8)
+    cell = size / counts
+    x, y = (((np.arange(count) + 0.5) / count - 0.5) * side for count, side in zip(counts, size, strict=True))
+    # Averaged once as finely as it is looked at, and these means averaged further.
+    values = looked_at(x, y, (float(cell[0]), float(cell[1])))
+    light = values.mean(axis=(1, 2))
+    even = values.var(axis=(1, 2)) < 1e-12
+    by_row = np.clip(values, 0.0, 1.0).transpose(1, 0, 2)
+    # A pattern without bounds goes on beyond what is looked at: only what lies within is compared.
+    reach = np.ceil(np.where(bounded, 0.0, np.hypot(known, added) / 2 / cell)).astype(int)
+    across, down = (slice(n, max(count - n, n + 1)) for n, count in zip(reach, counts, strict=True))
+
+    def variance(box: Array) -> Array:
+        # What is twice as wide as the pattern holds all of it wherever it lies: what is wider has less on average.
+        wide, high = np.clip(box, cell, 2 * size) / cell
+        share = float(np.prod(np.minimum(1.0, 2 * size / np.maximum(box, cell))))
+        down_done = _means_around(by_row, float(high))[down]
+        means = _means_around(down_done.transpose(2, 1, 0), float(wide))[across]
+        return np.asarray(share**2 * means.var(axis=(0, 2)))
+
+    lost = variance(known) - variance(np.hypot(known, added))
+    return np.where(even, 0.0, lost / np.where(even, 1.0, light**2))

@@ -1,0 +1,143 @@
+"""View taps: places of the aperture that views stand for, and how the cells of views are divided into them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+Mesh = tuple[NDArray[np.intp], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CellDivision:
+    """How the cells of views are divided.
+
+    Args:
+        parts: of each, along each axis.
+        spread: whether a view's light reaches its neighbours, as a tent, for a place between views is interpolated
+            from both; else it stays in its own cell.
+        finer: parts of the cells of some views, where several elements vary together; as many as ``parts`` for none.
+        where: these views, (v, u).
+        error: the error that elements varying together within parts of cells may leave, a share of the light.
+    """
+
+    parts: int
+    spread: bool
+    finer: int = 1
+    where: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((1, 1), dtype=np.bool_))
+    error: float = 0.0
+
+    def like(self, other: CellDivision) -> bool:
+        """Whether both make the same taps."""
+        mine, others = ((each.parts, each.spread, each.finer) for each in (self, other))
+        return mine == others and np.array_equal(self.where, other.where)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Taps(Brief):
+    """Taps in rows and columns; each reads a view, at a place of its cell.
+
+    Where the cells of some views are divided more finely than those of others, rows and columns of taps have
+    levels. A tap of a row and a column of different levels has no share of the light.
+
+    Args:
+        rows: row of views that each row of taps reads.
+        columns: likewise.
+        index: (i, j) of the view of each tap, (rows of taps, columns of taps, 2).
+        shift: of the tap from the middle of its view, in views.
+        shares: of a view's light.
+        row_level: of each row of taps.
+        column_level: likewise.
+        parts: of a view's cell each way, of each level.
+    """
+
+    rows: Numbers
+    columns: Numbers
+    index: Array
+    shift: Array
+    shares: Array
+    row_level: Numbers
+    column_level: Numbers
+    parts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, views: tuple[int, int], division: CellDivision) -> Taps:
+        """The taps of a grid of (rows, columns) of views."""
+        (rows, down, row_share, row_level), (columns, across, column_share, column_level) = (
+            _along(count, division, division.where.any(axis=1 - axis)) for axis, count in enumerate(views)
+        )
+        index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
+        shift = np.stack(np.broadcast_arrays(across[None, :], down[:, None]), axis=-1)
+        shares = row_share[:, None] * column_share[None, :]
+        parts: tuple[int, ...] = (division.parts,)
+        if division.finer > division.parts:
+            parts = (*parts, division.finer)
+            finer = division.where[np.ix_(rows, columns)]
+            shares = shares * (row_level[:, None] == finer) * (column_level[None, :] == finer)
+        return cls(rows, columns, index, shift, shares, row_level, column_level, parts)
+
+    def levels(self) -> Iterator[tuple[Mesh, int]]:
+        """The taps of each level that has any, an open mesh of their (rows, columns), and the parts of a cell."""
+        for level, parts in enumerate(self.parts):
+            mesh = np.ix_(np.flatnonzero(self.row_level == level), np.flatnonzero(self.column_level == level))
+            if mesh[0].size and mesh[1].size:
+                yield mesh, parts
+
+    def some(self, rows: Numbers, columns: Numbers) -> Taps:
+        """Some rows and columns of them."""
+        mesh = np.ix_(rows, columns)
+        return replace(
+            self,
+            rows=self.rows[rows],
+            columns=self.columns[columns],
+            index=self.index[mesh],
+            shift=self.shift[mesh],
+            shares=self.shares[mesh],
+            row_level=self.row_level[rows],
+            column_level=self.column_level[columns],
+        )
+
+
+def _along(views: int, division: CellDivision, finer: NDArray[np.bool_]) -> tuple[Numbers, Array, Array, Numbers]:
+    """Views read, shifts from them in views, shares and levels, of the taps along one axis.
+
+    Undivided, each view is one tap. Divided, it is one in each part of its cell; or its light is spread over a
+    tent that reaches its neighbours, so that a place between views is interpolated linearly from both.
+
+    Args:
+        views: how many there are.
+        division: of their cells.
+        finer: of which of them the cells are divided further.
+    """
+    parts = division.parts
+    if division.spread:
+        shift = (np.arange(-parts, parts) + 0.5) / parts
+        share = (1 - np.abs(shift)) / parts
+    else:
+        shift, share = _parts(parts)
+    view = np.repeat(np.arange(views), len(shift))
+    shifts, shares, level = np.tile(shift, views), np.tile(share, views), np.zeros(len(view), dtype=np.int64)
+    if division.finer > parts:
+        shift, share = _parts(division.finer)
+        number = np.flatnonzero(finer)
+        view = np.concatenate([view, np.repeat(number, len(shift))])
+        shifts, shares = (
+            np.append(shifts, np.tile(shift, len(number))),
+            np.append(shares, np.tile(share, len(number))),
+        )
+        level = np.append(level, np.ones(len(view) - len(level), dtype=np.int64))
+        order = np.lexsort((shifts, level, view))  # views one after the other, as they lie in memory
+        view, shifts, shares, level = view[order], shifts[order], shares[order], level[order]
+    return view, shifts, shares, level
+
+
+def _parts(parts: int) -> tuple[Array, Array]:
+    """Shifts and shares of the parts of a cell."""
+    return (np.arange(parts) + 0.5) / parts - 0.5, np.full(parts, 1 / parts)

@@ -1,0 +1,179 @@
+"""Elements in different planes that vary together inside the cell of a view: what it costs to take them apart.
+
+The mean of a product is not the product of the means. How far they differ is found by looking: at some places of the
+sensor, and through each of these at some places of the aperture, elements are looked at in points all over a cell.
+The places follow from the optics alone, so that a piece of a light field is treated as the whole is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+from vcc.plan.footprints.planes import Plane
+
+Array = NDArray[np.float64]
+
+PIXELS, RAYS, POINTS = 12, 64, 8
+"""Places of the sensor, of the aperture behind each, and points each way across a cell."""
+HALVED = (0.25, 0.5)
+"""By how much the error falls at least, and at most, where cells are divided once more."""
+LARGEST = 100
+"""Times the grid of views: what is larger does not bound the light."""
+
+
+class _Map(NamedTuple):
+    """Places on a plane from views and places on the sensor: by_view · (i, j) + by_pixel · (x, y) + offset."""
+
+    by_view: Array
+    by_pixel: Array
+    offset: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Looks(Brief):
+    """Places at which elements in several planes are looked at.
+
+    Args:
+        groups: planes that stand together, and tell views apart only: the first of these, if any; then one each.
+        at_views: whether the first group is at the views: where its open part is in a cell is then known, and what
+            others do there linearly.
+        places: on each plane of each group, in points of cells, (pixels, rays, points, points, 2), metres from the
+            middle of its pattern.
+    """
+
+    groups: tuple[tuple[Plane, ...], ...]
+    at_views: bool
+    places: tuple[tuple[Array, ...], ...]
+
+    @classmethod
+    def of(
+        cls,
+        groups: list[list[Plane]],
+        at_views: bool,
+        motion: Array,
+        on_sensor: Array,
+        sensor: tuple[int, int],
+        extent: tuple[float, float],
+    ) -> Looks:
+        """Such places for a light field.
+
+        Args:
+            groups: see `Looks`.
+            at_views: likewise.
+            motion: of the scene that views follow, see `tap_origin`.
+            on_sensor: 2×5, places on the sensor from indices (i, j, k, l, 1), pixels.
+            sensor: (rows, columns) of pixels.
+            extent: (rows, columns) of the grid of views.
+        """
+        maps = [[_by_view_and_pixel(plane, on_sensor) for plane in group] for group in groups]
+        rng = np.random.default_rng(0)
+        even = rng.random((PIXELS, RAYS, 2)) - 0.5
+        pixels = np.array(sensor[::-1])
+        pixel = (rng.random((PIXELS, 1, 2)) - 0.5) * pixels + (pixels - 1) / 2
+        every = [
+            (plane, one)
+            for group, each in zip(groups, maps, strict=True)
+            for plane, one in zip(group, each, strict=True)
+        ]
+        view = _views_met(every, even, pixel, extent)
+        part = (np.arange(POINTS) + 0.5) / POINTS - 0.5
+        inside = np.stack(np.meshgrid(part, part), axis=-1)
+
+        def places(plane: Plane, one: _Map) -> Array:
+            by_view, by_pixel, offset = one
+            middle = view @ by_view.T + pixel @ by_pixel.T + offset
+            return np.asarray(middle[:, :, None, None] + inside @ plane.view_step(motion).T)
+
+        return cls(
+            tuple(map(tuple, groups)),
+            at_views,
+            tuple(
+                tuple(places(plane, one) for plane, one in zip(group, each, strict=True))
+                for group, each in zip(groups, maps, strict=True)
+            ),
+        )
+
+    def values(self, number: int) -> Array:
+        """What passes a group in all points of cells, (pixels, rays, points, points)."""
+        return math.prod(
+            (
+                plane.pattern(*np.moveaxis(place, -1, 0))
+                for plane, place in zip(self.groups[number], self.places[number], strict=True)
+            ),
+            start=np.ones(1),
+        )
+
+    def error(self, values: list[Array] | None = None) -> Callable[[int], float]:
+        """By how much a picture errs where cells are divided into so many parts each way, a share of its light.
+
+        Args:
+            values: of all groups, where not their own: (..., pixels, rays, points, points).
+        """
+        values = [self.values(n) for n in range(len(self.groups))] if values is None else values
+        whole, half = (self._error(values, parts) for parts in (1, 2))
+        ratio = float(np.clip(half / whole, *HALVED)) if whole > 0 else HALVED[0]
+        return lambda parts: whole if parts == 1 else half * ratio ** math.log2(parts / 2)
+
+    def _error(self, values: list[Array], parts: int) -> float:
+        each = POINTS // parts
+        cut = [v.reshape(*v.shape[:2], parts, each, parts, each).transpose(0, 1, 2, 4, 3, 5) for v in values]
+        means = [v.mean(axis=(4, 5)) for v in cut]
+        truth = math.prod(cut[1:], start=cut[0]).mean(axis=(4, 5))
+        taken = math.prod(means[1:], start=means[0])
+        if self.at_views:
+            taken = taken + _linear(cut[0], means, cut[1:])
+        light, off = float(truth.mean()), (taken - truth).mean(axis=(1, 2, 3))
+        # Light that is too much, or too little, throughout counts twice.
+        return max(math.sqrt(float(np.mean(off**2))), 2 * abs(float(off.mean()))) / light if light > 0 else 0.0
+
+
+def _linear(first: Array, means: list[Array], others: list[Array]) -> Array:
+    """What others do linearly across parts of cells, to the light in the middle of what the first leaves open."""
+    each = first.shape[-1]
+    place = (np.arange(each) - (each - 1) / 2) / max(math.sqrt((each**2 - 1) / 12), 1e-300)
+    total = np.zeros(means[0].shape)
+    for axis in (4, 5):
+        along = place.reshape(-1, 1) if axis == 4 else place
+        open_at = (first * along).mean(axis=(4, 5))
+        for n, other in enumerate(others):
+            rest = math.prod((m for k, m in enumerate(means[1:]) if k != n), start=np.ones(1))
+            total += open_at * (other * along).mean(axis=(4, 5)) * rest
+    return total
+
+
+def _by_view_and_pixel(plane: Plane, on_sensor: Array) -> _Map:
+    """Places on a plane from views (i, j) and places on the sensor; see `Looks.of`."""
+    by_index, step = plane.at_index, on_sensor[:, 2:4]
+    if abs(np.linalg.det(step)) <= 1e-12 * np.abs(step).max() ** 2:  # a view is one place on the sensor
+        return _Map(by_index[:, :2], np.zeros((2, 2)), plane.offset)
+    by_pixel = by_index[:, 2:] @ np.linalg.inv(step)
+    by_view = by_index[:, :2] - by_pixel @ on_sensor[:, :2]
+    return _Map(by_view, by_pixel, plane.offset - by_pixel @ on_sensor[:, 4])
+
+
+def _views_met(planes: list[tuple[Plane, _Map]], even: Array, pixel: Array, extent: tuple[float, float]) -> Array:
+    """Views (i, j), fractions of them too, through which light goes: all over the smallest plane that has a size.
+
+    Args:
+        planes: with the maps to them.
+        even: places −½ … ½, (pixels, rays, 2).
+        pixel: places on the sensor, (pixels, 1, 2).
+        extent: (rows, columns) of the grid of views.
+    """
+    areas = [
+        math.prod(plane.pattern.size) / max(abs(float(np.linalg.det(one.by_view))), 1e-300)
+        for plane, one in planes
+    ]
+    plane, (by_view, by_pixel, offset) = planes[int(np.argmin(areas))]
+    if min(areas) < math.prod(extent) * LARGEST:
+        place = even * plane.pattern.size - pixel @ by_pixel.T - offset
+        return np.asarray(place @ np.linalg.inv(by_view).T)
+    rows, columns = extent
+    return np.asarray(even * (columns, rows) + np.array([columns - 1, rows - 1]) / 2)
