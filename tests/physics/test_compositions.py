@@ -35,7 +35,8 @@ def sheet(values: np.ndarray, z: float, width: float = 8 * mm, **placed) -> vcc.
 
 
 def capture(*elements: vcc.Element, lf: vcc.LightField | None = None, **options) -> np.ndarray:
-    camera = vcc.Camera([vcc.Lens(focal_length=FOCAL_LENGTH), *elements], SENSOR)
+    # As wide as the views: the masks behind it are not what bounds the light.
+    camera = vcc.Camera([vcc.Lens(focal_length=FOCAL_LENGTH, diameter=8 * mm), *elements], SENSOR)
     return camera.capture(noise() if lf is None else lf, **options).values
 
 

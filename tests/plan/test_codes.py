@@ -58,7 +58,8 @@ def test_plans_made_together_are_those_made_alone(case, refine, monkeypatch):
             alone.missing_reason,
             alone.cautions,
         )
-        assert (plan.missing_rays or 0) == pytest.approx(alone.missing_rays or 0, rel=1e-9, abs=1e-12)
+        # Masks are looked at in single precision where rays meet them.
+        assert plan.missing_rays == pytest.approx(alone.missing_rays, rel=1e-6, abs=1e-9)
         numbers = plan.numbers()
         for name, values in alone.numbers().items():
             np.testing.assert_allclose(numbers[name], values, rtol=1e-9, atol=1e-9, err_msg=name)

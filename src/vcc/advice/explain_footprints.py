@@ -94,7 +94,7 @@ def _memory(run: Drive) -> int:
 
 def _warnings(plan: Plan, core: Footprints) -> str:
     lines = []
-    if plan.missing_rays is not None and plan.missing_rays > 1e-3:
+    if plan.missing_rays > 1e-3:
         lines.append(f"  {plan.missing_rays:.1%} of the rays asked for are missing: {plan.missing_reason}")
     if plan.expected_ghosting > 1.5 * max(1.0, abs(core.row_step)):
         lines.append(

@@ -43,8 +43,8 @@ def trace(channels: int, by_cell: bool) -> Any:
     def kernel(field, sensor, points, aim, steps, pictures, tallies):  # type: ignore[no-untyped-def]
         """As `vcc.engines.ray_kernels.add_tile`, of which the arguments are, for all pixels.
 
-        pictures: (2, rows, columns, channels): what the two halves of a pixel's rays find. tallies: (rows, columns),
-            how many they are.
+        pictures: (2, rows, columns, channels): what the two halves of a pixel's rays find.
+        tallies: (rows, columns), how many they are.
         """
         x0, y0 = cuda.grid(2)
         wide, high = cuda.gridsize(2)
@@ -131,7 +131,7 @@ def look_up(field, samples, rays, found):  # type: ignore[no-untyped-def]
 
 @cuda.jit
 def put_together(pictures, tallies, rows):  # type: ignore[no-untyped-def]
-    """Of the two halves their sum and twice their difference; rows[r]: how many rays of a row of pixels there are."""
+    """Of the two halves their sum and twice their difference; rows[r]: how many rays a row of pixels has."""
     y = cuda.grid(1)
     _, high, wide, channels = pictures.shape
     for row in range(y, high, cuda.gridsize(1)):

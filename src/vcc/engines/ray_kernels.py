@@ -591,7 +591,7 @@ def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type:
 def add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """As `add_tile`, within what `room` gives.
 
-    ``sums``: of a packet, in single precision, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
+    ``sums``: of a packet, in single precision, and of a pixel, (2, lanes) each; and the rays traced, (1,).
     """
     table, samples, beside, seed = points
     cells = aim.cells

@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 RAYS = 2**16
 """Evenly spread over the sensor and over what bounds the light: shares are right to 0.1 %."""
 BORDER = 1e-6
-"""Of a cell or a sample, by which rays may pass the border: what is as wide as the grid of views misses nothing."""
+"""Of a cell or a sample, by which rays may pass the border: a stop as wide as the grid of views misses nothing."""
 WORTH_SAYING = 1e-3
 """Share of the light from which on a reason names what cuts it."""
 
@@ -50,15 +50,15 @@ class Missing(Brief):
     reason: str
 
     @classmethod
-    def of(cls, asked: float, in_views: float, held: float, stop: str) -> Missing:
-        """From amounts of light: all, that within the grid of views, and that within views' pictures, too.
+    def of(cls, amounts: Array, stop: str) -> Missing:
+        """From amounts of light.
 
         Args:
-            asked: in any unit.
-            in_views: likewise.
-            held: likewise.
+            amounts: all that is asked for, what of it is within the grid of views, and what of that is within the
+                views' pictures, in any unit.
             stop: what bounds the light.
         """
+        asked, in_views, held = map(float, amounts)
         if asked <= 0:
             return cls(0.0, "")
         outside_views, outside_pictures = (asked - in_views) / asked, (in_views - held) / asked
@@ -113,9 +113,10 @@ class AskedLight(Brief):
         """What of it the light field lacks."""
         if self.aimed is None or self._bounds_are_held():
             return Missing(0.0, "")
-        (index, share), (in_views, in_pictures) = self._traced, self._held
+        (_, share), (in_views, in_pictures) = self._traced, self._held
         share = share * in_views if self.by_views else share
-        return self._missing(share, in_views, in_pictures)
+        amounts = np.array([share.sum(), share[in_views].sum(), share[in_views & in_pictures].sum()])
+        return Missing.of(amounts, self._stop)
 
     def missing_with(self, number: int, cells: Sequence[Cells]) -> list[Missing]:
         """The same with other cells of one size in a mask, whose own are all open, of optics that are affine.
@@ -139,14 +140,8 @@ class AskedLight(Brief):
             for part in (np.ones(len(share)), in_views, in_views & in_pictures)
         )
         asked = viewed if self.by_views else asked
-        return [
-            Missing.of(*(float(amount @ each.values.ravel()) for amount in (asked, viewed, held)), self._stop)
-            for each in cells
-        ]
-
-    def _missing(self, share: Array, in_views: NDArray[np.bool_], in_pictures: NDArray[np.bool_]) -> Missing:
-        amounts = (share.sum(), share[in_views].sum(), share[in_views & in_pictures].sum())
-        return Missing.of(*map(float, amounts), self._stop)
+        amounts = np.stack([asked, viewed, held])
+        return [Missing.of(amounts @ each.values.ravel(), self._stop) for each in cells]
 
     @cached_property
     def _core(self) -> Rays:
@@ -155,6 +150,7 @@ class AskedLight(Brief):
         sensor, path = self.path.train.sensor, self.path
         steps, index_from_ray = steps_met(path, self.aimed, [], coarse=True)
         height, width = sensor.size
+        nv, nu, nt, ns = path.grid.shape[:4]
         return Rays(
             raster_shape=(1, 1),
             first_pixel=sensor.decentre,
@@ -165,7 +161,7 @@ class AskedLight(Brief):
             index_from_ray=index_from_ray,
             motion=np.zeros((2, 2)),
             between_views=False,
-            views=path.grid.shape[:4],
+            views=(nv, nu, nt, ns),
             scale=1.0,
             samples=RAYS,
             seed=0,
@@ -189,7 +185,7 @@ class AskedLight(Brief):
         """Which rays fall into the grid of views, and which into the views' pictures."""
         index, size = self._traced[0], self.path.size
         inside = np.abs(index - (size - 1) / 2) <= size / 2 + BORDER
-        return inside[:, :2].all(axis=1), inside[:, 2:].all(axis=1)
+        return np.asarray(inside[:, :2].all(axis=1)), np.asarray(inside[:, 2:].all(axis=1))
 
     def _bounds_are_held(self) -> bool:
         """Whether the light field holds all light, by bounds of it that are quickly found."""

@@ -28,8 +28,10 @@ from vcc.optics.faces import Element
 from vcc.optics.mask import Mask
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
+from vcc.plan.footprints.aperture import Aperture
 from vcc.plan.footprints.mask_textures import mask_as_met
 from vcc.plan.footprints.planes import Plane, depends_on_view_only
+from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.shapes.patterns import Pattern
 
 Field = TypeVar("Field", bound=InMemory)
@@ -116,12 +118,11 @@ def _weights(
     """What a pattern lets pass of view (j, i): a number where it tells views apart only, else (rows, columns)."""
     nv, nu, nt, ns = light_field.shape[:4]
     plane = Plane.met_by(light_field.frame, rays, pattern, decentre, "pattern")
-    index = np.stack(np.meshgrid(np.arange(float(nu)), np.arange(float(nv))), axis=-1)
-    still = np.zeros((2, 2))
+    views, still = Taps.of((nv, nu), CellDivision(1, False)), np.zeros((2, 2))
     if depends_on_view_only(plane, (nt, ns), still):
-        shares = plane.pattern.mean(*plane.boxes(index, np.zeros_like(index), still, (nt, ns)))
+        shares = Aperture([plane], views, still, (nt, ns)).open_shares()
         return lambda j, i: shares[j, i]
-    lookup, _ = mask_as_met(plane, index, np.zeros_like(index), still, (nt, ns), divide=1, fine=1)
+    lookup, _ = mask_as_met(plane, views, np.zeros_like(views.index), still, (nt, ns), fine=1)
     k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
     # A texture that makes up for being looked up by splines may pass 0 beside an edge; light does not.
     return lambda j, i: np.maximum(lookup.weights(j, i, k, l), 0.0)

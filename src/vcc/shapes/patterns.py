@@ -306,8 +306,8 @@ class Polygon(Pattern):
     def _integral(self, x: Array, y: Array) -> Array:
         """Area of the polygon left of x and above y.
 
-        By Green's theorem it is ∮ min(x(b), x) db around what lies above y: less x·∮ db = 0, −∮ max(x − x(b), 0) db,
-        side by side a mean of what is linear where it is above 0, times the side's height.
+        By Green's theorem it is ∮ min(x(b), x) db around what lies above y: less x·∮ db = 0,
+        −∮ max(x − x(b), 0) db, side by side a mean of what is linear where it is above 0, times the side's height.
         """
         angle = self.rotation + 2 * math.pi * np.arange(self.sides + 1) / self.sides
         a, b = self.diameter / 2 * np.cos(angle), self.diameter / 2 * np.sin(angle)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import product
 from typing import NamedTuple
 
@@ -10,12 +11,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+ALIKE = 1e-6
+"""Coverings whose spreads differ by less, as a share, are equally compact."""
 ROUNDING = 1e-9
 """Of a cell's area: a second rectangle below it is rounding."""
 
 
 class Tile(NamedTuple):
-    """A rectangle of a cell: its middle from that of the cell, its size, and its share of the cell's area."""
+    """A rectangle of a cell: its middle from that of the cell, its size, and its weight in the cell's mean."""
 
     x: float
     y: float
@@ -25,17 +28,27 @@ class Tile(NamedTuple):
 
 
 def tiles_of(step: Array) -> tuple[Tile, ...]:
-    """One rectangle, or two, whose copies at all points of a lattice cover the plane once.
+    """Rectangles, weighted, whose copies at all points of a lattice cover the plane evenly.
 
     Two vectors (a, b) and (−c, d) of the lattice, none of a, b, c, d below 0, have cells of area a·d + b·c: a
     rectangle of a×d and one of c×b side by side, as squares on the sides of a right-angled triangle tile the plane
-    (the Pythagorean tiling). So means over cells of any lattice can be had from means over rectangles, and their sum
-    over the plane is exact. Their common middle is that of the cell.
+    (the Pythagorean tiling). So means over cells of any lattice can be had from means over rectangles, and their
+    sum over the plane is exact. The smaller one may stand on either side of the larger: it stands on both, with
+    half its weight, so that cameras and their mirror images are treated alike.
 
     Args:
         step: 2×2, the vectors of the lattice as columns, linearly independent.
     """
-    return min(_coverings(_reduced(np.asarray(step, dtype=np.float64))), key=_spread)
+    coverings = _coverings(_reduced(np.asarray(step, dtype=np.float64)))
+    spreads = np.array([_spread(tiles) for tiles in coverings])
+    best = [
+        tiles for tiles, spread in zip(coverings, spreads, strict=True) if spread <= spreads.min() * (1 + ALIKE)
+    ]
+    weights: dict[tuple[float, float, float, float], float] = {}  # of equal ones, such as of squares turned by 45 degrees, all
+    for tile in (tile for tiles in best for tile in tiles):
+        place = next((one for one in weights if np.allclose(one, tile[:4], atol=ALIKE * tile.width)), tile[:4])
+        weights[place] = weights.get(place, 0.0) + tile.share / len(best)
+    return tuple(Tile(*place, share) for place, share in weights.items())
 
 
 def _reduced(step: Array) -> Array:
@@ -52,7 +65,7 @@ def _reduced(step: Array) -> Array:
 
 def _coverings(step: Array) -> list[tuple[Tile, ...]]:
     """The coverings by all pairs of short vectors of a lattice that lie as `tiles_of` wants them."""
-    found = []
+    found: list[tuple[Tile, ...]] = []
     for mixed in product((-1.0, 0.0, 1.0), repeat=4):
         change = np.array(mixed).reshape(2, 2)
         if abs(round(np.linalg.det(change))) != 1:
@@ -62,22 +75,20 @@ def _coverings(step: Array) -> list[tuple[Tile, ...]]:
         if a <= 0 or d <= 0 or b * c > rounding:
             continue
         if b * c >= -rounding:
-            corners = [(0.0, 0.0, a, d)]
-        elif b > 0:
-            corners = [(0.0, 0.0, a, d), (a, 0.0, -c, b)]
-        else:  # the mirror image
-            corners = [(0.0, -d, a, d), (a, b, c, -b)]
-        found.append(_about_their_middle(np.array(corners)))
+            found.append((Tile(0.0, 0.0, float(a), float(d), 1.0),))
+            continue
+        area = a * d - b * c
+        large = Tile(0.0, 0.0, float(a), float(d), float(a * d / area))
+        # To the right and below, flush with a corner; (c, d) leads from one to the other.
+        beside = np.array([a + abs(c), math.copysign(1, b) * (abs(b) - d)]) / 2
+        below = np.array([math.copysign(1, b) * (a - abs(c)), d + abs(b)]) / 2
+        for x, y in (beside, below):
+            half = [
+                Tile(float(s * x), float(s * y), float(abs(c)), float(abs(b)), float(-b * c / area / 2))
+                for s in (-1, 1)
+            ]
+            found.append((large, *half))
     return found
-
-
-def _about_their_middle(corners: Array) -> tuple[Tile, ...]:
-    """Tiles from rows of (left, top, width, height)."""
-    size = corners[:, 2:]
-    share = size.prod(axis=1) / size.prod(axis=1).sum()
-    middle = corners[:, :2] + size / 2
-    middle = middle - share @ middle
-    return tuple(Tile(*map(float, row)) for row in np.column_stack([middle, size, share]))
 
 
 def _spread(tiles: tuple[Tile, ...]) -> float:

@@ -162,7 +162,7 @@ class _Cells(Brief):
         return len(self.aperture.planes) == 1 and len(self.whole(0)) == 1
 
     def open_shares(self, shares: Array | None = None) -> Array:
-        """The open share of each cell, (rows, columns); ``shares`` are the product of `parts` where it is known."""
+        """The open share of each cell, (rows, columns); ``shares``: the product of `parts` where it is known."""
         if self.closed:
             return self._means(0, self.whole(0), self._of_cells(0))
         return np.asarray((_product(self.parts()) if shares is None else shares).mean(axis=(2, 3)))

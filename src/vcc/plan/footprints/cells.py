@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,7 @@ from vcc.base.describe import Brief
 from vcc.plan.footprints.detail import detail_lost
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision
-from vcc.plan.footprints.together import Looks
+from vcc.plan.footprints.together import Apart, Looks
 from vcc.plan.how import LARGEST_REFINEMENT
 from vcc.plan.parallax_rule import BetweenViews
 from vcc.shapes.sheets import clear_over, dark_over
@@ -22,15 +21,15 @@ Array = NDArray[np.float64]
 
 ERROR = 1e-3
 """Error, as a share of the light, that masks may make within parts of cells and of samples: 60 dB."""
-FINE_DETAIL_IN_VIEW = 0.15
+FINE_DETAIL_IN_VIEW = 0.04
 """Variance of a mask, of its mean squared, that may vanish inside the cell of a view before cells are divided."""
 LARGEST_CHOSEN_DIVISION = 4
 """Beyond this a plan divides cells of views only when told to: the cost grows with the square."""
 SPILT = 0.25
-"""Of the light that a mask cuts off within a finer sample as wide as a pixel, how much falls on the wrong one."""
+"""Of the light that a mask cuts off within a finer sample as wide as a pixel, the share on the wrong one."""
 MISPLACED = 0.1
-"""The error that a mask makes which cuts the cell of a view, where the cell's pictures lie a pixel apart on the sensor
-and the shadow of an edge is as wide: as a share of what it cuts off. Measured on 24 random cameras, 0.04 to 0.13."""
+"""Error of a mask that cuts the cell of a view, as a share of what it cuts off, where the cell's pictures lie a
+pixel apart on the sensor and the shadow of an edge is as wide. Measured on 24 random cameras: 0.04 to 0.13."""
 
 
 class Detail:
@@ -40,9 +39,9 @@ class Detail:
         """See `detail_lost`."""
         return detail_lost(plane, known, added)
 
-    def together(self, looks: Looks) -> Callable[[int], float]:
-        """See `Looks.error`."""
-        return looks.error()
+    def together(self, looks: Looks) -> Apart:
+        """See `Looks.apart`."""
+        return looks.apart()
 
 
 DETAIL = Detail()
@@ -80,15 +79,29 @@ class Geometry(Brief):
         centre = view @ by_view.T + by_sample @ middle + plane.offset
         half = np.abs(by_view).sum(axis=1) / 2 + np.abs(by_sample) @ np.array([ns, nt]) / 2
         low, high = centre - half, centre + half
-        step = self.on_sensor[:, 2:]
-        if abs(np.linalg.det(step)) > 1e-12 * np.abs(step).max() ** 2:
-            by_pixel = by_sample @ np.linalg.inv(step)
+        by_pixel = self._by_pixel(plane)
+        if by_pixel is not None:
             by_view = by_view - by_pixel @ self.on_sensor[:, :2]
             pixels = np.array(self.sensor[::-1])
             centre = view @ by_view.T + by_pixel @ ((pixels - 1) / 2 - self.origin) + plane.offset
             half = np.abs(by_view).sum(axis=1) / 2 + np.abs(by_pixel) @ (pixels / 2 + self.margin)
             low, high = np.maximum(low, centre - half), np.minimum(high, centre + half)
         return low, np.maximum(low, high)
+
+    def penumbra(self, plane: Plane) -> Array:
+        """Size (x, y) of what of a plane a place of the sensor sees through all views, metres."""
+        by_pixel = self._by_pixel(plane)
+        by_view = plane.at_index[:, :2]
+        if by_pixel is not None:
+            by_view = by_view - by_pixel @ self.on_sensor[:, :2]
+        return np.asarray(np.abs(by_view) @ np.array(self.extent[::-1]))
+
+    def _by_pixel(self, plane: Plane) -> Array | None:
+        """2×2: metres on a plane per pixel of the sensor, within a view; None where a view is one place there."""
+        step = self.on_sensor[:, 2:]
+        if abs(np.linalg.det(step)) <= 1e-12 * np.abs(step).max() ** 2:
+            return None
+        return np.asarray(plane.sample_step @ np.linalg.inv(step))
 
     def varying(self, planes: list[Plane]) -> NDArray[np.bool_]:
         """In which views any of some planes is neither clear nor dark throughout, (v, u)."""
@@ -131,9 +144,10 @@ def divide_views(
             parts *= 2
     spread = parts > 1
     groups = [view_planes] * bool(view_planes) + [[plane] for plane in path_planes]
-    where, error = _together(groups, geometry), _no_error
-    if where.any():
-        error = detail.together(
+    where = _together(groups, geometry)
+    apart = Apart(_no_error, 0.0)
+    if len(groups) > 1:  # even where no view of this piece needs it: all pieces of a light field are divided alike
+        apart = detail.together(
             Looks.of(
                 groups,
                 bool(view_planes),
@@ -145,13 +159,13 @@ def divide_views(
         )
     misplaced = max((_misplaced(plane, between, geometry, detail) for plane in path_planes), default=0.0)
     if misplaced > ERROR:
-        where = where | geometry.varying(path_planes)
-    if not where.any():
-        return CellDivision(parts, spread)
-    most = LARGEST_CHOSEN_DIVISION if refine == "auto" else max(LARGEST_CHOSEN_DIVISION, int(refine))
+        where, apart = where | geometry.varying(path_planes), apart._replace(share=1.0)
+    # Where few cells are to be divided, they may be divided further for as many taps.
+    most = 2 * LARGEST_CHOSEN_DIVISION if 0 < 4 * apart.share <= 1 and not spread else LARGEST_CHOSEN_DIVISION
+    most = most if refine == "auto" else max(most, int(refine))
 
     def left(finer: int) -> float:
-        return max(error(finer), misplaced / finer**1.5)
+        return float(max(apart.error(finer), misplaced / finer**1.5))
 
     finer = parts
     while finer < most and left(finer) > ERROR:
@@ -191,8 +205,8 @@ def _cell(plane: Plane, between: BetweenViews) -> Array:
 
 def divide_samples(
     planes: list[Plane],
-    between: BetweenViews,
     geometry: Geometry,
+    views: CellDivision,
     refine: int | str,
     detail: Detail = DETAIL,
 ) -> tuple[int, float]:
@@ -203,8 +217,8 @@ def divide_samples(
 
     Args:
         planes: of masks in mid-path.
-        between: what is between views.
         geometry: of the samples.
+        views: how their cells are divided.
         refine: "auto", or what was asked for.
         detail: what is found of the patterns.
 
@@ -214,13 +228,15 @@ def divide_samples(
     size = float(np.abs(geometry.on_sensor[:, 2:]).sum(axis=1).max())
 
     def error(plane: Plane, parts: int) -> float:
-        penumbra = np.abs(plane.view_step(between.motion)) @ np.array(geometry.extent[::-1])
         sample = np.abs(plane.sample_step).sum(axis=1) / parts
-        return SPILT * math.sqrt(max(detail.lost(plane, penumbra, sample), 0.0)) * size / parts
+        lost = detail.lost(plane, geometry.penumbra(plane), sample)
+        return SPILT * math.sqrt(max(lost, 0.0)) * size / parts
 
     if refine == 1 or not planes:
         return 1, 0.0
     fine, most = (1, LARGEST_REFINEMENT) if refine == "auto" else (int(refine), int(refine))
+    if refine == "auto" and views.finer >= LARGEST_CHOSEN_DIVISION:  # parts of cells times parts of samples cost
+        most = LARGEST_CHOSEN_DIVISION
     for plane in planes:
         while fine < most and error(plane, fine) > ERROR:
             fine *= 2

@@ -7,7 +7,7 @@ cells. Those of a mask in mid-path decide its texture, and how finely cells of v
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -25,7 +25,7 @@ from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.footprints.mixtures import Mixture, of_cells, of_views
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane
-from vcc.plan.footprints.together import Looks
+from vcc.plan.footprints.together import Apart, Looks
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.shapes.mean_back import holds
@@ -78,7 +78,7 @@ class Codes(Brief):
         return cls(first, Train(elements, first.sensor), opened, listed, number)
 
     def plans(self, grid: Grid, how: How) -> list[Plan] | None:
-        """The plan of each camera, but for what its light field lacks; None where each has to be made by itself."""
+        """The plan of each camera, but for the light it lacks; None where each has to be made by itself."""
         one = self._at_views(grid, how)
         return None if one is None else [self._plan(one, each) for each in self.cells]
 
@@ -193,14 +193,14 @@ class _OneOfMany(Detail):
     def lost(self, plane: Plane, known: Array, added: Array) -> float:
         return float(self._details.lost(plane, known, added)[self._number])
 
-    def together(self, looks: Looks) -> Callable[[int], float]:
+    def together(self, looks: Looks) -> Apart:
         own = self._details.plane
         values = [looks.values(n) for n in range(len(looks.groups))]
         place = next(n for n, group in enumerate(looks.groups) if any(plane is own for plane in group))
         assert isinstance(own.pattern, Cells)
         cells = replace(own.pattern, values=self._details.cells[self._number])
         values[place] = cells(*np.moveaxis(looks.places[place][0], -1, 0))
-        return looks.error(values)
+        return looks.apart(values)
 
 
 def exchanged(pattern: Pattern, old: Cells, new: Cells) -> Pattern:

@@ -121,7 +121,7 @@ class InPath(Brief):
         """Whether the same would have been decided of other patterns of the same size; see `divide_views`."""
         division = divide_views(self.at_views, self.planes, self.between, self.geometry, how.refine, detail)
         own, fine = self.divided
-        samples, _ = divide_samples(self.planes, self.between, self.geometry, how.refine, detail)
+        samples, _ = divide_samples(self.planes, self.geometry, division, how.refine, detail)
         return division.like(own) and fine == samples
 
 
@@ -156,8 +156,9 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
     view_planes = [plane for plane, so in zip(planes, at_views, strict=True) if so]
     path_planes = [plane for plane, so in zip(planes, at_views, strict=True) if not so]
 
+    views = (grid.shape[0], grid.shape[1])
     geometry = Geometry(
-        grid.shape[:2], grid.extent, samples, on_sensor, origin, sensor.shape, MARGIN + max(between.gap_filled)
+        views, grid.extent, samples, on_sensor, origin, sensor.shape, MARGIN + max(between.gap_filled)
     )
     division = decisions.keep(
         "parts of views' cells",
@@ -166,10 +167,10 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
     )
     fine, spilt = decisions.keep(
         "parts of samples",
-        lambda: divide_samples(path_planes, between, geometry, how.refine),
+        lambda: divide_samples(path_planes, geometry, division, how.refine),
         lambda one, other: one[0] == other[0],
     )
-    taps = Taps.of(grid.shape[:2], division)
+    taps = Taps.of(views, division)
     aperture = Aperture(view_planes, taps, between.motion, samples, decisions)
     parts = decisions.made(
         "what is open of views",

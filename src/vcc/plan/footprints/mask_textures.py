@@ -57,8 +57,8 @@ class Footing(Brief):
     """How a mask is averaged over the footprints of samples in taps of one level.
 
     A footprint is a parallelogram of the cell of a view's part, and of a sample's: a mean along four sides. Where
-    all lie along the axes that is a mean over two boxes, of which the wider one is taken by the pattern's own means
-    and the other by filters of the texture. Where they do not, all is done by a filter.
+    all lie along the axes that is a mean over two boxes: the wider one is taken by the pattern's own means, the
+    other by filters of the texture. Where they do not, all is done by a filter.
 
     Args:
         by_views: along (x, y), whether the box of a view's part is the wider one; None where sides are turned.
@@ -122,7 +122,8 @@ def mask_as_met(
     place = tap_origin(plane.at_index, plane.offset, taps.index, taps.shift + off_middle, motion)
     sample_sides = plane.sample_step / fine * over_samples
     sides = [np.hstack([plane.view_step(motion) / parts, sample_sides]) for _, parts in taps.levels()]
-    lattice = _lattice(place, plane, taps, samples, sides, decisions)
+    finest = np.hstack([plane.view_step(motion) / taps.parts[-1], sample_sides])
+    lattice = _lattice(place, plane, taps, samples, sides, finest, decisions)
     spacing = lattice.spacing
     texture = decisions.made(
         "texture",
@@ -158,6 +159,7 @@ def _lattice(
     taps: Taps,
     samples: tuple[int, int],
     sides: list[Array],
+    finest: Array,
     decisions: Decisions,
 ) -> Lattice:
     """The lattice of a mask's texture: one, whatever part of it is needed: pieces of a light field read alike.
@@ -168,9 +170,10 @@ def _lattice(
         taps: of the plan.
         samples: (rows, columns) of a view.
         sides: of the footprints of samples in taps of each level, (2, 4): of a view's part, and of a sample.
+        finest: those of the finest level, which a piece of a light field may lack.
         decisions: the lattice is kept, with room around what is read.
     """
-    footprint = [np.sqrt((each**2).sum(axis=1)) for each in sides]
+    footprint = [np.sqrt((each**2).sum(axis=1)) for each in (*sides, finest)]
     bound = np.array(plane.pattern.size) / 2 + np.max(footprint, axis=0)
     region = _region(place, plane.sample_step, samples, bound)
 
@@ -181,7 +184,7 @@ def _lattice(
     def decided() -> Lattice:
         low, high = region
         room = ROOM * decisions.lasting
-        spacing = _spacing(np.min(footprint, axis=0), np.minimum(2 * bound, high - low))
+        spacing = _spacing(footprint[-1], np.minimum(2 * bound, high - low))
         low, high = (
             np.maximum(low - room * (high - low), -(1 + room) * bound),
             np.minimum(high + room * (high - low), (1 + room) * bound),
@@ -396,7 +399,7 @@ class _Averaging(Brief):
         # Filters are symmetric: a mean counts in all points that its own filter reaches.
         beside = [(n // 2,) * 2 for n in _reach(self.filters)]
         wide = np.pad(weights, [(2 * low, 2 * high) for low, high in beside])
-        means = _filtered(wide, self.filters)
+        means = np.asarray(_filtered(wide, self.filters), dtype=np.float64)
         total = np.zeros(cells.values.shape)
         for n, some in enumerate(_rows_at_once(self.y.size, self.x.size)):
             boxes = Boxes(self.x[None, :], self.y[some, None], *self.size)
@@ -404,9 +407,9 @@ class _Averaging(Brief):
         return total
 
 
-def _reach(filters: tuple[Array, ...]) -> tuple[int, int]:
+def _reach(filters: tuple[Array, ...]) -> tuple[int, ...]:
     """(rows, columns) of what filters take together."""
-    return filters[0].shape if len(filters) == 1 else (len(filters[1]), len(filters[0]))  # type: ignore[return-value]
+    return filters[0].shape if len(filters) == 1 else (len(filters[1]), len(filters[0]))
 
 
 def _rows_at_once(rows: int, columns: int) -> list[NDArray[np.int64]]:

@@ -23,7 +23,7 @@ class CellDivision:
         parts: of each, along each axis.
         spread: whether a view's light reaches its neighbours, as a tent, for a place between views is interpolated
             from both; else it stays in its own cell.
-        finer: parts of the cells of some views, where several elements vary together; as many as ``parts`` for none.
+        finer: parts of the cells of some views, where several elements vary together; ``parts`` for none.
         where: these views, (v, u).
         error: the error that elements varying together within parts of cells may leave, a share of the light.
     """
@@ -71,7 +71,8 @@ class Taps(Brief):
     def of(cls, views: tuple[int, int], division: CellDivision) -> Taps:
         """The taps of a grid of (rows, columns) of views."""
         (rows, down, row_share, row_level), (columns, across, column_share, column_level) = (
-            _along(count, division, division.where.any(axis=1 - axis)) for axis, count in enumerate(views)
+            _along(count, division, np.asarray(division.where.any(axis=1 - axis)))
+            for axis, count in enumerate(views)
         )
         index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
         shift = np.stack(np.broadcast_arrays(across[None, :], down[:, None]), axis=-1)

@@ -1,8 +1,8 @@
 """Elements in different planes that vary together inside the cell of a view: what it costs to take them apart.
 
-The mean of a product is not the product of the means. How far they differ is found by looking: at some places of the
-sensor, and through each of these at some places of the aperture, elements are looked at in points all over a cell.
-The places follow from the optics alone, so that a piece of a light field is treated as the whole is.
+The mean of a product is not the product of the means. How far they differ is found by looking: at some places of
+the sensor, and through each of these at some places of the aperture, elements are looked at in points all over a
+cell. The places follow from the optics alone, so that a piece of a light field is treated as the whole is.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from vcc.plan.footprints.planes import Plane
 
 Array = NDArray[np.float64]
 
-PIXELS, RAYS, POINTS = 12, 64, 8
-"""Places of the sensor, of the aperture behind each, and points each way across a cell."""
+PIXELS, RAYS, POINTS = 3, 32, 8
+"""Places of the sensor, of the aperture behind each, and points each way across a cell; besides mirror images."""
 HALVED = (0.25, 0.5)
 """By how much the error falls at least, and at most, where cells are divided once more."""
 LARGEST = 100
@@ -34,6 +34,18 @@ class _Map(NamedTuple):
     by_view: Array
     by_pixel: Array
     offset: Array
+
+
+class Apart(NamedTuple):
+    """What it costs to take elements apart that vary together.
+
+    Args:
+        error: by which a picture errs where cells are divided into so many parts each way, a share of its light.
+        share: of the rays, of those in whose cells several elements vary.
+    """
+
+    error: Callable[[int], float]
+    share: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,9 +86,9 @@ class Looks(Brief):
         """
         maps = [[_by_view_and_pixel(plane, on_sensor) for plane in group] for group in groups]
         rng = np.random.default_rng(0)
-        even = rng.random((PIXELS, RAYS, 2)) - 0.5
+        even = _and_mirrored(rng.random((PIXELS, RAYS, 2)) - 0.5)
         pixels = np.array(sensor[::-1])
-        pixel = (rng.random((PIXELS, 1, 2)) - 0.5) * pixels + (pixels - 1) / 2
+        pixel = _and_mirrored(rng.random((PIXELS, 1, 2)) - 0.5) * pixels + (pixels - 1) / 2
         every = [
             (plane, one)
             for group, each in zip(groups, maps, strict=True)
@@ -110,8 +122,8 @@ class Looks(Brief):
             start=np.ones(1),
         )
 
-    def error(self, values: list[Array] | None = None) -> Callable[[int], float]:
-        """By how much a picture errs where cells are divided into so many parts each way, a share of its light.
+    def apart(self, values: list[Array] | None = None) -> Apart:
+        """What taking the elements apart costs.
 
         Args:
             values: of all groups, where not their own: (..., pixels, rays, points, points).
@@ -119,7 +131,9 @@ class Looks(Brief):
         values = [self.values(n) for n in range(len(self.groups))] if values is None else values
         whole, half = (self._error(values, parts) for parts in (1, 2))
         ratio = float(np.clip(half / whole, *HALVED)) if whole > 0 else HALVED[0]
-        return lambda parts: whole if parts == 1 else half * ratio ** math.log2(parts / 2)
+        varying = sum(np.asarray(np.ptp(each, axis=(-2, -1)) > 0, dtype=int) for each in values)
+        share = float(np.mean(np.asarray(varying) > 1))
+        return Apart(lambda parts: whole if parts == 1 else half * ratio ** math.log2(parts / 2), share)
 
     def _error(self, values: list[Array], parts: int) -> float:
         each = POINTS // parts
@@ -146,6 +160,13 @@ def _linear(first: Array, means: list[Array], others: list[Array]) -> Array:
             rest = math.prod((m for k, m in enumerate(means[1:]) if k != n), start=np.ones(1))
             total += open_at * (other * along).mean(axis=(4, 5)) * rest
     return total
+
+
+def _and_mirrored(places: Array) -> Array:
+    """Places (n, …, 2), their mirror images, and all these with x and y exchanged: mirrored cameras are alike."""
+    signs = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+    mirrored = np.concatenate([places * sign for sign in signs])
+    return np.concatenate([mirrored, mirrored[..., ::-1]])
 
 
 def _by_view_and_pixel(plane: Plane, on_sensor: Array) -> _Map:

@@ -54,7 +54,7 @@ def notes_of(
     parts, finer = division.parts, division.finer
     if parts > 1:
         notes.append(f"cells of views divided {parts}×{parts}: a mask is finer than a view's cell")
-    if finer > parts:
+    if finer > parts and division.where.any():
         some, all_views = np.count_nonzero(division.where), division.where.size
         which = "all views" if some == all_views else f"{some} of {all_views} views"
         notes.append(f"cells of {which} divided {finer}×{finer}: elements in different planes vary together there")
@@ -68,8 +68,8 @@ def notes_of(
         notes.append(f"samples divided {fine}×{fine}: a mask near the sensor is finer than a sample")
     if spilt > ERROR:
         notes.append(
-            f"masks near the sensor are finer than these samples: an error of about {spilt:.1%} of the light beside "
-            "their edges"
+            f"masks near the sensor are finer than these samples: an error of about {spilt:.1%} of the light "
+            "beside their edges"
         )
     return tuple(notes)
 

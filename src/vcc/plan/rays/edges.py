@@ -139,7 +139,7 @@ def _edges(core: Rays, pixels: int) -> list[_Edge]:
             found.append(_Edge(n, words))
     index = core.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
     lit = rays.share > 0
-    inside = core.held(index)[0]
+    inside = core.inside(index)
     if (lit & ~inside).any():
         found.append(_Edge(len(core.steps), "the border of the views"))
     view = np.floor(index[lit & inside][:, :2] + 0.5)
