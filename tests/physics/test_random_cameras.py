@@ -14,8 +14,8 @@ from tests.physics.random_cameras import AFFINE, BENT, KINDS, drawn
 from tests.physics.random_tracer import Bench, Plane, Scene, Table
 from vcc.base.units import mm
 
-SLOW = {"stores"}
-"""Laws that take half a second a camera."""
+SLOW = {"stores", "refine"}
+"""Laws that take half a second a camera, or more."""
 
 
 def held(found: list[Check]) -> None:
@@ -97,6 +97,11 @@ def test_laws_hold(kind):
 @pytest.mark.parametrize("kind", ["two masks", "lenslets"])
 def test_stores_hold_what_memory_does(kind):
     held(list(LAWS["stores"](drawn(kind, 1, 14, 7))))
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("one mask", 5), ("two masks", 0), ("three masks", 1)])
+def test_asking_for_more_never_gives_less(kind, seed):
+    held(list(LAWS["refine"](drawn(kind, seed, 14))))
 
 
 @pytest.mark.parametrize("kind", AFFINE)

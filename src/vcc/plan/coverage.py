@@ -185,7 +185,10 @@ class AskedLight(Brief):
         """Which rays fall into the grid of views, and which into the views' pictures."""
         index, size = self._traced[0], self.path.size
         inside = np.abs(index - (size - 1) / 2) <= size / 2 + BORDER
-        return np.asarray(inside[:, :2].all(axis=1)), np.asarray(inside[:, 2:].all(axis=1))
+        in_views, in_pictures = (np.asarray(inside[:, some].all(axis=1)) for some in (slice(2), slice(2, 4)))
+        if not self.path.index_from_sensor.matrix[:2, 2:4].any():  # a pixel sees one view, whatever it shows
+            in_pictures = np.ones_like(in_pictures)
+        return in_views, in_pictures
 
     def _bounds_are_held(self) -> bool:
         """Whether the light field holds all light, by bounds of it that are quickly found."""

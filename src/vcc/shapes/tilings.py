@@ -44,7 +44,7 @@ def tiles_of(step: Array) -> tuple[Tile, ...]:
     best = [
         tiles for tiles, spread in zip(coverings, spreads, strict=True) if spread <= spreads.min() * (1 + ALIKE)
     ]
-    weights: dict[tuple[float, float, float, float], float] = {}  # of equal ones, such as of squares turned by 45 degrees, all
+    weights: dict[tuple[float, float, float, float], float] = {}  # of squares turned by 45 degrees, all
     for tile in (tile for tiles in best for tile in tiles):
         place = next((one for one in weights if np.allclose(one, tile[:4], atol=ALIKE * tile.width)), tile[:4])
         weights[place] = weights.get(place, 0.0) + tile.share / len(best)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.plan.footprints.detail import detail_lost
 from vcc.plan.footprints.planes import Plane
-from vcc.plan.footprints.taps import CellDivision
+from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.plan.footprints.together import Apart, Looks
 from vcc.plan.how import LARGEST_REFINEMENT
 from vcc.plan.parallax_rule import BetweenViews
@@ -70,21 +70,26 @@ class Geometry(Brief):
     sensor: tuple[int, int]
     margin: float
 
-    def met(self, plane: Plane) -> tuple[Array, Array]:
-        """The lowest and the highest place (x, y) at which the samples of each view meet a plane, (v, u, 2)."""
-        (rows, columns), (nt, ns) = self.views, self.samples
-        view = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(np.float64)
+    def met(self, plane: Plane, view: Array, parts: int = 1) -> tuple[Array, Array]:
+        """The lowest and the highest place (x, y) at which the samples of parts of views meet a plane.
+
+        Args:
+            plane: any.
+            view: (i, j) of the middles of the parts, (rows, columns, 2).
+            parts: of a view's cell, each way.
+        """
+        nt, ns = self.samples
         by_view, by_sample = plane.at_index[:, :2], plane.at_index[:, 2:]
         middle = np.array([(ns - 1) / 2, (nt - 1) / 2])
         centre = view @ by_view.T + by_sample @ middle + plane.offset
-        half = np.abs(by_view).sum(axis=1) / 2 + np.abs(by_sample) @ np.array([ns, nt]) / 2
+        half = np.abs(by_view).sum(axis=1) / 2 / parts + np.abs(by_sample) @ np.array([ns, nt]) / 2
         low, high = centre - half, centre + half
         by_pixel = self._by_pixel(plane)
         if by_pixel is not None:
             by_view = by_view - by_pixel @ self.on_sensor[:, :2]
             pixels = np.array(self.sensor[::-1])
             centre = view @ by_view.T + by_pixel @ ((pixels - 1) / 2 - self.origin) + plane.offset
-            half = np.abs(by_view).sum(axis=1) / 2 + np.abs(by_pixel) @ (pixels / 2 + self.margin)
+            half = np.abs(by_view).sum(axis=1) / 2 / parts + np.abs(by_pixel) @ (pixels / 2 + self.margin)
             low, high = np.maximum(low, centre - half), np.minimum(high, centre + half)
         return low, np.maximum(low, high)
 
@@ -105,11 +110,23 @@ class Geometry(Brief):
 
     def varying(self, planes: list[Plane]) -> NDArray[np.bool_]:
         """In which views any of some planes is neither clear nor dark throughout, (v, u)."""
+        rows, columns = self.views
+        view = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(np.float64)
         found = np.zeros(self.views, dtype=np.bool_)
         for plane in planes:
-            low, high = self.met(plane)
-            found |= ~(clear_over(plane.pattern, low, high) | dark_over(plane.pattern, low, high))
+            found |= self._varies(plane, view)
         return found
+
+    def varying_taps(self, plane: Plane, taps: Taps) -> NDArray[np.bool_]:
+        """In the cells of which taps a plane is neither clear nor dark throughout, (rows, columns)."""
+        found = np.zeros(taps.shares.shape, dtype=np.bool_)
+        for mesh, parts in taps.levels():
+            found[mesh] = self._varies(plane, (taps.index + taps.shift)[mesh], parts)
+        return found
+
+    def _varies(self, plane: Plane, view: Array, parts: int = 1) -> NDArray[np.bool_]:
+        low, high = self.met(plane, view, parts)
+        return np.asarray(~(clear_over(plane.pattern, low, high) | dark_over(plane.pattern, low, high)))
 
 
 def divide_views(

@@ -188,7 +188,7 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         mask_as_met(
             plane,
             kept_taps,
-            off_middle,
+            off_middle * _varying(geometry, plane, kept_taps, decisions.of(mask_in_path(n)))[..., None],
             between.motion,
             samples,
             fine,
@@ -239,6 +239,14 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
     as_met = replace(aperture, taps=kept_taps)
     in_path = InPath(view_planes, path_planes, tuple(kept for _, kept in met), between, geometry, (division, fine))
     return Compiled(plan, as_met, kept_taps.shares, alone, in_path)
+
+
+def _varying(geometry: Geometry, plane: Plane, taps: Taps, decisions: Decisions) -> NDArray[np.bool_]:
+    """Taps in whose cells a mask varies, (rows, columns): elsewhere it does not matter which part of a cell is open.
+
+    Moved to the middle of the open part, a cell would reach over an edge that does not cross it.
+    """
+    return decisions.keep("cells in which it varies", lambda: geometry.varying_taps(plane, taps), np.array_equal)
 
 
 @dataclass(frozen=True, eq=False)
