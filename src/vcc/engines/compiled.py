@@ -8,8 +8,8 @@ An index of what there is and the code itself are two files, and many processes 
 in each other's way, which has crashed programs (numba issues 4807 and 10128): they take turns.
 
 Numba stamps kept code by the file that its function stands in. Functions that it calls, constants and types of
-other files are compiled into the same code: here the stamp covers every file of ours from which the function's file
-imports, and those from which these import.
+other files are compiled into the same code: here the stamp covers every file of ours from which the function's
+file imports, and those from which these import.
 """
 
 from __future__ import annotations

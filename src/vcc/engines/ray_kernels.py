@@ -571,27 +571,17 @@ def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ign
         flipped[n] = hashed(number, seed + 1 + n) >> np.uint32(32 - DIGITS)
 
 
-@_allocating
-def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type: ignore[no-untyped-def]
+@_compiled
+def add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
 
     The first picture is what all of a pixel's rays find, the second what its two halves differ by. Once
-    ``ended[0]`` is true, nobody wants them, and the kernel returns.
+    ``ended[0]`` is true, nobody wants them, and the kernel returns. It is called from Python as it is:
+    a kernel around it that made the arrays took a third of the time to compile.
 
-    Returns:
-        (1,): how many rays were traced.
-    """
-    lanes = max(field.samples.channels, LANES)
-    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(1, np.int64)
-    add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, room(), sums)
-    return sums[2]
-
-
-@_compiled
-def add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
-    """As `add_tile`, within what `room` gives.
-
-    ``sums``: of a packet, in single precision, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
+    Args:
+        within: as what `room` makes.
+        sums: of a packet, float32, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
     """
     table, samples, beside, seed = points
     cells = aim.cells
