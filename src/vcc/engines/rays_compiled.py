@@ -46,7 +46,22 @@ def traced(
     tiles = [tables.Tile(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)]
     rays = 0
     with Workers(threads) as pool:
-        add = partial(_tile, light_field(core, values, channels), *given(core, beside), pool.ended, pictures)
+        sensor, points, aim, steps = given(core, beside)
+        # Numba leaves out branches by what is None.
+        cells = aim.cells if aim.by_cell else None
+        rare = None if kernels.FEW.issuperset(steps.codes.tolist()) else True
+        add = partial(
+            _tile,
+            light_field(core, values, channels),
+            sensor,
+            points,
+            aim.window,
+            cells,
+            steps,
+            rare,
+            pool.ended,
+            pictures,
+        )
         for done, part in enumerate(pool.map(add, tiles), start=1):
             rays += part
             tell(progress, done, len(tiles))
