@@ -1,7 +1,9 @@
 """Kernels work where their machine code cannot be kept, and where what is kept is damaged."""
 
 import importlib.util
+import sys
 import tempfile
+import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -56,6 +58,56 @@ def test_code_is_kept_beside_its_source_and_read_again(loaded: Load, tmp_path: P
     assert list((tmp_path / "__pycache__").glob("kernel.doubled*.nbc"))
     assert second(21) == 42
     assert (was_read(first), was_read(second)) == (False, True)
+
+
+@pytest.mark.parametrize("changed", ["called", "constants"])
+def test_code_is_compiled_again_where_another_file_of_its_package_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str
+) -> None:
+    """Before, only a kernel's own file counted: old code went on being used, its callees' included."""
+    header = "from vcc.engines.compiled import compiled\n"
+    files = {
+        "kernel": f"{header}from of_a_test.called import times\n\n"
+        "@compiled()\ndef made(x):\n    return times(x)\n",
+        "called": f"{header}from of_a_test import (  # in lines\n    constants,\n)\nBY = constants.BY\n\n"
+        "@compiled()\ndef times(x):\n    return BY * x\n",
+        "constants": "BY = 3\n",
+        "beside": "BY = 5\n",
+    }
+    instead = {"called": files["called"].replace("BY * x", "BY * x + 10"), "constants": "BY = 4\n"}
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.syspath_prepend(tmp_path)
+    folder = tmp_path / "of_a_test"
+    folder.mkdir()
+    for name, text in files.items():
+        (folder / f"{name}.py").write_text(text)
+
+    def load() -> Any:
+        for name in [name for name in sys.modules if name.partition(".")[0] == "of_a_test"]:
+            del sys.modules[name]
+        importlib.invalidate_caches()
+        return importlib.import_module("of_a_test.kernel").made
+
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python's own cache has seconds for stamps
+    assert load()(2) == 6
+    (folder / "beside.py").write_text("BY = 6\n")  # which nobody imports
+    again = load()
+    assert again(2) == 6
+    assert was_read(again)
+    (folder / f"{changed}.py").write_text(instead[changed])
+    assert load()(2) == (16 if changed == "called" else 8)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "of_a_test"]:
+        del sys.modules[name]
+
+
+def test_stamps_cost_little() -> None:
+    """All of the package's kernels are stamped when they are imported: a few milliseconds."""
+    from vcc.engines import ray_number_kernels
+
+    compiled._read.cache_clear()
+    start = time.process_time()
+    compiled._sources(ray_number_kernels.__name__, ray_number_kernels.__file__)
+    assert time.process_time() - start < 0.05  # it takes 0.004 s
 
 
 def test_where_no_code_can_be_kept_it_is_compiled_and_that_is_said_once(loaded: Load, tmp_path: Path) -> None:

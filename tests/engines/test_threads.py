@@ -79,12 +79,12 @@ def test_compiled_rays_end_within_a_tile_once_nobody_wants_them(monkeypatch):
         assert (pictures[:, :3, :3] != -1).all()
         return found[0]
 
-    tile, found, add_tile = Tile(0, 3, 0, 3), [], rays_compiled.kernels.add_tile
-    monkeypatch.setattr(rays_compiled.kernels, "add_tile", kernel)
+    tile, found, add_tile = Tile(0, 3, 0, 3), [], rays_compiled._tile
+    monkeypatch.setattr(rays_compiled, "_tile", kernel)
     lf = field()
     plan = vcc.Camera([LENS], vcc.Sensor(z=52 * mm, shape=(4, 4), pitch=1 * mm)).compile(
         lf, method="rays", samples=8
     )
     drive(plan, lf, How(threads=1))
-    assert found[0].tolist() == [0, 0, 0]
-    assert found[1][0] > 0
+    assert found[0] == 0
+    assert found[1] > 0

@@ -131,7 +131,7 @@ def brute_force(case: Case) -> Iterator[Check]:
 
 
 def refined(case: Case) -> Iterator[Check]:
-    """Asking for more never gives less: with ``refine=8`` pictures are as near to the truth, or within the target."""
+    """Asking for more never gives less: with ``refine=8`` pictures are as near to the truth, or near enough."""
     if case.kind in BENT:
         return
     truth, doubt = case.bench.by_means(case.scene, 10 ** (-(TARGETS[case.kind] + 15) / 20))

@@ -6,11 +6,18 @@ without being kept (a container's image may bring it along), and else compiled b
 
 An index of what there is and the code itself are two files, and many processes that begin at once would write both
 in each other's way, which has crashed programs (numba issues 4807 and 10128): they take turns.
+
+Numba stamps kept code by the file that its function stands in. Functions that it calls, constants and types of
+other files are compiled into the same code: here the stamp covers every file of ours from which the function's
+file imports, and those from which these import.
 """
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import os
+import re
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -35,6 +42,11 @@ TURN = ".vcc.lock"
 """The file in a folder of code that says whose turn it is."""
 PATIENCE = 5.0
 """Seconds after which nobody waits for a turn any more: some network disks have no locks that work."""
+
+_IMPORTED = re.compile(
+    rb"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]*(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]*))", re.MULTILINE
+)
+"""Import statements: a module and names from it, or modules."""
 
 SAMPLES = tuple(map(np.dtype, ("uint8", "uint16", "int16", "float32")))
 """Types of samples that loops read as they are: in which light fields are kept, and what is made of 8 bits."""
@@ -85,6 +97,11 @@ class _Kept(FunctionCache):  # type: ignore[misc]
 
     _impl_class = _ReadableToo
 
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        own, others = self._cache_file._source_stamp, _sources(function.__module__, function.__code__.co_filename)
+        self._cache_file._source_stamp = (own, others)
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The code for arguments of these types, or None."""
         try:
@@ -111,6 +128,47 @@ class _Kept(FunctionCache):  # type: ignore[misc]
                 self.flush()
         except OSError as error:
             _say_once(self.cache_path, error)
+
+
+def _sources(module: str, file: str) -> str:
+    """A digest of all files of ours that may be compiled into a module's functions."""
+    ours = {
+        module.partition(".")[0]: Path(file).parents[module.count(".")],
+        __name__.partition(".")[0]: Path(__file__).parents[__name__.count(".")],
+    }
+    found: dict[str, bytes] = {}
+    ahead = [module]
+    while ahead:
+        name = ahead.pop()
+        if name in found or (folder := ours.get(name.partition(".")[0])) is None:
+            continue
+        place = folder.joinpath(*name.split("."))
+        for source in (place.with_suffix(".py"), place / "__init__.py"):
+            try:
+                status = source.stat()
+            except OSError:  # what is imported is no module, or a package
+                continue
+            found[name], imported = _read(source, status.st_mtime_ns, status.st_size)
+            ahead += imported
+            break
+    together = hashlib.sha256()
+    for name in sorted(found):
+        together.update(name.encode() + found[name])
+    return together.hexdigest()
+
+
+@functools.cache
+def _read(source: Path, changed: int, size: int) -> tuple[bytes, tuple[str, ...]]:
+    """The digest of a file, and full names of what it imports; read again where it has changed."""
+    text = source.read_bytes()
+    statements = re.sub(rb"#[^\n]*", b"", text)
+    names: list[str] = []
+    for origin, some, modules in _IMPORTED.findall(statements):
+        parts = [
+            part.split()[0].decode() for part in (some or modules).strip(b"()\r\n ").split(b",") if part.split()
+        ]
+        names += [origin.decode(), *(f"{origin.decode()}.{part}" for part in parts)] if origin else parts
+    return hashlib.sha256(text).digest(), tuple(names)
 
 
 @contextmanager

@@ -41,7 +41,7 @@ def trace(channels: int, by_cell: bool) -> Any:
 
     @cuda.jit
     def kernel(field, sensor, points, aim, steps, pictures, tallies):  # type: ignore[no-untyped-def]
-        """As `vcc.engines.ray_kernels.add_tile`, of which the arguments are, for all pixels.
+        """As `vcc.engines.ray_kernels.add_pixels`, of which the arguments are, for all pixels.
 
         pictures: (2, rows, columns, channels): what the two halves of a pixel's rays find.
         tallies: (rows, columns), how many they are.

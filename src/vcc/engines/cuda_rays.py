@@ -33,7 +33,7 @@ def traced(core: Rays, values: Any, beside: int, progress: Progress | None = Non
 
 
 def traced_on_gpu(core: Rays, values: Any, beside: int) -> tuple[Any, Any]:
-    """The pictures of `vcc.engines.ray_kernels.add_tile`, and how many rays each row of pixels has, on the GPU."""
+    """The pictures of `vcc.engines.ray_kernels.add_pixels`, and the rays of each row of pixels, on the GPU."""
     there = arranged(taken(resident(values)))
     rows, columns = core.raster_shape
     channels = there.shape[4]

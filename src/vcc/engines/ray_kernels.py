@@ -93,6 +93,57 @@ def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
 
 
 @_compiled
+def part_affinely(f, n, x, y, s, t):  # type: ignore[no-untyped-def]
+    """Step 0: an affine map along x, and one along y."""
+    f0, f1, f2, f3, f4, f5 = f[0], f[1], f[2], f[3], f[4], f[5]
+    for p in range(n):
+        xp, sp = x[p], s[p]
+        x[p] = f0 * xp + f1 * sp + f2
+        s[p] = f3 * xp + f4 * sp + f5
+    f0, f1, f2, f3, f4, f5 = f[6], f[7], f[8], f[9], f[10], f[11]
+    for p in range(n):
+        yp, tp = y[p], t[p]
+        y[p] = f0 * yp + f1 * tp + f2
+        t[p] = f3 * yp + f4 * tp + f5
+
+
+@_compiled
+def within_disc(f, n, x, y, share):  # type: ignore[no-untyped-def]
+    """Step 6: dark outside a disc."""
+    f0, f1, f2 = f[0], f[1], f[2]
+    for p in range(n):
+        share[p] = share[p] if (x[p] - f0) ** 2 + (y[p] - f1) ** 2 <= f2 else 0.0
+
+
+@_compiled
+def within_rectangle(f, n, x, y, share):  # type: ignore[no-untyped-def]
+    """Step 7: dark outside a rectangle."""
+    f0, f1, f2, f3 = f[0], f[1], f[2], f[3]
+    for p in range(n):
+        share[p] = share[p] if (abs(x[p] - f0) <= f2) & (abs(y[p] - f1) <= f3) else 0.0
+
+
+FEW = frozenset({0, 6, 7})
+"""Codes of the steps of a plain lens: affine along x and y apart, a round rim, a rectangular one."""
+
+
+@_compiled
+def take_few_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
+    """As `take_steps`, where all steps are among `FEW`, which take a tenth of the time to compile."""
+    codes, _, real, _, _ = steps
+    n = drawn.rays
+    x, y, s, t, share = rays
+    for step in range(len(codes)):
+        code, f = codes[step], real[step]
+        if code == 0:
+            part_affinely(f, n, x, y, s, t)
+        elif code == 6:
+            within_disc(f, n, x, y, share)
+        else:
+            within_rectangle(f, n, x, y, share)
+
+
+@_compiled
 def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     """Take a packet of rays through all steps.
 
@@ -104,16 +155,7 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     for step in range(len(codes)):
         code, a, f = codes[step], whole[step], real[step]
         if code == 0:
-            f0, f1, f2, f3, f4, f5 = f[0], f[1], f[2], f[3], f[4], f[5]
-            for p in range(n):
-                xp, sp = x[p], s[p]
-                x[p] = f0 * xp + f1 * sp + f2
-                s[p] = f3 * xp + f4 * sp + f5
-            f0, f1, f2, f3, f4, f5 = f[6], f[7], f[8], f[9], f[10], f[11]
-            for p in range(n):
-                yp, tp = y[p], t[p]
-                y[p] = f0 * yp + f1 * tp + f2
-                t[p] = f3 * yp + f4 * tp + f5
+            part_affinely(f, n, x, y, s, t)
         elif code == 1:
             for p in range(n):
                 xp, yp, sp, tp = x[p], y[p], s[p], t[p]
@@ -170,13 +212,9 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
                 s[p] -= mixed(slopes, a[2], 2, 0, at)
                 t[p] -= mixed(slopes, a[2], 2, 1, at)
         elif code == 6:
-            f0, f1, f2 = f[0], f[1], f[2]
-            for p in range(n):
-                share[p] = share[p] if (x[p] - f0) ** 2 + (y[p] - f1) ** 2 <= f2 else 0.0
+            within_disc(f, n, x, y, share)
         elif code == 7:
-            f0, f1, f2, f3 = f[0], f[1], f[2], f[3]
-            for p in range(n):
-                share[p] = share[p] if (abs(x[p] - f0) <= f2) & (abs(y[p] - f1) <= f3) else 0.0
+            within_rectangle(f, n, x, y, share)
         elif code == 8:
             for p in range(n):
                 column, row = math.floor((x[p] - f[0]) * f[2]), math.floor((y[p] - f[1]) * f[3])
@@ -571,30 +609,23 @@ def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ign
         flipped[n] = hashed(number, seed + 1 + n) >> np.uint32(32 - DIGITS)
 
 
-@_allocating
-def add_tile(field, sensor, points, aim, steps, ended, pictures, tile):  # type: ignore[no-untyped-def]
+@_compiled
+def add_pixels(field, sensor, points, window, cells, steps, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
 
     The first picture is what all of a pixel's rays find, the second what its two halves differ by. Once
-    ``ended[0]`` is true, nobody wants them, and the kernel returns.
+    ``ended[0]`` is true, nobody wants them, and the kernel returns. It is called from Python as it is:
+    a kernel around it that made the arrays took a third of the time to compile.
 
-    Returns:
-        (1,): how many rays were traced.
-    """
-    lanes = max(field.samples.channels, LANES)
-    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(1, np.int64)
-    add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, room(), sums)
-    return sums[2]
-
-
-@_compiled
-def add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
-    """As `add_tile`, within what `room` gives.
-
-    ``sums``: of a packet, in single precision, and of a pixel, (2, lanes) each; and the rays traced, (1,).
+    Args:
+        window: where to aim; not looked at where there are cells.
+        cells: through which to aim, or None: what aims through cells is then not compiled.
+        steps: what rays meet.
+        rare: None where all steps are among `FEW`: the rest is then not compiled.
+        within: as what `room` makes.
+        sums: of a packet, float32, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
     """
     table, samples, beside, seed = points
-    cells = aim.cells
     blocks = table.shape[1] // samples
     channels = field.samples.channels
     rays, near, images, flipped = within
@@ -607,23 +638,33 @@ def add_pixels(field, sensor, points, aim, steps, ended, pictures, tile, within,
             pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
             first = ((np.int64(hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
             totals[:] = 0
-            for q in range(cells_at(aim.by_cell, cells, middle, sensor.sensitive, near)):
-                turn_to(aim.by_cell, cells, seed, pixel, near, q, images, flipped)
+            seen = 1
+            if cells is not None:
+                seen = cells_at(True, cells, middle, sensor.sensitive, near)
+            for q in range(seen):
+                if cells is None:
+                    for number in range(4):
+                        flipped[number] = hashed(pixel, seed + 1 + number) >> np.uint32(32 - DIGITS)
+                else:
+                    turn_to(True, cells, seed, pixel, near, q, images, flipped)
                 for done in range(0, samples, PACKET):
                     n = min(PACKET, samples - done)
                     drawn = Drawn(table, first + done, n, flipped)
                     at_pixel(drawn, middle, sensor.sensitive, rays)
-                    if aim.by_cell:
-                        through_cell(drawn, images, cells, rays)
+                    if cells is None:
+                        through_window(drawn, window, rays)
                     else:
-                        through_window(drawn, aim.window, rays)
+                        through_cell(drawn, images, cells, rays)
                     sent = 0
                     for p in range(n):
                         sent += share[p] > 0.0
                     if sent == 0:
                         continue
                     tally[0] += sent
-                    take_steps(steps, drawn, rays)
+                    if rare is None:
+                        take_few_steps(steps, drawn, rays)
+                    else:
+                        take_steps(steps, drawn, rays)
                     add_rays(field, rays, n, samples // 2 - done, sums)
                     for half in range(2):  # a packet in single precision, the packets in double
                         for lane in range(sums.shape[1]):

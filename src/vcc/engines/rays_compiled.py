@@ -13,6 +13,7 @@ from vcc.base.workers import Workers
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
 from vcc.engines.compiled import read_as
+from vcc.engines.vector_gather import LANES
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.windows import Aim, CellWindows, Window
@@ -45,13 +46,36 @@ def traced(
     tiles = [tables.Tile(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)]
     rays = 0
     with Workers(threads) as pool:
+        sensor, points, aim, steps = given(core, beside)
+        # Numba leaves out branches by what is None.
+        cells = aim.cells if aim.by_cell else None
+        rare = None if kernels.FEW.issuperset(steps.codes.tolist()) else True
         add = partial(
-            kernels.add_tile, light_field(core, values, channels), *given(core, beside), pool.ended, pictures
+            _tile,
+            light_field(core, values, channels),
+            sensor,
+            points,
+            aim.window,
+            cells,
+            steps,
+            rare,
+            pool.ended,
+            pictures,
         )
         for done, part in enumerate(pool.map(add, tiles), start=1):
-            rays += int(part[0])
+            rays += part
             tell(progress, done, len(tiles))
     return Partial(pictures[0], pictures[1], rays, core.samples)
+
+
+def _tile(*given: Any) -> int:
+    """The pixels of a tile, by `kernels.add_pixels`, in arrays of its own; returns how many rays were traced."""
+    lanes = max(given[0].samples.channels, LANES)
+    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(1, dtype=np.int64)
+    near, images, flipped = np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
+    rays = tables.Packet(*np.empty((5, kernels.PACKET)))
+    kernels.add_pixels(*given, (rays, near, images, flipped), sums)
+    return int(sums[2][0])
 
 
 def given(core: Rays, beside: int) -> tuple[tables.Sensor, tables.Points, tables.Aim, tables.Steps]:

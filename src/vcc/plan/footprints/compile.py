@@ -242,7 +242,7 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
 
 
 def _varying(geometry: Geometry, plane: Plane, taps: Taps, decisions: Decisions) -> NDArray[np.bool_]:
-    """Taps in whose cells a mask varies, (rows, columns): elsewhere it does not matter which part of a cell is open.
+    """Taps in whose cells a mask varies, (rows, columns): elsewhere it does not matter which part of one is open.
 
     Moved to the middle of the open part, a cell would reach over an edge that does not cross it.
     """
