@@ -29,13 +29,11 @@ class _Pilot:
         seconds: of a run.
         rays: that are traced.
         error: from sampling, as a share of the picture's mean.
-        missing: share of the rays asked for.
     """
 
     seconds: float
     rays: float
     error: float
-    missing: float
 
 
 def sections(run: Drive) -> tuple[list[str], float | None]:
@@ -43,7 +41,7 @@ def sections(run: Drive) -> tuple[list[str], float | None]:
     core = run.core
     assert isinstance(core, Rays)
     pilot = _pilot(run, core)
-    parts = [_sampling(core, pilot, run.how.tolerance), _cost(run, core, pilot), _warnings(run, pilot)]
+    parts = [_sampling(core, pilot, run.how.tolerance), _cost(run, core, pilot), _warnings(run)]
     return parts, None if pilot is None else pilot.seconds
 
 
@@ -75,7 +73,6 @@ def _pilot(run: Drive, core: Rays) -> _Pilot | None:
         preparing + fixed + max(each - fixed, 0.0) * len(patches) * factor,
         sum(one.rays for one in traced) * factor,
         error / mean if mean > 0 else 0.0,
-        sum(one.missing for one in traced) / len(traced),
     )
 
 
@@ -128,12 +125,9 @@ def _memory(run: Drive, core: Rays) -> int:
     return run.engine.memory(core, run.channels, run.threads) + copied
 
 
-def _warnings(run: Drive, pilot: _Pilot | None) -> str:
+def _warnings(run: Drive) -> str:
     lines = []
-    if pilot is not None and pilot.missing > 1e-3:
-        lines.append(
-            f"  {pilot.missing:.1%} of the rays asked for are missing: they fall outside the grid of views or the "
-            "views' pictures"
-        )
+    if run.plan.missing_rays > 1e-3:
+        lines.append(f"  {run.plan.missing_rays:.1%} of the rays asked for are missing: {run.plan.missing_reason}")
     lines += [f"  {caution}" for caution in run.plan.cautions]
     return "Warnings\n" + ("\n".join(lines) if lines else "  none")
