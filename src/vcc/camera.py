@@ -186,12 +186,12 @@ class Camera(Train):
 
         Warns:
             ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
-                tolerance was not reached, the sampling error of rays exceeds 1 % of the brightest pixel (40 dB) and
-                neither samples nor a tolerance were given (the warning reports how many rays suffice), the cells of
-                an array are smaller than a pixel, or the picture is 0 everywhere although the light field is not
-                dark (by footprints, and no mask closes the camera). Where the picture is 0, a quarter of the rays
-                or more is missing, or the picture is nearly black, and a length is 1 m or more, or a pitch 2 cm, it
-                asks whether millimetres were meant.
+                tolerance was not reached, the sampling error of rays exceeds 1 % of the brightest pixel (40 dB)
+                and neither samples nor a tolerance were given (the warning reports how many rays suffice), the
+                cells of an array are smaller than a pixel, or the picture is 0 everywhere although the light field
+                is not dark (by footprints, and no mask closes the camera). Where the picture is 0, a quarter of
+                the rays or more is missing, or the picture is nearly black, and a length is 1 m or more, or a
+                pitch 2 cm, it asks whether millimetres were meant.
 
         Raises:
             InputError: an option that does not exist or does not go with the method, an element that returns

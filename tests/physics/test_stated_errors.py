@@ -79,8 +79,9 @@ def test_stated_errors_are_the_true_ones(measured):
     """An error is that of the mean of two halves, A and B, and is stated as half the root mean square of A − B.
 
     With ρ the correlation of their errors, (true / stated)² = (1 + ρ) / (1 − ρ). Points that are evener as a
-    whole than their halves have ρ < 0: the error is stated too large. ρ ≤ ½ is required of each picture, so that the true
-    one is at most √3 times the stated one; and ρ ≤ 0 on average, to two standard errors of 288 pictures (5 %).
+    whole than their halves have ρ < 0: the error is stated too large. ρ ≤ ½ is required of each picture, so that
+    the true one is at most √3 times the stated one; and ρ ≤ 0 on average, to two standard errors of 288 pictures
+    (5 %).
     """
     ratios = np.stack([true / stated for true, stated, _ in measured])
     assert ratios.max() <= np.sqrt(3)
