@@ -10,6 +10,7 @@ from typing import Any, Literal, Self, TypeVar, Unpack
 from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
 from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.explain import Explanation, explained
+from vcc.advice.noise import why_noisy
 from vcc.base import checks, late
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
@@ -185,10 +186,12 @@ class Camera(Train):
 
         Warns:
             ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
-                tolerance was not reached, the cells of an array are smaller than a pixel, or the picture is 0
-                everywhere although the light field is not dark (by footprints, and no mask closes the camera).
-                Where the picture is 0, a quarter of the rays or more is missing, or the picture is nearly black,
-                and a length is 1 m or more, or a pitch 2 cm, it asks whether millimetres were meant.
+                tolerance was not reached, the sampling error of rays exceeds 1 % of the brightest pixel (40 dB)
+                and neither samples nor a tolerance were given (the warning reports how many rays suffice), the
+                cells of an array are smaller than a pixel, or the picture is 0 everywhere although the light field
+                is not dark (by footprints, and no mask closes the camera). Where the picture is 0, a quarter of
+                the rays or more is missing, or the picture is nearly black, and a length is 1 m or more, or a
+                pitch 2 cm, it asks whether millimetres were meant.
 
         Raises:
             InputError: an option that does not exist or does not go with the method, an element that returns
@@ -200,7 +203,10 @@ class Camera(Train):
         check_is_light_field(light_field)
         chosen, absurd = How.of(how, options), self._absurd(light_field)
         plan = self._planned(light_field, chosen, plan, options, progress)
-        return self._image(plan, light_field, drive(plan, light_field, chosen, progress, executor), absurd)
+        found = drive(plan, light_field, chosen, progress, executor)
+        if noisy := why_noisy(plan, chosen, found):
+            warn_of_result(noisy)
+        return self._image(plan, light_field, found, absurd)
 
     def _absurd(self, light_field: Samples) -> str:
         """What to ask where lengths are absurd; said now where hardly any light will come of it."""

@@ -45,6 +45,8 @@ class LightField(InMemory):
             `vcc.fields.disparity.Disparities`.
         extent: (rows, columns) of views of the light field that this is a piece of, counted in this piece's steps;
             None for a whole one.
+        beyond: of a piece, (before, after) along (v, u, t, s): how many more samples, in this piece's steps, the
+            light field has there that this is a piece of. Pieces that slicing makes have it; none for a whole one.
 
     Raises:
         InputError: not 4-D or 5-D, an empty axis, a dtype that is not unsigned integer or floating point,

@@ -1,7 +1,7 @@
 """A camera that asks for rays which the light field does not hold gets its picture, and is told the share.
 
-Oracles: areas in closed form, and rays drawn here. The share is an estimate from 2^16 evenly spread rays. `EVEN` is
-more than such a set errs by beside a border, which some 4·2^12 of its boxes of 2^-4 a side meet, each wrong by
+Oracles: areas in closed form, and rays drawn here. The share is an estimate from 2^16 evenly spread rays. `EVEN`
+is more than such a set errs by beside a border, which some 4·2^12 of its boxes of 2^-4 a side meet, each wrong by
 half a ray at random: 2^7/2^17, and what the rays drawn here err by.
 """
 

@@ -316,7 +316,7 @@ def test_lenslets_smaller_than_a_pixel_are_warned_of():
     array = vcc.LensArray(pitch=50 * um, focal_length=0.4 * mm, z=D)
     camera = vcc.Camera([LENS, array], vcc.Sensor(D + 0.4 * mm, (6, 6), 60 * um))
     with pytest.warns(vcc.ResultWarning, match=r"lens array at z = .* are 50 um wide, less than a pixel .*60 um"):
-        camera.capture(field())
+        camera.capture(field(), samples=64)
     assert "less than a pixel" in camera.explain(field())
 
 

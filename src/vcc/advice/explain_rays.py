@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vcc.advice.noise import ENOUGH, remedy
 from vcc.fields.sampled import has_values, to_numpy
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
@@ -29,11 +30,13 @@ class _Pilot:
         seconds: of a run.
         rays: that are traced.
         error: from sampling, as a share of the picture's mean.
+        decibels: of the brightest pixel over that error.
     """
 
     seconds: float
     rays: float
     error: float
+    decibels: float
 
 
 def sections(run: Drive) -> tuple[list[str], float | None]:
@@ -41,7 +44,7 @@ def sections(run: Drive) -> tuple[list[str], float | None]:
     core = run.core
     assert isinstance(core, Rays)
     pilot = _pilot(run, core)
-    parts = [_sampling(core, pilot, run.how.tolerance), _cost(run, core, pilot), _warnings(run)]
+    parts = [_sampling(core, pilot, run.how.tolerance), _cost(run, core, pilot), _warnings(run, core, pilot)]
     return parts, None if pilot is None else pilot.seconds
 
 
@@ -69,10 +72,12 @@ def _pilot(run: Drive, core: Rays) -> _Pilot | None:
     factor = rows * columns / sum(math.prod(patch.raster_shape) for patch in patches)
     mean = abs(sum(float(np.mean(to_numpy(one.values), dtype=np.float64)) for one in traced) / len(traced))
     error = math.sqrt(sum(sampling_error(one) ** 2 for one in traced) / len(traced))
+    brightest = max(float(np.abs(to_numpy(one.values)).max()) for one in traced)
     return _Pilot(
         preparing + fixed + max(each - fixed, 0.0) * len(patches) * factor,
         sum(one.rays for one in traced) * factor,
         error / mean if mean > 0 else 0.0,
+        20 * math.log10(brightest / error) if min(brightest, error) > 0 else math.inf,
     )
 
 
@@ -99,7 +104,8 @@ def _sampling(core: Rays, pilot: _Pilot | None, tolerance: float | None) -> str:
     lines.append(f"  {core.samples} rays for each pixel{through}, evenly spread, seed {core.seed}")
     if pilot is not None:
         lines.append(
-            f"  expected sampling error: {pilot.error:.2g} of the picture's mean, root mean square"
+            f"  expected sampling error: {pilot.error:.2g} of the picture's mean, root mean square "
+            f"({pilot.decibels:.1f} dB of the brightest pixel)"
             + ("" if tolerance is None else f"; samples are doubled until it is {tolerance:g}")
         )
     return "Sampling\n" + "\n".join(lines)
@@ -125,8 +131,11 @@ def _memory(run: Drive, core: Rays) -> int:
     return run.engine.memory(core, run.channels, run.threads) + copied
 
 
-def _warnings(run: Drive) -> str:
+def _warnings(run: Drive, core: Rays, pilot: _Pilot | None) -> str:
     lines = []
+    if pilot is not None and pilot.decibels < ENOUGH and run.how.tolerance is None:
+        rays = core.samples << core.aim.halvings
+        lines.append(f"  sampling error of {pilot.decibels:.1f} dB: {remedy(rays, pilot.decibels)}")
     if run.plan.missing_rays > 1e-3:
         lines.append(f"  {run.plan.missing_rays:.1%} of the rays asked for are missing: {run.plan.missing_reason}")
     lines += [f"  {caution}" for caution in run.plan.cautions]

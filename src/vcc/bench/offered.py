@@ -172,7 +172,10 @@ def _halved(light_field: LightField) -> LightField:
     to_fine = Affine.translation(0, 0, (columns - 1) / 2, (rows - 1) / 2) @ Affine.scaling(1, 1, columns, rows)
     found = light_field.measured_disparity_range()
     disparities = None if found is None else (found[0] / columns, found[1] / columns)
-    return LightField(coarse, light_field.frame @ to_fine, disparities, extent=light_field.extent)
+    cut = (1, 1, rows, columns)
+    beyond = tuple((a // n, b // n) for (a, b), n in zip(light_field.beyond, cut, strict=True))
+    frame = light_field.frame @ to_fine
+    return LightField(coarse, frame, disparities, extent=light_field.extent, beyond=beyond)
 
 
 def _mean(view: NDArray[np.generic], rows: int, columns: int, kind: np.dtype[np.generic]) -> NDArray[np.generic]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
@@ -26,6 +27,7 @@ from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
 from vcc.plan.decisions import WhileWanted
 from vcc.plan.model import Plan
+from vcc.plan.operators import SharpenViews
 from vcc.plan.rays.compile import DEFAULT_SAMPLES
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.windows import CellWindows
@@ -255,7 +257,8 @@ def _with_fewer_rays(plan: Plan, rays: int) -> Plan:
     """A plan with fewer rays, that look at views as they are: sharper ones would only show the noise of so few."""
     assert isinstance(plan.core, Rays)
     fewer = max(plan.core.samples * rays // DEFAULT_SAMPLES, FEWEST_RAYS)
-    return replace(plan, core=plan.core.more(fewer), before=())
+    before = tuple(operator for operator in plan.before if not isinstance(operator, SharpenViews))
+    return replace(plan, core=plan.core.more(fewer), before=before)
 
 
 def _looking_at(plan: Plan, core: Rays, fine: Grid, coarse: Grid) -> Plan:
@@ -265,10 +268,12 @@ def _looking_at(plan: Plan, core: Rays, fine: Grid, coarse: Grid) -> Plan:
     find their mean with less noise where they look at means, and where neighbours look at the same ones.
     """
     coarse_from_fine = coarse.frame.inverse() @ fine.frame
-    nv, nu, nt, ns = coarse.shape[:4]
+    (top, _), (left, _), (above, _), (before, _) = plan.beside
+    border = Affine.translation(left, top, before, above)  # as many samples, coarse as fine
+    nv, nu, nt, ns = plan.shape(coarse.shape)[:4]
     made = replace(
         core,
-        index_from_ray=coarse_from_fine @ core.index_from_ray,
+        index_from_ray=border @ coarse_from_fine @ border.inverse() @ core.index_from_ray,
         motion=coarse_from_fine.linear[2:, 2:] @ core.motion,
         views=(nv, nu, nt, ns),
     )

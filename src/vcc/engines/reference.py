@@ -93,7 +93,7 @@ def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: 
     """Samples as a core takes them, filtered in double precision; bytes are sharpened exactly."""
     for operator in before:
         exact = isinstance(operator, operators.SharpenViews) and values.dtype == np.uint8
-        moved = isinstance(operator, operators.SwapPixelAxes)
+        moved = isinstance(operator, operators.SwapPixelAxes | operators.DarkBorder)
         values = operator.apply(values if exact or moved else values.astype(np.float64))
     return values
 

@@ -23,6 +23,11 @@ Array = NDArray[np.float64]
 Sample = Literal["mean", "point"]
 """What a sample says of the scene: its mean over the cell of a pixel, or its value in the middle of the cell."""
 
+Beyond = tuple[tuple[int, int], ...]
+"""(before, after) along (v, u, t, s)."""
+ALL: Beyond = ((0, 0),) * 4
+"""Nothing lies beyond a light field that is no piece of another."""
+
 SAMPLES_IN_WORDS: dict[Sample, str] = {"mean": "means over pixels", "point": "values at points"}
 """What samples are, for people."""
 
@@ -80,6 +85,8 @@ class Grid(Value):
         disparities: what the samples show of depth, measured when first asked for.
         extent: (rows, columns) of views of the light field that this is a piece of, counted in this piece's steps;
             what a camera decides by the extent of the views it decides for all pieces alike.
+        beyond: of a piece, (before, after) along (v, u, t, s): how many more samples, in this piece's steps, the
+            light field has there that this is a piece of.
     """
 
     shape: tuple[int, ...]
@@ -89,6 +96,7 @@ class Grid(Value):
     disparity_range: tuple[float, float] | None = None
     disparities: Disparities = field(default_factory=Disparities)
     extent: tuple[float, float] = (0.0, 0.0)
+    beyond: Beyond = ALL
 
     def __post_init__(self) -> None:
         check_frame(self.frame)
@@ -134,7 +142,24 @@ class Grid(Value):
             disparity_range=None if stated is None else scaled(stated, u / s),
             disparities=self.disparities.piece(ranges),
             extent=(self.extent[0] / abs(v), self.extent[1] / abs(u)),
+            beyond=tuple(map(_beyond, ranges[:4], self.shape[:4], self.beyond)),
         ), ranges
+
+    @property
+    def whole_grid(self) -> Grid:
+        """The grid that this is a piece of, in this piece's steps; itself where it is none."""
+        if self.beyond == ALL:
+            return self
+        first = [before for before, _ in self.beyond]
+        shape = tuple(n + sum(beyond) for n, beyond in zip(self.shape[:4], self.beyond, strict=True))
+        corner = Affine.translation(*(-first[axis] for axis in LIGHT_FIELD_AXES))
+        return replace(self, shape=(*shape, *self.shape[4:]), frame=self.frame @ corner, beyond=ALL)
+
+    @property
+    def in_whole(self) -> Block:
+        """Which part of `whole_grid` this is."""
+        ranges = ((before, before + n) for (before, _), n in zip(self.beyond, self.shape[:4], strict=True))
+        return Block(*ranges)
 
     def moved(self, rays: Affine) -> Grid:
         """The same samples after a map of rays."""
@@ -342,3 +367,16 @@ def _plane(frame: Affine, axis: Axis) -> Array:
     """Place and slope along an axis (rows) by a step of views and by one of pixels (columns), 2×2."""
     n = 0 if axis == "u" else 1
     return frame.linear[n::2, n::2]
+
+
+def _beyond(part: range, size: int, beyond: tuple[int, int]) -> tuple[int, int]:
+    """How many more samples there are before and after those of a range, in its steps.
+
+    Args:
+        part: indices that are taken along an axis.
+        size: of the axis.
+        beyond: of the axis.
+    """
+    low, high = min(part[0], part[-1]), max(part[0], part[-1])
+    ends = (beyond[0] + low) // abs(part.step), (beyond[1] + size - 1 - high) // abs(part.step)
+    return ends if part.step > 0 else ends[::-1]

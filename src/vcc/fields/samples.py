@@ -16,7 +16,17 @@ from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.base.showing import Shown
 from vcc.fields.disparity import Disparities, DisparityMaps
-from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, check_frame, check_shape, told_along_u
+from vcc.fields.grid import (
+    ALL,
+    SAMPLES_IN_WORDS,
+    Beyond,
+    Block,
+    Grid,
+    Sample,
+    check_frame,
+    check_shape,
+    told_along_u,
+)
 from vcc.fields.parallax import disparity_range
 from vcc.fields.plane_sweep import disparity_maps
 from vcc.fields.sampled import Index, has_values, taken, to_dtype, to_numpy
@@ -114,6 +124,7 @@ class InMemory(OnGrid):
     sample: Sample = "mean"
     disparity: Any = None
     extent: tuple[float, float] | None = None
+    beyond: Beyond = ALL
 
     def __post_init__(self) -> None:
         check_shape(shape_of(self.values))
@@ -150,9 +161,16 @@ class InMemory(OnGrid):
             grid: whose shape is theirs.
         """
         made = object.__new__(cls)
-        parts = (values, grid.frame, grid.disparity_range, grid.sample, grid.disparities, grid.extent)
-        names = ("values", "frame", "disparity_range", "sample", "disparity", "extent")
-        for name, part in zip(names, parts, strict=True):
+        parts = {
+            "values": values,
+            "frame": grid.frame,
+            "disparity_range": grid.disparity_range,
+            "sample": grid.sample,
+            "disparity": grid.disparities,
+            "extent": grid.extent,
+            "beyond": grid.beyond,
+        }
+        for name, part in parts.items():
             object.__setattr__(made, name, part)
         made._complete()
         return made
@@ -168,6 +186,7 @@ class InMemory(OnGrid):
             self.disparity_range,
             self.disparity,
             self.extent or (0.0, 0.0),
+            self.beyond,
         )
 
     @property
@@ -193,6 +212,10 @@ class InMemory(OnGrid):
 
     def __getitem__(self, index: Index | tuple[Index, ...]) -> Self:
         """A piece of the light field, in its place: slices along (v, u, t, s[, channel]).
+
+        Images of the pieces add up to the image of the whole. So a piece, where it was cut, fades towards
+        neighbours that it no longer has. For a light field of its own, which ends there:
+        ``vcc.LightField(piece.values, piece.frame)``.
 
         Where only every second pixel (or fewer) is kept along s and along t, means become ``"point"``: of a cell
         n pixels wide each sample covers 1/n, and what that took from sharpness is 1/n² of what a mean over the

@@ -66,7 +66,7 @@ class How(Value, Shown):
             that `vcc.Camera.explain` states; a number from 1 to 8 divides samples by it each way, and 1 divides
             nothing.
         samples: rays a pixel, rounded up to a power of two (behind a main lens and lenslets: for each lenslet that
-            the pixel sees); None takes 64.
+            the pixel sees); None takes 64, and warns if their error exceeds 1 % of the brightest pixel.
         tolerance: double the samples until the estimated sampling error of the picture, root mean square, is at
             most this share of its mean; None does not.
         seed: of the rays' choice of points. The same seed gives the same picture, on any number of threads.

@@ -22,7 +22,7 @@ from vcc.fields.grid import Block, Grid
 from vcc.optics.train import Train
 from vcc.plan.depth_rule import ViewsBetween
 from vcc.plan.numbers import numbers, with_numbers
-from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews
+from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews, DarkBorder
 from vcc.plan.protocol import Core
 
 NUMBERED = ("core", "before", "after")
@@ -92,6 +92,11 @@ class Plan(Value, Shown):
     def reach(self) -> int:
         """Rows of pixels on each side of a block that are read with it."""
         return max((operator.reach for operator in self.before), default=0)
+
+    @property
+    def beside(self) -> tuple[tuple[int, int], ...]:
+        """Dark samples that are put (before, after) those of a piece along (v, u, t, s)."""
+        return next((o.beside for o in self.before if isinstance(o, DarkBorder)), ((0, 0),) * 4)
 
     @property
     def smear(self) -> tuple[float, float]:

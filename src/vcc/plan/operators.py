@@ -219,6 +219,66 @@ class BlurViews(Brief, Value):
 
 
 @dataclass(frozen=True, eq=False)
+class DarkBorder(Value):
+    """Dark samples around a piece of a light field, where the light field has others that are not in the piece.
+
+    What is done afterwards spreads the piece's light among them as it does in the whole, so that the pictures of
+    the pieces add up to the picture of the whole.
+
+    Args:
+        beside: (before, after) along (v, u, t, s): how many samples.
+    """
+
+    beside: tuple[tuple[int, int], ...]
+
+    reach = 0
+    copies = True
+
+    def apply(self, values: Any) -> Any:
+        """Samples (v, u, t, s[, channels]) with the border, of their type."""
+        if isinstance(values, np.ndarray):
+            return np.pad(values, [*self.beside, *[(0, 0)] * (values.ndim - 4)])
+        xp = array_namespace(values)
+        for axis, beside in enumerate(self.beside):
+            dark = [
+                xp.zeros(
+                    (*values.shape[:axis], n, *values.shape[axis + 1 :]), dtype=values.dtype, device=device(values)
+                )
+                for n in beside
+            ]
+            if any(beside):
+                values = xp.concat([dark[0], values, dark[1]], axis=axis)
+        return values
+
+    def transpose(self, values: Any) -> Any:
+        """Samples with the border cut off."""
+        cut = (slice(a, n - b) for (a, b), n in zip(self.beside, values.shape[:4], strict=True))
+        return values[(*cut, ...)]
+
+    def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """There are no numbers."""
+        return {}
+
+    def block(self, block: Block) -> Block:
+        """What a block's light reaches: itself and as much of a border on each side as the piece has."""
+        grown = ((first, stop + a + b) for (first, stop), (a, b) in zip(block.ranges, self.beside, strict=True))
+        return Block(*grown)
+
+    def made_of(self, pixels: Any) -> Any:
+        """The same, where they stand without the border."""
+        return pixels - np.array(self.beside)[2:, :1]
+
+    def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
+        """With the border."""
+        grown = (n + a + b for n, (a, b) in zip(shape[:4], self.beside, strict=True))
+        return (*grown, *shape[4:])
+
+    def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
+        """As they were."""
+        return kind, 1.0
+
+
+@dataclass(frozen=True, eq=False)
 class SharpenViews(Value):
     """Each view filtered along k and along l, to give back beforehand what looking samples up linearly takes.
 

@@ -28,7 +28,7 @@ from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Gradient, Partial
 from vcc.run.blocks import Blocks, cut_evenly
-from vcc.run.drive import Counted, Drive
+from vcc.run.drive import Counted, Drive, dark_of_neighbours
 from vcc.run.executors import Work
 from vcc.run.sent import Sent
 
@@ -300,7 +300,10 @@ class Backwards:
         if found.samples is None:
             return block, Gradient(None, numbers)
         row, column = block.rows[0] - around.rows[0], block.columns[0] - around.columns[0]
-        inner = found.samples[row : row + block.shape[0], column : column + block.shape[1]]
+        (top, bottom), (left, right), *_ = self.plan.beside
+        inner = found.samples[
+            row : row + block.shape[0] + top + bottom, column : column + block.shape[1] + left + right
+        ]
         block, part = self._before(block, inner, samples)
         return block, replace(part, numbers={**numbers, **part.numbers})
 
@@ -310,6 +313,8 @@ class Backwards:
             weights /= self.drive.unit  # which an engine has made for nobody else
         grown, beside = self.drive.with_reach(block)
         if any(beside):
+            for view in np.ndindex(weights.shape[:2]):
+                dark_of_neighbours(weights[view], beside, self.plan.beside[2])
             weights = np.pad(weights, [(0, 0), (0, 0), beside, *[(0, 0)] * (weights.ndim - 3)])
         before, given = self.plan.before, []
         numbers: dict[str, Array] = {}

@@ -120,11 +120,10 @@ class Need:
         pixels = math.prod(plan.core.raster_shape) * (grid.channels or 1)
         grown = math.prod(plan.shape(grid.shape)[2:]) * kept
         times = 1 + 16 / kept if copies else 1.0
+        border = max(2 * plan.core.border + sum(beside) for beside in plan.beside[:2])
         raster = (16 if plan.by_rays else 8) * pixels
         single = 4 * pixels if plan.by_rays else 0
-        return cls(
-            (1 + SUMS) * raster + single + engine_memory, grown, times, 2 * plan.core.border, raster, plan.by_rays
-        )
+        return cls((1 + SUMS) * raster + single + engine_memory, grown, times, border, raster, plan.by_rays)
 
     def with_sums(self) -> Need:
         """With what whoever runs blocks for others keeps beside: the results of blocks that are to be summed."""

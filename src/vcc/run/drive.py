@@ -596,10 +596,11 @@ class Drive:
         around = self.around(block)
         room = self._room(self.plan.shape((*around.shape, *self.samples.grid.shape[4:])))
         (a, b), (c, d) = block.rows, block.columns
+        top, left = (before for before, _ in self.plan.beside[:2])
 
         def put(place: tuple[int, int]) -> None:
             row, column = a + place[0], c + place[1]
-            room[row - around.rows[0], column - around.columns[0]] = self._view(row, column, block)
+            room[row - around.rows[0] + top, column - around.columns[0] + left] = self._view(row, column, block)
 
         with Workers(self.need.readers) as pool:
             for _ in pool.map(put, np.argwhere(self.used[a:b, c:d]).tolist()):
@@ -625,8 +626,11 @@ class Drive:
         """The samples of one view of a block, read with as many more rows of pixels as operators before reach."""
         one, (above, below) = self.with_reach(replace(block, rows=(row, row + 1), columns=(column, column + 1)))
         threads = self.threads if self.need.readers == 1 else 1  # others are at other views
-        view = self.engine.prepared(self.plan.before, self.samples.read(one), threads)[0, 0]
-        return view[above : view.shape[0] - below] if above or below else view
+        (top, _), (left, _), *beside = self.plan.beside
+        view = self.engine.prepared(self.plan.before, self.samples.read(one), threads)[top, left]
+        view = view[above : view.shape[0] - below]
+        dark_of_neighbours(view, (above, below), beside[0])
+        return view
 
     def _look_between(self, between: ViewsBetween) -> None:
         """Look at the denser light field instead, whose views are made when they are read."""
@@ -690,6 +694,20 @@ def _with_border(block: Block, border: int, shape: tuple[int, ...]) -> Block:
         rows=(max(a - border, 0), min(b + border, shape[0])),
         columns=(max(c - border, 0), min(d + border, shape[1])),
     )
+
+
+def dark_of_neighbours(rows: Any, read: tuple[int, int], beside: tuple[int, int]) -> None:
+    """Put out the border of a block's rows of pixels where the block has neighbours, which hold these rows.
+
+    Args:
+        rows: of a view, with a border; written over.
+        read: rows (above, below) that were read of neighbours.
+        beside: rows (above, below) of the border.
+    """
+    if read[0] and beside[0]:
+        rows[: beside[0]] = 0
+    if read[1] and beside[1]:
+        rows[rows.shape[0] - beside[1] :] = 0
 
 
 def _in_double(part: Partial) -> Partial:

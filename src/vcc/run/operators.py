@@ -22,6 +22,7 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.memory import check_samples
 from vcc.fields.disparity import Disparities
+from vcc.fields.grid import ALL
 from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
 from vcc.fields.samples import InMemory, maps_of
 from vcc.optics.faces import Element
@@ -274,4 +275,5 @@ def resampled(
         )
     np.maximum(result, 0, out=result)  # a spline may undershoot; radiance does not
     final: NDArray[np.float32] = result if light_field.grid.channels is not None else result[..., 0]
-    return replace(light_field, values=final, frame=frame, disparity_range=None, disparity=None, extent=None)
+    alone: dict[str, Any] = {"disparity_range": None, "disparity": None, "extent": None, "beyond": ALL}
+    return replace(light_field, values=final, frame=frame, **alone)

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.units import short
 from vcc.base.values import content
-from vcc.fields.grid import Grid
+from vcc.fields.grid import ALL, Block, Grid
 from vcc.optics.deflections import CellDeflection, FacetDeflection
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.train import Stage, Train
 from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.how import How
 from vcc.plan.model import Plan
-from vcc.plan.operators import Before, SharpenViews
+from vcc.plan.operators import Before, DarkBorder, SharpenViews
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import steps
 from vcc.plan.rays.aim import Aimed, aimed
@@ -55,7 +55,8 @@ def compile_rays(
 
     Args:
         train: the optics.
-        grid: of the light field.
+        grid: of the light field. A piece of another is looked at by the rays of the whole, and gives what its
+            samples add to the picture of the whole.
         how: what was chosen.
         reason: why rays are needed, for the plan's notes.
 
@@ -66,16 +67,26 @@ def compile_rays(
     motion, followed = decisions.keep(
         "parallax along which views are interpolated", lambda: _motion(grid, how), lambda one, other: True
     )
-    path = Path(train, grid, motion, how.rays_a_pixel or DEFAULT_SAMPLES, decisions)
+    path = Path(train, grid.whole_grid, motion, how.rays_a_pixel or DEFAULT_SAMPLES, decisions)
     taken = aimed(path)
     notes = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {taken.aim.words}"]
     core = _core(path, taken, how, notes)
     notes.append(followed)
+    before = _before(grid, how, notes)
+    if grid.beyond != ALL:
+        border = _border(grid, core, before)
+        before = (border, *before)
+        core = core.part(_with(border, grid.in_whole))
+        notes.append(
+            f"the light field is a piece of one of {'×'.join(map(str, grid.whole_grid.shape[:4]))} samples: it is "
+            "looked at by the rays of the whole, and fades towards the neighbours that it was cut from, so that "
+            "pictures of pieces add up"
+        )
     return Plan(
         sensor_shape=train.sensor.shape,
         grid_shape=grid.shape[:4],
         core=core,
-        before=_before(grid, how, notes),
+        before=before,
         cautions=tuple(_cautions(train)),
         notes=tuple(notes),
     )
@@ -121,6 +132,20 @@ def _before(grid: Grid, how: How, notes: list[str]) -> tuple[Before, ...]:
         + (", and by what their pixels' own averaging took" if grid.sample == "mean" else "")
     )
     return (SharpenViews.of(grid.sample),)
+
+
+def _border(grid: Grid, core: Rays, before: tuple[Before, ...]) -> DarkBorder:
+    """As much of a dark border around a piece as its light reaches among the samples of the whole."""
+    reach = max((operator.reach for operator in before), default=0)
+    most = (core.border, core.border, reach, reach)
+    beside = ((min(a, n), min(b, n)) for (a, b), n in zip(grid.beyond, most, strict=True))
+    return DarkBorder(tuple(beside))
+
+
+def _with(border: DarkBorder, block: Block) -> Block:
+    """A block of a whole with the border around it."""
+    ends = zip(block.ranges, border.beside, strict=True)
+    return Block(*((first - a, stop + b) for (first, stop), (a, b) in ends))
 
 
 def _cautions(train: Train) -> Iterator[str]:
