@@ -101,6 +101,7 @@ def _warnings(plan: Plan, core: Footprints) -> str:
             f"  ghosting: views' pictures of some depths stay {plan.expected_ghosting:.2g} pixels apart; "
             "the light field has too few views for this defocus"
         )
+    lines += [f"  {caution}" for caution in plan.cautions]
     return "Warnings\n" + ("\n".join(lines) if lines else "  none")
 
 

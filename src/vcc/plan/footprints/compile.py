@@ -31,7 +31,7 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane, depends_on_view_only, tap_origin
 from vcc.plan.footprints.shares import SMALLEST_STEP
 from vcc.plan.footprints.taps import CellDivision, Taps
-from vcc.plan.footprints.words import coarse_textures, notes_of
+from vcc.plan.footprints.words import cautions_of, coarse_textures, notes_of
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews, OnSensor, SwapPixelAxes
@@ -232,7 +232,8 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         before=tuple(before),
         after=tuple(after),
         expected_ghosting=between.gap_left,
-        notes=notes + coarse_textures(lookups) + blurs.notes,
+        notes=notes + blurs.notes,
+        cautions=cautions_of(division, (fine, spilt)) + coarse_textures(lookups),
     )
     # Gaps between views' pictures that are filled ask for parts of cells where a mask is fine.
     alone = not path_planes and (how.refine == 1 or max(between.gap_filled) <= 1)

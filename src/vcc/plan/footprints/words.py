@@ -11,8 +11,11 @@ from vcc.plan.footprints.mask_textures import texture_error
 from vcc.plan.footprints.model import MaskLookup
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision
+from vcc.plan.how import LARGEST_REFINEMENT
 from vcc.plan.parallax_rule import BetweenViews
 
+TOO_MUCH = 5e-3
+"""Error, as a share of the light, from which on a picture says it; estimates are about twice what errors are."""
 COARSE_TEXTURE = 5e-3
 """Error of a mask's texture between its points, as a share of its largest value, from which on a plan says it."""
 
@@ -72,6 +75,27 @@ def notes_of(
             "beside their edges"
         )
     return tuple(notes)
+
+
+def cautions_of(division: CellDivision, samples: tuple[int, float]) -> tuple[str, ...]:
+    """What a picture by these cells lacks so much of that it is to be said with the picture."""
+    found = []
+    if division.error > TOO_MUCH:
+        found.append(
+            "elements in different planes vary together within parts of views' cells: an error of up to "
+            f"{division.error:.1%} of the light. Pass {_finer(max(division.finer, division.parts))}more views"
+        )
+    fine, spilt = samples
+    if spilt > TOO_MUCH:
+        found.append(
+            f"a mask near the sensor is finer than the samples: an error of about {spilt:.1%} of the light beside "
+            f"its edges. Pass {_finer(fine)}finer samples"
+        )
+    return tuple(found)
+
+
+def _finer(parts: int) -> str:
+    return f"refine={2 * parts}, or " if 2 * parts <= LARGEST_REFINEMENT else ""
 
 
 def coarse_textures(lookups: tuple[MaskLookup, ...]) -> tuple[str, ...]:
