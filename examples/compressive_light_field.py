@@ -38,7 +38,7 @@ CONTRASTS = (0.1, 1.0, 10.0, 100.0)
 """Variances of a patch, as multiples of the mean of those that were learned from."""
 MEAN, MEAN_VARIANCE = 0.4, 0.1
 """Of the mean radiance of a patch."""
-OPTIONS = {"between_views": "none", "interpolation": "nearest"}
+OPTIONS = {"between_views": "none", "interpolation": "nearest", "refine": 1}
 """Each view stands for its square of the lens, each sample for its pixel."""
 
 

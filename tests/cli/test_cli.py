@@ -32,7 +32,7 @@ def test_capture_writes_a_picture_and_says_how(folder):
     assert result.exit_code == 0, result.output
     assert "picture.png: 16×12 pixels" in result.stdout
     assert "exposure" in result.stdout
-    assert "Note: 29.0% of the rays" in result.stderr  # a circle of 4 mm, 3 × 3 views of 1 mm
+    assert "Note: 28.9% of the rays" in result.stderr  # a circle of 4 mm, 3 × 3 views of 1 mm
     assert imagecodecs.png_decode((folder / "picture.png").read_bytes()).shape == (12, 16, 3)
 
 

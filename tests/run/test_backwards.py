@@ -71,7 +71,9 @@ def test_derivatives_through_the_whole_plan(name, kind):
     """
     elements, options = PLANS[name]
     given, rng = light_field(kind=kind), np.random.default_rng(6)
-    plan = vcc.Camera(elements, SENSOR).compile(given, **options)
+    # Parts of samples end nowhere at the borders of pixels: what they share out has bends there.
+    sensor = replace(SENSOR, pitch=FOCUS * 3.07e-3, decentre=(0.013 * mm, 0.029 * mm))
+    plan = vcc.Camera(elements, sensor).compile(given, **options)
     how, weights = How(engine="reference"), weights_of(SENSOR.shape)
     own = plan.numbers()
     linear = [each for each in own if each.startswith(("before", "after")) or each == "core.scale"]

@@ -88,8 +88,9 @@ def test_a_store_is_gone_through_for_the_few_pictures_alone(tmp_path):
     stored = vcc.store.save_store(field, tmp_path / "field.zarr")
     found = captured_together(several, stored, How(interpolation="linear", memory_limit=10**6))
     alone = captured_together(several, field, How(interpolation="linear"))
+    brightest = max(image.values.max() for image in alone)  # one has only what rings beside closed cells
     for one, other in zip(found, alone, strict=True):
-        np.testing.assert_allclose(one.values, other.values, rtol=0, atol=AGREEMENT * other.values.max())
+        np.testing.assert_allclose(one.values, other.values, rtol=0, atol=AGREEMENT * brightest)
 
 
 def test_few_masks_and_what_is_not_linear_in_cells_are_no_sums():

@@ -15,8 +15,8 @@ Numbers = NDArray[np.int64]
 Mesh = tuple[NDArray[np.intp], ...]
 
 
-@dataclass(frozen=True, eq=False)
-class CellDivision:
+@dataclass(frozen=True, eq=False, repr=False)
+class CellDivision(Brief):
     """How the cells of views are divided.
 
     Args:
