@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import resource
 import signal
+import sys
+import threading
 import warnings
 from pathlib import Path
 from typing import Any
@@ -217,3 +219,34 @@ def test_a_full_disk_is_told_once_and_keeps_nothing(tmp_path, capfd):
         signal.signal(signal.SIGXFSZ, before)
     assert not capfd.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("times", [1, 50], ids=["once", "in a loop"])
+@pytest.mark.parametrize("what", [KeyboardInterrupt, SystemExit, MemoryError])
+def test_what_interrupts_ends_the_work_and_the_older_file_stays(what, times, tmp_path):
+    """Signals that arrive as the library has its pieces written: h5py drops what is raised there."""
+    path, left = tmp_path / "a.mat", [times]
+    lftoolbox.save(LightField.from_views(np.full((2, 2, 8, 8), 7, np.uint8), 1e-3, 1e-3), path)
+    before = path.read_bytes()
+    noise = np.random.default_rng(0).random((3, 3, 64, 64), np.float32)
+
+    def handler(number, frame):
+        raise what
+
+    def each_call(frame, event, argument):
+        if "hdf5_writing" in frame.f_code.co_filename and frame.f_code.co_name == "write" and left[0]:
+            left[0] -= 1
+            signal.raise_signal(signal.SIGINT)
+
+    usual, traced = signal.signal(signal.SIGINT, handler), sys.gettrace()
+    threading.settrace(each_call)
+    sys.settrace(each_call)
+    try:
+        with pytest.raises(what):
+            lftoolbox.save(LightField.from_views(noise, 1e-3, 1e-3), path)
+    finally:
+        sys.settrace(traced)
+        threading.settrace(traced)
+        signal.signal(signal.SIGINT, usual)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["a.mat"]
