@@ -156,8 +156,7 @@ def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[An
         values = np.concatenate([colours, scaled[..., None].astype(values.dtype)], axis=4)
 
     def fill(file: Any, put: Put) -> None:
-        packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-        _variable(put, file, "LF", values.T, **packed)
+        _variable(put, file, "LF", values.T, compression="gzip", compression_opts=1, shuffle=True)
         options = _struct(file, "RectOptions")
         _variable(put, options, "RectCamIntrinsicsH", intrinsics_of(grid.frame).T)
         ours = _struct(file, _OURS)
@@ -181,9 +180,7 @@ def _struct(file: Any, name: str) -> Any:
     return group
 
 
-def _variable(
-    put: Put, group: Any, name: str, values: NDArray[Any], kind: str | None = None, **how: Any
-) -> None:
+def _variable(put: Put, group: Any, name: str, values: NDArray[Any], kind: str | None = None, **how: Any) -> None:
     """A variable as MATLAB stores it: its axes reversed, its class in an attribute."""
     made = put(group, name, values, **how)
     made.attrs["MATLAB_class"] = np.bytes_(kind or _CLASSES[values.dtype.name])

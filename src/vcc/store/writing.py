@@ -22,6 +22,7 @@ from vcc.base.errors import InputError
 from vcc.base.measures import decibels
 from vcc.base.progress import Progress, tell
 from vcc.base.words import first_few
+from vcc.base.workers import uninterrupted
 from vcc.fields.arrays import one_view
 from vcc.fields.disparity import DisparityMaps
 from vcc.fields.grid import Grid, Sample
@@ -116,7 +117,7 @@ class StoreWriter:
             )
         view = self._fitting(np.asarray(samples), f"view ({row}, {column}) for {self.path}")
         try:
-            self.array[row, column] = view
+            uninterrupted(self.array.__setitem__, (row, column), view)
         except OSError as error:
             kept = nv * nu - len(self.missing())
             raise InputError(
@@ -451,7 +452,8 @@ def _make(
         raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
     cut = layout(shape, kind, packing, chunks)
     part = part_of(folder)
-    try:
+
+    def make() -> None:
         store = zarr.storage.LocalStore(part)
         group = zarr.create_group(store, attributes={KEY: attributes.as_json()})
         group.create_array(
@@ -462,6 +464,9 @@ def _make(
             dimension_names=AXES[: len(shape)],
             **cut,
         )
+
+    try:
+        uninterrupted(make)
         part.replace(folder)
     except OSError as error:
         raise InputError(f"{folder} cannot be made: {error.strerror or error}") from error
@@ -496,9 +501,12 @@ def _continued(folder: Path, wanted: Attributes) -> Attributes:
 def _write_attributes(folder: Path, attributes: Attributes) -> None:
     import zarr
 
-    try:
+    def write() -> None:
         group = zarr.open_group(store=zarr.storage.LocalStore(folder), mode="r+")
         group.attrs[KEY] = attributes.as_json()
+
+    try:
+        uninterrupted(write)
     except OSError as error:
         raise InputError(
             f"{folder} could not be finished: {error.strerror or error}. All views are kept"
