@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import platform
 import weakref
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from vcc.base.errors import InputError
-from vcc.files.parts import DAY
+from vcc.files.parts import DAY, lock_of
 
 fcntl: Any
 try:
@@ -39,7 +40,7 @@ class WriterLock:
 
     def __init__(self, target: Path) -> None:
         target = Path(os.path.realpath(target))
-        self._file = target.with_name(f".{target.name}.lock")
+        self._file = lock_of(target)
         earlier = _locks.pop(self._file, None)
         if earlier is not None:
             earlier.give_back()
@@ -84,9 +85,10 @@ def _locked(file: Path, target: Path) -> int | None:
             os.close(stream)
             return None
         if _still(stream, file):
-            os.truncate(stream, 0)
-            since = f"{datetime.now():%Y-%m-%d %H:%M:%S}"
-            os.write(stream, f"process {os.getpid()} on {platform.node()} since {since}".encode())
+            with suppress(OSError):  # the disk is full; what is written next says so
+                os.truncate(stream, 0)
+                since = f"{datetime.now():%Y-%m-%d %H:%M:%S}"
+                os.write(stream, f"process {os.getpid()} on {platform.node()} since {since}".encode())
             return stream
         os.close(stream)  # who held it removed it in the meantime
 

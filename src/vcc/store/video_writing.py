@@ -26,7 +26,7 @@ from vcc.base.reading import expanded
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import atomic_path
-from vcc.files.parts import clear_folder, clear_leftovers, part_of, settle, settle_names
+from vcc.files.parts import check_name, clear_folder, clear_leftovers, part_of, settle, settle_names
 from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import Transfer, plain, written_here
 from vcc.store.compression import Compression, Pixels
@@ -281,6 +281,7 @@ def create_video(
     plain(provenance or {}, "provenance")
     names = None if channel_names is None else tuple(channel_names)
     packing = Packing(transfer, None if dtype is None else np.dtype(dtype), names, chunks, compression)
+    check_name(folder)
     restored(folder)
     there = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
     if there and not is_video(folder):

@@ -28,7 +28,7 @@ from vcc.fields.disparity import DisparityMaps
 from vcc.fields.grid import Grid, Sample
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import refusal
-from vcc.files.parts import clear_leftovers, part_of, put_in_place
+from vcc.files.parts import check_name, clear_leftovers, part_of, put_in_place
 from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import (
     ARRAY,
@@ -267,6 +267,7 @@ def create_store(
     )
     attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
     attributes.as_json()  # refuses what JSON cannot hold, before anything is made
+    check_name(folder)
     restored(folder)
     there = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
     if there:
@@ -356,6 +357,7 @@ def write_views(
         InputError: see `save_store`.
     """
     folder = Path(path).expanduser()
+    check_name(folder)
     restored(folder)
     if os.path.lexists(folder):
         _check_replaceable(folder, overwrite)
