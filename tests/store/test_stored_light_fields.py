@@ -738,3 +738,27 @@ def test_what_interrupts_is_raised_once_nothing_writes_any_more(tmp_path, monkey
     assert written[-1] == "samples/c.0.1.0.0.0"  # it was awaited
     assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
     np.testing.assert_array_equal(open_store(tmp_path / "a.zarr").read().values, light_field(seed=1).values)
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_threads_that_save_one_store_do_so_one_after_the_other(tmp_path, overwrite):
+    together, told = threading.Barrier(4), []
+
+    def save(seed):
+        together.wait()
+        try:
+            stored = save_store(light_field(seed=seed), tmp_path / "a.zarr", overwrite=overwrite)
+            told.append(stored.complete)
+        except vcc.InputError as error:
+            told.append(str(error))
+
+    threads = [threading.Thread(target=save, args=(seed,)) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    there = f"{tmp_path / 'a.zarr'} is there already: choose another name, or pass overwrite=True"
+    assert told == ([True] * 4 if overwrite else [True, there, there, there])
+    found = open_store(tmp_path / "a.zarr").read().values
+    assert any(np.array_equal(found, light_field(seed=seed).values) for seed in range(4))
+    assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import platform
+import threading
 import weakref
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,10 @@ except ImportError:  # Windows
 
 _locks: weakref.WeakValueDictionary[Path, WriterLock] = weakref.WeakValueDictionary()
 """Those of this process, by the file that stands for them."""
+_turns: weakref.WeakValueDictionary[Path, Any] = weakref.WeakValueDictionary()
+"""Locks for the threads of this process that write a thing as a whole, by the same file."""
+_one_thread = threading.Lock()
+"""Held while the above are looked at."""
 
 
 class WriterLock:
@@ -41,12 +47,13 @@ class WriterLock:
     def __init__(self, target: Path) -> None:
         target = Path(os.path.realpath(target))
         self._file = lock_of(target)
-        earlier = _locks.pop(self._file, None)
-        if earlier is not None:
-            earlier.give_back()
-        self._held = _locked(self._file, target)
-        self._let_go = weakref.finalize(self, _let_go, self._held, self._file, os.getpid())
-        _locks[self._file] = self
+        with _one_thread:
+            earlier = _locks.pop(self._file, None)
+            if earlier is not None:
+                earlier.give_back()
+            self._held = _locked(self._file, target)
+            self._let_go = weakref.finalize(self, _let_go, self._held, self._file, os.getpid())
+            _locks[self._file] = self
 
     @property
     def held(self) -> bool:
@@ -61,6 +68,16 @@ class WriterLock:
     def give_back(self) -> None:
         """Let others write."""
         self._let_go()
+
+
+@contextmanager
+def in_turn(target: Path) -> Iterator[None]:
+    """Write a thing as a whole; other threads of this process that do so wait."""
+    file = lock_of(Path(os.path.realpath(target)))
+    with _one_thread:
+        turn = _turns.setdefault(file, threading.RLock())
+    with turn:
+        yield
 
 
 def _locked(file: Path, target: Path) -> int | None:

@@ -29,7 +29,7 @@ from vcc.fields.grid import Grid, Sample
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import refusal
 from vcc.files.parts import check_name, clear_leftovers, part_of, put_in_place
-from vcc.files.writer_lock import WriterLock
+from vcc.files.writer_lock import WriterLock, in_turn
 from vcc.store.attributes import (
     ARRAY,
     AXES,
@@ -358,20 +358,21 @@ def write_views(
     """
     folder = Path(path).expanduser()
     check_name(folder)
-    restored(folder)
-    if os.path.lexists(folder):
-        _check_replaceable(folder, overwrite)
-    lock = WriterLock(folder)
-    try:
-        clear_leftovers(folder, lock.patience)
-        stated |= {"disparity_range": grid.disparity_range, "sample": grid.sample}
-        part = part_of(folder)
-        begin = partial(create_store, part, grid.frame, grid.shape, grid.kind, **stated)
-        with in_one_piece(folder, part, begin, partial(_put_in_place, part, folder, overwrite)) as writer:
-            write_all(writer, view, progress, disparity)
-    finally:
-        lock.give_back()
-    return open_store(folder)
+    with in_turn(folder):
+        restored(folder)
+        if os.path.lexists(folder):
+            _check_replaceable(folder, overwrite)
+        lock = WriterLock(folder)
+        try:
+            clear_leftovers(folder, lock.patience)
+            stated |= {"disparity_range": grid.disparity_range, "sample": grid.sample}
+            part = part_of(folder)
+            begin = partial(create_store, part, grid.frame, grid.shape, grid.kind, **stated)
+            with in_one_piece(folder, part, begin, partial(_put_in_place, part, folder, overwrite)) as writer:
+                write_all(writer, view, progress, disparity)
+        finally:
+            lock.give_back()
+        return open_store(folder)
 
 
 @contextmanager
