@@ -160,7 +160,7 @@ _MEMBER, _HEAD = b"PK\3\4", 30
 
 
 def _check_directory(loaded: np.lib.npyio.NpzFile, path: Path) -> None:
-    """Refuse an archive whose directory lists fewer members than there are, or calls one otherwise than it is called.
+    """Refuse an archive whose directory lists fewer members than there are, or gives one another name.
 
     What is not listed (a frame) would be taken as not stated.
     """

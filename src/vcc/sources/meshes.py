@@ -86,7 +86,7 @@ def _check_materials(path: Path) -> None:
 
 
 def _text(path: Path) -> str:
-    """The text of an OBJ or of its materials: of other codes trimesh makes a guess, or asks for a package for it."""
+    """The text of an OBJ or of its materials; of other codes trimesh makes a guess, or asks for a package."""
     try:
         return read_bytes(path).decode("utf-8")
     except UnicodeDecodeError as error:

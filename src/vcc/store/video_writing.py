@@ -31,6 +31,7 @@ from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import Transfer, plain, written_here
 from vcc.store.compression import Compression, Pixels
 from vcc.store.converting import as_kept
+from vcc.store.held import drawn
 from vcc.store.reading import restored
 from vcc.store.video_layout import UNFINISHED, VIDEO, Between, Common, Place, VideoAttributes
 from vcc.store.video_reading import is_video, open_video
@@ -290,7 +291,8 @@ def create_video(
     try:
         clear_leftovers(folder, lock.patience)
         if not there:
-            made = VideoAttributes(between or "linear", None, written_here() if provenance is None else provenance)
+            origin = written_here() if provenance is None else provenance
+            made = VideoAttributes(between or "linear", None, origin, drawn())
             _begin(folder, made)
         video = open_video(folder)
         if between not in (None, video.between):

@@ -45,6 +45,7 @@ from vcc.store.attributes import (
 )
 from vcc.store.compression import Compression, Lossless, Lossy, Pixels, layout
 from vcc.store.disparity_maps import keep_maps
+from vcc.store.held import drawn
 from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata, restored
 
 
@@ -264,6 +265,7 @@ def create_store(
         provenance,
         None if made is None else plain(made, "description"),
         sample=sample,
+        identity=drawn(),
     )
     attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
     attributes.as_json()  # refuses what JSON cannot hold, before anything is made
