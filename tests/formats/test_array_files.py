@@ -136,6 +136,28 @@ def test_damaged_files_are_refused(tmp_path, samples):
         arrays.read(plain)
 
 
+@pytest.mark.parametrize("harm", ["hidden", "renamed"])
+def test_a_directory_that_hides_a_member_is_refused(tmp_path, samples, harm):
+    """Without its frame a light field would be one of unknown cameras."""
+    path = tmp_path / "a.npz"
+    arrays.save(LightField.from_views(samples, 1e-3, 1e-3), path)
+    data = path.read_bytes()
+    start = data.index(b"PK\1\2")
+    entries = data[start : data.index(b"PK\5\6")].split(b"PK\1\2")[1:]
+    kept = [entry for entry in entries if b"frame.npy" not in entry]
+    if harm == "renamed":
+        kept = [entry.replace(b"frame.npy", b"frbme.npy") for entry in entries]
+    assert len(kept) + (harm == "hidden") == len(entries) == 4
+    directory = b"".join(b"PK\1\2" + entry for entry in kept)
+    count = len(kept).to_bytes(2, "little")
+    ends = len(directory).to_bytes(4, "little") + start.to_bytes(4, "little")
+    path.write_bytes(data[:start] + directory + b"PK\5\6" + bytes(4) + count + count + ends + bytes(2))
+    with np.load(path) as loaded:
+        assert "frame" not in loaded.files
+    with pytest.raises(InputError, match="is damaged: its directory"):
+        arrays.read(path)
+
+
 @pytest.mark.parametrize(
     ("entry", "message"),
     [

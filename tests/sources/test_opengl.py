@@ -239,11 +239,14 @@ TARGET = disc((0, 0, -1), 0.1)
         ("broken.glb", b"glTF\x02\x00\x00\x00\xff\xff\x00\x00rest", "broken.glb cannot be read"),
         ("bare.obj", b"mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "material file none.mtl"),
         ("pale.obj", b"mtllib pale.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "my wood.png"),
+        ("grün.obj", "# grün\nv 0 0 0\n".encode("latin1"), r"grün\.obj is not text in UTF-8 \(byte 4 is 0xfc\)"),
+        ("paint.obj", b"mtllib paint.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"paint\.mtl is not text.*iconv"),
         ("points.ply", trimesh.PointCloud(np.eye(3)).export(file_type="ply"), "points.ply holds no triangles"),
     ],
 )
 def test_files_that_cannot_be_drawn_are_refused(tmp_path, name, content, words):
     (tmp_path / "pale.mtl").write_text("newmtl a\nmap_Kd my wood.png\n")
+    (tmp_path / "paint.mtl").write_bytes("# grün\nnewmtl a\n".encode("latin1"))
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=words):

@@ -5,6 +5,7 @@ The oracle is the light field in memory; for how much is read, the bytes that Za
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import os
@@ -12,6 +13,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -716,3 +718,47 @@ def test_a_full_disk_under_a_store_written_as_a_whole_keeps_what_stood_there(tmp
         save_store(lf, tmp_path / "a.zarr", overwrite=True)
     assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
     assert open_store(tmp_path / "a.zarr").complete
+
+
+def test_what_interrupts_is_raised_once_nothing_writes_any_more(tmp_path, monkeypatch):
+    """Zarr writes in threads of its own, which went on and made a folder anew that had been taken away."""
+    real, written = zarr.storage.LocalStore.set, []
+
+    async def interrupted(self, key, value):
+        if key == "samples/c.0.1.0.0.0":
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+            await asyncio.sleep(0.3)
+        await real(self, key, value)
+        written.append(key)
+
+    save_store(light_field(seed=1), tmp_path / "a.zarr")
+    monkeypatch.setattr(zarr.storage.LocalStore, "set", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        save_store(light_field(), tmp_path / "a.zarr", overwrite=True)
+    assert written[-1] == "samples/c.0.1.0.0.0"  # it was awaited
+    assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
+    np.testing.assert_array_equal(open_store(tmp_path / "a.zarr").read().values, light_field(seed=1).values)
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_threads_that_save_one_store_do_so_one_after_the_other(tmp_path, overwrite):
+    together, told = threading.Barrier(4), []
+
+    def save(seed):
+        together.wait()
+        try:
+            stored = save_store(light_field(seed=seed), tmp_path / "a.zarr", overwrite=overwrite)
+            told.append(stored.complete)
+        except vcc.InputError as error:
+            told.append(str(error))
+
+    threads = [threading.Thread(target=save, args=(seed,)) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    there = f"{tmp_path / 'a.zarr'} is there already: choose another name, or pass overwrite=True"
+    assert told == ([True] * 4 if overwrite else [True, there, there, there])
+    found = open_store(tmp_path / "a.zarr").read().values
+    assert any(np.array_equal(found, light_field(seed=seed).values) for seed in range(4))
+    assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]

@@ -6,9 +6,11 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
+
+Result = TypeVar("Result")
 
 _this_thread = threading.local()
 
@@ -53,3 +55,31 @@ class Workers(ThreadPoolExecutor):
         interrupted = kind is not None and not issubclass(kind, Exception)
         self.shutdown(wait=not interrupted, cancel_futures=kind is not None)
         return False
+
+
+def uninterrupted(
+    work: Callable[..., Result], /, *given: Any, end: Callable[[BaseException], object] | None = None
+) -> Result:
+    """What some work returns, done in a thread of its own, where nothing interrupts; this one waits.
+
+    Python handles Ctrl-C and other signals in its main thread alone. So what they raise never arrives in the midst
+    of a library that drops it (h5py) or that goes on in threads of its own (Zarr): what was interrupted is over
+    when it is raised here.
+
+    Args:
+        work: called with what is given.
+        given: to it.
+        end: called with what is raised here meanwhile, so that long work ends early.
+
+    Raises:
+        BaseException: what the work raises, or, once it is over, what was raised here meanwhile.
+    """
+    with Workers(1) as worker:
+        try:
+            done: Future[Result] = worker.submit(work, *given)
+            return done.result()
+        except BaseException as error:
+            if end is not None:
+                end(error)
+            worker.shutdown()
+            raise

@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 
 from vcc.base.errors import InputError
-from vcc.files.parts import clear_leftovers, part_of
+from vcc.files.parts import check_name, clear_leftovers, part_of
 
 
 @contextmanager
@@ -54,7 +54,7 @@ def refusal(error: OSError, part: Path) -> str:
     """
     reason = error.strerror or str(error)
     if error.errno not in (errno.ENOSPC, errno.EDQUOT):
-        return f"{reason}. Write to another folder, or get permission"
+        return f"{reason}. {_WAYS_OUT.get(error.errno, 'Write to another folder')}"
     files = part.rglob("*") if part.is_dir() else [part]
     written = sum(_taken(file) for file in files if file.is_file())
     free = shutil.disk_usage(part.parent).free
@@ -62,6 +62,23 @@ def refusal(error: OSError, part: Path) -> str:
         f"{reason}. {_megabytes(written)} MB of it were written, and {_megabytes(free)} MB are free there: make "
         "room on the disk, or write to another"
     )
+
+
+_NOT_ALLOWED = "Write to another folder, or get permission"
+_WAYS_OUT: dict[int | None, str] = {
+    errno.EACCES: _NOT_ALLOWED,
+    errno.EPERM: _NOT_ALLOWED,
+    errno.EROFS: _NOT_ALLOWED,
+    errno.EFBIG: "Write to another disk, or allow larger files (ulimit -f)",
+    errno.ENAMETOOLONG: "Choose a shorter name",
+}
+
+
+def said_by_disk(words: str) -> OSError:
+    """What the disk refused, of a library that hands on its words alone."""
+    known = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM)
+    number = next((number for number in known if os.strerror(number) in words), None)
+    return OSError(words) if number is None else OSError(number, os.strerror(number))
 
 
 def _taken(file: Path) -> int:
@@ -76,6 +93,7 @@ def _megabytes(count: int) -> str:
 
 def _check_target(target: Path) -> None:
     folder = target.parent
+    check_name(target)
     if not folder.exists():
         raise InputError(
             f"{target.name} cannot be written: the folder {folder} does not exist. "

@@ -34,6 +34,8 @@ from vcc.files.camera_families import (
     unit_of,
 )
 from vcc.files.camera_reading import Beside, read_array
+from vcc.files.npy import write_npy
+from vcc.files.parts import stem_and_ending
 from vcc.optics import Element
 from vcc.optics.train import Train
 from vcc.shapes import patterns
@@ -61,7 +63,7 @@ def write_tables(file: Path, tables: Mapping[str, Any], arrays: Mapping[str, NDA
 
     for name, values in arrays.items():  # first, so that the camera file never names a missing one
         with atomic_path(file.parent / name) as temporary, temporary.open("wb") as stream:
-            np.save(stream, values)
+            write_npy(values, stream)
     with atomic_path(file) as temporary:
         temporary.write_text(tomli_w.dumps(tables), encoding="utf-8")
 
@@ -188,7 +190,9 @@ class Writer(Brief):
     def array(self, values: NDArray[np.float64], field: str = "") -> str:
         """The name of the file that will hold an array."""
         # All arrays have values: that name would say nothing.
-        stem = f"{self.file.stem}_{self.slug}" + (f"_{field}" if field not in ("", "values") else "")
+        stem = f"{stem_and_ending(self.file)[0]}_{self.slug}" + (
+            f"_{field}" if field not in ("", "values") else ""
+        )
         name, count = f"{stem}.npy", 1
         while name in self.arrays:
             count += 1

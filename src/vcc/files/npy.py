@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,17 @@ from vcc.base.errors import InputError
 from vcc.base.reading import check_file, reading
 
 _ZIP = b"PK\x03\x04"
+
+
+def write_npy(values: NDArray[Any], stream: IO[bytes]) -> None:
+    """Write an array as ``numpy.save`` does, which says of a full disk no more than how many elements fitted.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    values = np.asarray(values, order="C")
+    np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(values))
+    stream.write(values.reshape(-1).view(np.uint8).data)
 
 
 def read_npy(path: Path, what: str = "file") -> NDArray[Any]:

@@ -19,6 +19,9 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
+from vcc.base.errors import InputError
+from vcc.base.reading import shown
+
 DAY = 86400.0
 """Seconds after which a part of another machine's process, of which nothing is known, counts as left behind."""
 
@@ -33,9 +36,57 @@ def set_aside(target: Path) -> Path:
     return _named(target, "old")
 
 
+def check_name(target: Path) -> None:
+    """Refuse a name that no file can have.
+
+    Raises:
+        InputError: it is too long.
+    """
+    size, most = len(os.fsencode(target.name)), _longest_name(target.parent)
+    if size > most:
+        raise InputError(
+            f"{shown(target.name, 60)} cannot be written: the name has {size} bytes, and the disk allows {most}. "
+            "Choose a shorter name"
+        )
+
+
+def lock_of(target: Path) -> Path:
+    """A name beside a target, for the lock of who writes it."""
+    stem, suffix = stem_and_ending(target)
+    return target.with_name(f".{stem}{suffix}.lock")
+
+
 def _named(target: Path, state: str) -> Path:
     writer = f"{_machine()}-{os.getpid()}-{secrets.token_hex(4)}"
-    return target.with_name(f".{target.stem}.{writer}.{state}{target.suffix}")
+    stem, suffix = stem_and_ending(target)
+    return target.with_name(f".{stem}.{writer}.{state}{suffix}")
+
+
+_LONGEST_ENDING = 16
+"""Bytes of what is an ending; more are part of a name."""
+_ADDED = len(f"..{'.'}{'0' * 8}-{'0' * 10}-{'0' * 8}.part.lock")
+"""Characters that names made of a target's have more than it, at most: those of the lock of a part."""
+
+
+def stem_and_ending(target: Path) -> tuple[str, str]:
+    """Stem and ending of a target; the stem cut, and marked, where names made of it would be too long."""
+    stem, suffix = target.stem, target.suffix
+    if len(os.fsencode(suffix)) > _LONGEST_ENDING:
+        stem, suffix = target.name, ""
+    whole = os.fsencode(stem)
+    most = _longest_name(target.parent) - _ADDED - len(os.fsencode(suffix))
+    if len(whole) <= most:
+        return stem, suffix
+    mark = f"~{zlib.crc32(whole):08x}"
+    return whole[: most - len(mark)].decode(errors="ignore") + mark, suffix
+
+
+def _longest_name(folder: Path) -> int:
+    """Bytes that a name in a folder may have."""
+    try:
+        return os.pathconf(folder, "PC_NAME_MAX")
+    except (AttributeError, OSError, ValueError):  # Windows; no such folder
+        return 255
 
 
 def clear_leftovers(target: Path, patience: float = DAY) -> None:
@@ -164,7 +215,8 @@ def put_back(target: Path) -> bool:
 
 def _left(target: Path, state: str, patience: float) -> Iterator[Path]:
     """What writers that are dead left of a target."""
-    return _parts(target.parent, re.escape(target.stem), state, re.escape(target.suffix), patience)
+    stem, suffix = stem_and_ending(target)
+    return _parts(target.parent, re.escape(stem), state, re.escape(suffix), patience)
 
 
 def _parts(folder: Path, stem: str, state: str, suffix: str, patience: float) -> Iterator[Path]:

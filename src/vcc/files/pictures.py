@@ -15,6 +15,7 @@ from vcc.base.errors import InputError
 from vcc.base.reading import check_file
 from vcc.base.showing import Shown
 from vcc.files import transfer
+from vcc.files.atomic import said_by_disk
 from vcc.files.destination import Destination, Target
 from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_png
 from vcc.files.statement import Statement, in_png, statement_of, tiff_tags, write_npy
@@ -404,7 +405,10 @@ def _write_exr(values: NDArray[np.float32], path: Path, text: str) -> None:
         channels = {name: np.ascontiguousarray(values[..., n]) for n, name in enumerate(names)}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, "comments": text}
     with OpenEXR.File(header, channels) as file:
-        file.write(str(path))
+        try:
+            file.write(str(path))
+        except RuntimeError as error:
+            raise said_by_disk(str(error)) from error
 
 
 def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:

@@ -25,6 +25,7 @@ from vcc.base.errors import InputError
 from vcc.base.fingerprint import Untold, fingerprint
 from vcc.base.reading import check_file, shown
 from vcc.base.version import VERSION
+from vcc.files import npy
 from vcc.optics.train import Train
 
 KEY: Final = "vcc_picture"
@@ -367,9 +368,9 @@ def _exr_text(path: Path) -> str | None:
 
 def write_npy(values: NDArray[Any], path: Path, text: str) -> None:
     """An array, and behind it, as another one, its statement."""
-    with path.open("wb") as file:  # np.save would append an ending of its own
-        np.save(file, values)
-        np.save(file, np.array(text.encode("ascii")))
+    with path.open("wb") as file:
+        npy.write_npy(values, file)
+        npy.write_npy(np.array(text.encode("ascii")), file)
 
 
 def _npy_text(path: Path) -> str | None:

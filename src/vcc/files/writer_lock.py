@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 import platform
+import threading
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from vcc.base.errors import InputError
-from vcc.files.parts import DAY
+from vcc.files.parts import DAY, lock_of
 
 fcntl: Any
 try:
@@ -20,6 +23,10 @@ except ImportError:  # Windows
 
 _locks: weakref.WeakValueDictionary[Path, WriterLock] = weakref.WeakValueDictionary()
 """Those of this process, by the file that stands for them."""
+_turns: weakref.WeakValueDictionary[Path, Any] = weakref.WeakValueDictionary()
+"""Locks for the threads of this process that write a thing as a whole, by the same file."""
+_one_thread = threading.Lock()
+"""Held while the above are looked at."""
 
 
 class WriterLock:
@@ -39,13 +46,14 @@ class WriterLock:
 
     def __init__(self, target: Path) -> None:
         target = Path(os.path.realpath(target))
-        self._file = target.with_name(f".{target.name}.lock")
-        earlier = _locks.pop(self._file, None)
-        if earlier is not None:
-            earlier.give_back()
-        self._held = _locked(self._file, target)
-        self._let_go = weakref.finalize(self, _let_go, self._held, self._file, os.getpid())
-        _locks[self._file] = self
+        self._file = lock_of(target)
+        with _one_thread:
+            earlier = _locks.pop(self._file, None)
+            if earlier is not None:
+                earlier.give_back()
+            self._held = _locked(self._file, target)
+            self._let_go = weakref.finalize(self, _let_go, self._held, self._file, os.getpid())
+            _locks[self._file] = self
 
     @property
     def held(self) -> bool:
@@ -60,6 +68,16 @@ class WriterLock:
     def give_back(self) -> None:
         """Let others write."""
         self._let_go()
+
+
+@contextmanager
+def in_turn(target: Path) -> Iterator[None]:
+    """Write a thing as a whole; other threads of this process that do so wait."""
+    file = lock_of(Path(os.path.realpath(target)))
+    with _one_thread:
+        turn = _turns.setdefault(file, threading.RLock())
+    with turn:
+        yield
 
 
 def _locked(file: Path, target: Path) -> int | None:
@@ -84,9 +102,10 @@ def _locked(file: Path, target: Path) -> int | None:
             os.close(stream)
             return None
         if _still(stream, file):
-            os.truncate(stream, 0)
-            since = f"{datetime.now():%Y-%m-%d %H:%M:%S}"
-            os.write(stream, f"process {os.getpid()} on {platform.node()} since {since}".encode())
+            with suppress(OSError):  # the disk is full; what is written next says so
+                os.truncate(stream, 0)
+                since = f"{datetime.now():%Y-%m-%d %H:%M:%S}"
+                os.write(stream, f"process {os.getpid()} on {platform.node()} since {since}".encode())
             return stream
         os.close(stream)  # who held it removed it in the meantime
 

@@ -12,7 +12,7 @@ import math
 import zipfile
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ ENDINGS = (".npy", ".npz")
 _OWN = ("values", "frame", "transfer", "sample", "disparity_range")
 _MOST_LIKELY_CHANNELS = 4  # an axis of so few samples is colour rather than a picture's width
 _ORDER = "vutsc"
+_AGAIN = "Copy it again from where it came from"
 
 
 def recognised(path: Path) -> bool:
@@ -126,6 +127,7 @@ def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
                 raise InputError(f"{path} holds one array without a name: end its own name in .npy")
             names = loaded.files
             _check_unpacked(loaded, path)
+            _check_directory(loaded, path)
             if key is not None:
                 if key not in names:
                     raise InputError(f'{path} holds no array "{key}", but {_listed(names)}')
@@ -138,7 +140,7 @@ def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
         raise
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, KeyError, zipfile.error, MemoryError) as error:
         objects = any(word in str(error) for word in ("Object arrays", "Python objects", "pickle"))
-        way_out = "Save numbers only" if objects else "Copy it again from where it came from"
+        way_out = "Save numbers only" if objects else _AGAIN
         raise InputError(
             f"{path} cannot be read as arrays: it is truncated, damaged, of Python objects or too large "
             f"({error}). {way_out}"
@@ -151,6 +153,41 @@ def _check_unpacked(loaded: np.lib.npyio.NpzFile, path: Path) -> None:
     """Refuse arrays that unpack to more than so few bytes may hold."""
     members = [] if loaded.zip is None else loaded.zip.infolist()
     check_claim(sum(member.file_size for member in members), path.stat().st_size, str(path), LIGHT_FIELD)
+
+
+_MEMBER, _HEAD = b"PK\3\4", 30
+"""How a member of an archive begins: a head of so many bytes, then its name."""
+
+
+def _check_directory(loaded: np.lib.npyio.NpzFile, path: Path) -> None:
+    """Refuse an archive whose directory lists fewer members than there are, or gives one another name.
+
+    What is not listed (a frame) would be taken as not stated.
+    """
+    archive = loaded.zip
+    if archive is None:
+        return
+    end = 0
+    with path.open("rb") as file:
+        for member in sorted(archive.infolist(), key=lambda each: each.header_offset):
+            _check_gap(file, end, member.header_offset, path)
+            file.seek(member.header_offset)
+            head = file.read(_HEAD)
+            called = file.read(int.from_bytes(head[26:28], "little"))
+            codes = "utf-8" if member.flag_bits & 0x800 else "cp437"
+            if head[:4] != _MEMBER or called != member.orig_filename.encode(codes, "replace"):
+                raise InputError(
+                    f"{path} is damaged: its directory calls a member {member.orig_filename!r}. {_AGAIN}"
+                )
+            end = file.tell() + int.from_bytes(head[28:30], "little") + member.compress_size
+        _check_gap(file, end, archive.start_dir, path)
+
+
+def _check_gap(file: IO[bytes], first: int, stop: int, path: Path) -> None:
+    """Refuse a member in a part of an archive that no member is said to be in."""
+    file.seek(first)
+    if _MEMBER in file.read(max(stop - first, 0)):
+        raise InputError(f"{path} is damaged: its directory leaves out members that are there. {_AGAIN}")
 
 
 def _listed(names: list[str]) -> str:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,15 +57,11 @@ class Film:
             self._write_mp4(frames, path, words)
 
     def _write_mp4(self, frames: Iterable[Codes], path: Path, words: str) -> None:
-        av: Any = video.library()
         # The common chroma of H.264 goes by pairs of pixels.
         even = (
             np.pad(each, ((0, each.shape[0] % 2), (0, each.shape[1] % 2), (0, 0)), mode="edge") for each in frames
         )
-        try:
-            video.encode(av, path, even, self.frames_per_second, quality=18, lossless=False)
-        except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
-            raise InputError(f"{words} could not be written as a video: {error}") from error
+        video.encode(path, even, self.frames_per_second, quality=18, lossless=False, words=words)
 
     def _write_gif(self, frames: Sequence[Codes], path: Path) -> None:
         """By Pillow, which Matplotlib brings; without FFmpeg."""

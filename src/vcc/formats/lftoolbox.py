@@ -25,7 +25,7 @@ from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
 from vcc.formats import hdf5, hdf5_reading
 from vcc.formats.grid import Decoded, Geometry, weights_apart
-from vcc.formats.hdf5_writing import new_file
+from vcc.formats.hdf5_writing import Put, write_file
 
 _TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
 _FROM_ZERO = Affine.translation(1, 1, 1, 1)  # from indices counted from 0 to MATLAB's
@@ -154,19 +154,20 @@ def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[An
         colours = values if values.ndim == 5 else values[..., None]
         scaled = np.rint(weights * whole) if values.dtype.kind == "u" else weights
         values = np.concatenate([colours, scaled[..., None].astype(values.dtype)], axis=4)
+
+    def fill(file: Any, put: Put) -> None:
+        _variable(put, file, "LF", values.T, compression="gzip", compression_opts=1, shuffle=True)
+        options = _struct(file, "RectOptions")
+        _variable(put, options, "RectCamIntrinsicsH", intrinsics_of(grid.frame).T)
+        ours = _struct(file, _OURS)
+        for name, word in (("Transfer", "linear"), ("Sample", grid.sample)):
+            _variable(put, ours, name, np.frombuffer(word.encode("utf-16-le"), np.uint16)[:, None], "char")
+        _variable(put, ours, "HasWeight", np.array([[float(weights is not None)]]))
+        if grid.disparity_range is not None:
+            _variable(put, ours, "DisparityRange", np.array(grid.disparity_range, float)[:, None])
+
     with atomic_path(path) as temporary:
-        with new_file(temporary, userblock_size=512) as file:
-            _variable(
-                file, "LF", np.ascontiguousarray(values.T), compression="gzip", compression_opts=1, shuffle=True
-            )
-            options = _struct(file, "RectOptions")
-            _variable(options, "RectCamIntrinsicsH", np.ascontiguousarray(intrinsics_of(grid.frame).T))
-            ours = _struct(file, _OURS)
-            for name, word in (("Transfer", "linear"), ("Sample", grid.sample)):
-                _variable(ours, name, np.frombuffer(word.encode("utf-16-le"), np.uint16)[:, None], "char")
-            _variable(ours, "HasWeight", np.array([[float(weights is not None)]]))
-            if grid.disparity_range is not None:
-                _variable(ours, "DisparityRange", np.array(grid.disparity_range, float)[:, None])
+        write_file(temporary, fill, userblock_size=512)
         with temporary.open("r+b") as raw:
             # Text, no subsystem, version 2.0 and the byte order: what MATLAB looks at before it calls HDF5.
             raw.write(_HEADER.encode().ljust(116) + bytes(8) + b"\x00\x02IM")
@@ -179,9 +180,9 @@ def _struct(file: Any, name: str) -> Any:
     return group
 
 
-def _variable(group: Any, name: str, values: NDArray[Any], kind: str | None = None, **how: Any) -> None:
+def _variable(put: Put, group: Any, name: str, values: NDArray[Any], kind: str | None = None, **how: Any) -> None:
     """A variable as MATLAB stores it: its axes reversed, its class in an attribute."""
-    made = group.create_dataset(name, data=values, **how)
+    made = put(group, name, values, **how)
     made.attrs["MATLAB_class"] = np.bytes_(kind or _CLASSES[values.dtype.name])
     if kind == "char":
         made.attrs["MATLAB_int_decode"] = np.int32(2)

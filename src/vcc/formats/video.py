@@ -179,7 +179,7 @@ def save(
     rows, columns, height, width = grid.shape[:4]
     way = _way(rows, columns, flight)
     numbers = Codes(light_field, 8, "srgb", exposure)
-    av = library()
+    library()
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
         for row, column in way:
@@ -190,10 +190,7 @@ def save(
             yield np.ascontiguousarray(codes)
 
     with atomic_path(path) as temporary:
-        try:
-            encode(av, temporary, pictures(), frames_per_second, quality, lossless)
-        except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
-            raise InputError(f"{path} could not be written as a video: {error}") from error
+        encode(temporary, pictures(), frames_per_second, quality, lossless, f"{path}")
     return len(way), numbers.exposure, numbers.clipped
 
 
@@ -313,6 +310,37 @@ def _way(rows: int, columns: int, flight: Flight) -> list[tuple[int, int]]:
 
 
 def encode(
+    path: Path,
+    pictures: Iterator[NDArray[np.uint8]],
+    frames_per_second: float,
+    quality: int,
+    lossless: bool,
+    words: str,
+) -> None:
+    """Write sRGB pictures, all of one even size, as an H.264 film.
+
+    Args:
+        path: where to.
+        pictures: (rows, columns, 3) each.
+        frames_per_second: how fast.
+        quality: H.264's constant rate factor, 0 (best) to 51.
+        lossless: keep every bit, as RGB; few players show it.
+        words: what to call the file in an error.
+
+    Raises:
+        InputError: no PyAV, or what it cannot write.
+        OSError: the disk refuses.
+    """
+    av = library()
+    try:
+        _encode(av, path, pictures, frames_per_second, quality, lossless)
+    except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
+        if isinstance(error, OSError) and error.errno:
+            raise
+        raise InputError(f"{words} could not be written as a video: {error}") from error
+
+
+def _encode(
     av: Any,
     path: Path,
     pictures: Iterator[NDArray[np.uint8]],
@@ -320,16 +348,6 @@ def encode(
     quality: int,
     lossless: bool,
 ) -> None:
-    """Write sRGB pictures, all of one even size, as an H.264 film.
-
-    Args:
-        av: from `library`.
-        path: where to.
-        pictures: (rows, columns, 3) each.
-        frames_per_second: how fast.
-        quality: H.264's constant rate factor, 0 (best) to 51.
-        lossless: keep every bit, as RGB; few players show it.
-    """
     with av.open(str(path), "w", options={"movflags": "+faststart"}) as container:
         stream: Any = None
         for picture in pictures:

@@ -21,7 +21,7 @@ from vcc.base.progress import Progress, tell
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import refusal
-from vcc.files.parts import clear_leftovers, part_of
+from vcc.files.parts import check_name, clear_leftovers, part_of
 from vcc.files.pictures import Exposure, save_picture, write_codes
 from vcc.files.statement import Statement
 from vcc.formats import arrays, eslf, lftoolbox, video
@@ -304,6 +304,7 @@ def _check_folder_options(grid: Grid, kind: str, ending: str, exposure: Exposure
 @contextmanager
 def _new_folder(path: Path) -> Iterator[Path]:
     """A temporary folder beside ``path``; it becomes ``path`` if all goes well, and else nothing is left of it."""
+    check_name(path)
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         what = "holds files already" if path.is_dir() else "is a file"
         raise InputError(f"{path} {what}: give the name of a new folder, or move it away")

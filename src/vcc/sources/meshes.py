@@ -85,8 +85,19 @@ def _check_materials(path: Path) -> None:
                 raise InputError(f"{library} names the picture {picture.name}, and there is no {picture}")
 
 
+def _text(path: Path) -> str:
+    """The text of an OBJ or of its materials; of other codes trimesh makes a guess, or asks for a package."""
+    try:
+        return read_bytes(path).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path} is not text in UTF-8 (byte {error.start:,} is 0x{error.object[error.start]:02x}): save it in "
+            f'UTF-8, such as by iconv -f latin1 -t utf-8 "{path.name}"'
+        ) from None
+
+
 def _named_in(path: Path, word: str) -> list[Path]:
-    lines = read_bytes(path).decode("utf-8", errors="replace").splitlines()
+    lines = _text(path).splitlines()
     rests = [
         line.split(maxsplit=1)[1].strip() for line in lines if line.split()[:1] == [word] and len(line.split()) > 1
     ]

@@ -11,7 +11,6 @@ import hashlib
 import math
 import os
 import re
-import secrets
 import shutil
 import subprocess
 import tempfile
@@ -27,6 +26,7 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded, is_file, read_bytes, reading, unpacked_gzip
+from vcc.files.parts import part_of
 from vcc.files.picture_decoders import read_exr_channels
 from vcc.sources.views import ViewCamera
 
@@ -275,7 +275,7 @@ class PbrtRenderer:
         """
         seed = (self._seed * 1_000_003 + camera.row * 65_537 + camera.column) % 2**31
         path = self._scene.path
-        wrapper = path.with_name(f".{path.stem}.vcc-{secrets.token_hex(4)}.pbrt")
+        wrapper = part_of(path.with_suffix(".pbrt"))
         with tempfile.TemporaryDirectory() as folder:
             picture = Path(folder) / "view.exr"
             try:

@@ -16,6 +16,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.version import VERSION
 from vcc.fields.grid import Sample
+from vcc.store.held import IDENTITY
 
 FORMAT_VERSION = 1
 """Of the attributes and the layout below; a reader refuses what is newer than it knows."""
@@ -49,6 +50,7 @@ class Attributes(Brief):
         lossy: codec, quality and measured PSNR, or None where samples are kept exactly.
         complete: whether all views are there.
         sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; stores that do not state it hold means.
+        identity: drawn when the store was made (`vcc.store.held`); None of those that are older.
     """
 
     frame: Affine
@@ -60,11 +62,13 @@ class Attributes(Brief):
     lossy: dict[str, Any] | None = None
     complete: bool = False
     sample: Sample = "mean"
+    identity: str | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The attributes as they are written."""
         return {
             "format_version": FORMAT_VERSION,
+            IDENTITY: self.identity,
             "axes": list(AXES),
             "units": UNITS,
             "frame": self.frame.matrix.tolist(),
@@ -114,6 +118,7 @@ class Attributes(Brief):
                 lossy=stated.get("lossy"),
                 complete=stated["complete"],
                 sample=stated.get("sample", "mean"),
+                identity=stated.get(IDENTITY),
             )
         except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{path}: its attributes cannot be used: {error}") from None
@@ -130,6 +135,8 @@ class Attributes(Brief):
             raise InputError(f"{owner}: frame is an invertible 5×5 map of indices to rays, not\n{self.frame!r}")
         checks.one_of(f"{owner}: transfer", self.transfer, get_args(Transfer))
         checks.one_of(f"{owner}: sample", self.sample, get_args(Sample))
+        if not isinstance(self.identity, str | None):
+            raise InputError(f"{owner}: identity is a text, not {self.identity!r}")
         if not isinstance(self.complete, bool):
             raise InputError(f"{owner}: complete is true or false, not {self.complete!r}")
         if self.disparity_range is not None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vcc.base.errors import InputError
+from vcc.base.workers import uninterrupted
 from vcc.fields.disparity import DisparityMaps
 from vcc.files.parts import clear_leftovers, part_of
 
@@ -61,14 +62,18 @@ def keep_maps(store: Path, maps: DisparityMaps) -> None:
 
     folder = store / FOLDER
     part = part_of(folder)
-    try:
-        clear_leftovers(folder)
+
+    def make() -> None:
         array = zarr.create_array(
             store=zarr.storage.LocalStore(part), shape=maps.values.shape, chunks=(1, *maps.values.shape[1:]),
             dtype="float32", fill_value=float("nan"),
         )  # fmt: skip
         array[:] = maps.values
         array.attrs.update(json.loads(json.dumps({"views": maps.views, "source": maps.source})))
+
+    try:
+        clear_leftovers(folder)
+        uninterrupted(make)
         try:
             part.rename(folder)
         except OSError:

@@ -6,6 +6,7 @@ import math
 import os
 import platform
 import warnings
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -39,10 +40,11 @@ from vcc.files.parts import put_back
 from vcc.files.transfer import decode
 from vcc.image import Image
 from vcc.light_field import LightField
-from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer, same
+from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
 from vcc.store.chunks import Chunked, Range, sharding
 from vcc.store.compression import know_pictures
 from vcc.store.disparity_maps import keep_maps, read_maps
+from vcc.store.held import Held, stated_of
 from vcc.store.video_layout import VIDEO, places
 
 MEASURED_BYTES = 2**26
@@ -64,11 +66,13 @@ class StoredLightField(OnGrid):
         path: folder of the store.
         attributes: what it states; see `vcc.store.attributes.Attributes`.
         array: the Zarr array of samples.
+        held: that the store which is read is the one that was opened; None in the hands of its writer.
     """
 
     path: Path
     attributes: Attributes
     array: Any
+    held: Held | None = None
 
     @cached_property
     def grid(self) -> Grid:
@@ -84,7 +88,8 @@ class StoredLightField(OnGrid):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Its address: whoever gets it opens the store for himself."""
-        return _opened_elsewhere, (self.path.absolute(), self.attributes, self.shape, self.dtype)
+        stated = None if self.held is None else self.held.stated
+        return _opened_elsewhere, (self.path.absolute(), self.attributes, stated)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -215,7 +220,8 @@ class StoredLightField(OnGrid):
         Raises:
             InputError: views are missing (named).
         """
-        missing = self.missing()
+        with self._through():
+            missing = self.missing()
         if missing or not self.complete:
             raise InputError(f"{self.path} is not complete: {self._count_words(missing)}")
 
@@ -242,7 +248,8 @@ class StoredLightField(OnGrid):
             Shape (rows, columns[, channels]).
 
         Raises:
-            InputError: the view is missing, its file is damaged or cut off, or it holds what is no radiance.
+            InputError: the view is missing, its file is damaged or cut off, or it holds what is no radiance; or
+                another store stands there than the one that was opened.
         """
         samples = self.stored_view(row, column, first, stop, columns)
         return decode(samples) if self.transfer == "srgb" else samples
@@ -251,6 +258,14 @@ class StoredLightField(OnGrid):
         self, row: int, column: int, first: int, stop: int, columns: Range | None = None
     ) -> NDArray[Any]:
         """As `linear_view`, always as stored."""
+        with self._through():
+            return self._stored(row, column, (first, stop), columns)
+
+    def _through(self) -> AbstractContextManager[None]:
+        """What is read within is of the store that was opened."""
+        return nullcontext() if self.held is None else self.held.through()
+
+    def _stored(self, row: int, column: int, rows: Range, columns: Range | None) -> NDArray[Any]:
         file = self.view_file(row, column)
         if not file.is_file():
             raise InputError(
@@ -258,7 +273,7 @@ class StoredLightField(OnGrid):
                 + ("Copy or make the store again" if self.complete else self._count_words(self.missing()))
             )
         try:
-            samples = self._unpacked(row, column, (first, stop), columns or (0, self.shape[3]))
+            samples = self._unpacked(row, column, rows, columns or (0, self.shape[3]))
         except MemoryError as error:
             raise InputError(
                 f"view ({row}, {column}) of {self.path} takes {self.view_bytes / 1e9:.1f} GB of memory, more than "
@@ -328,11 +343,14 @@ class StoredLightField(OnGrid):
         return values
 
     def _kept_or_found(self, progress: Progress | None) -> DisparityMaps:
-        kept = read_maps(self.path, self.shape)
+        with self._through():
+            kept = read_maps(self.path, self.shape)
         if kept is not None:
             return kept
         found = disparity_maps(self, progress=progress)
         try:
+            with self._through():  # nothing is kept beside the samples of another one
+                pass
             keep_maps(self.path, found)
         except OSError as error:
             warnings.warn(
@@ -390,14 +408,14 @@ def open_store(path: str | PathLike[str]) -> StoredLightField:
     folder = expanded(path)
     restored(folder)
     with reading(folder, "a light field in a store"):
+        held = Held.now(folder, "light field", _identity)
         array, attributes = read_metadata(folder)
         _check_array(folder, array, attributes)
-        return StoredLightField(folder, attributes, array)
+        held.check()
+        return StoredLightField(folder, attributes, array, held)
 
 
-def _opened_elsewhere(
-    path: Path, attributes: Attributes, shape: tuple[int, ...], kind: np.dtype[Any]
-) -> StoredLightField:
+def _opened_elsewhere(path: Path, attributes: Attributes, stated: str | None) -> StoredLightField:
     """A store that another process has open, opened in this one.
 
     Raises:
@@ -409,13 +427,17 @@ def _opened_elsewhere(
         raise InputError(
             f"the store is not found on {platform.node()}: {error}. All that work on it read it under one path"
         ) from error
-    stated = replace(found.attributes, frame=attributes.frame)
-    if (found.shape, found.dtype) != (shape, kind) or not same(stated.as_json(), attributes.as_json()):
+    if stated is not None and (found.held is None or found.held.stated != stated):
         raise InputError(
-            f"on {platform.node()}, {path} holds another light field, or was written to: open it anew, and see "
-            "that all that work on it read the same files"
+            f"on {platform.node()}, {path} holds another light field than the one that was opened: open it "
+            "again, and see that all that work on it read the same files"
         )
     return replace(found, attributes=attributes)
+
+
+def _identity(folder: Path) -> Any:
+    """What tells a store from another; a writer that goes on with it changes nothing of that."""
+    return stated_of(folder, KEY, ARRAY, ("complete", "lossy"))
 
 
 def _check_array(folder: Path, array: Any, attributes: Attributes) -> None:

@@ -20,6 +20,7 @@ from vcc.base.errors import InputError
 from vcc.base.reading import read_bytes, read_json, shown, stated_at
 from vcc.fields.grid import Grid, Sample, check_shape
 from vcc.store.attributes import DTYPES, Attributes, Transfer, plain
+from vcc.store.held import IDENTITY
 
 VIDEO_VERSION = 1
 """Of the attributes and the layout below; a reader refuses what is newer than it knows."""
@@ -127,16 +128,19 @@ class VideoAttributes(Brief):
         between: what there is between two frames.
         common: what all frames have in common; None before the first.
         provenance: where the video comes from, as JSON can hold it.
+        identity: drawn when the video was made (`vcc.store.held`); None of those that are older.
     """
 
     between: Between = "linear"
     common: Common | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
+    identity: str | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The attributes as they are written."""
         return {
             "format_version": VIDEO_VERSION,
+            IDENTITY: self.identity,
             "between": self.between,
             "grid": None if self.common is None else self.common.as_json(),
             "provenance": plain(self.provenance, "provenance"),
@@ -163,7 +167,10 @@ class VideoAttributes(Brief):
         common, provenance = stated.get("grid"), stated.get("provenance") or {}
         if not isinstance(provenance, dict):
             raise InputError(f"{path}: provenance is an object, not {type(provenance).__name__}")
-        return cls(between, None if common is None else Common.from_json(common, path), provenance)
+        identity = stated.get(IDENTITY)
+        if not isinstance(identity, str | None):
+            raise InputError(f"{path}: identity is a text, not {identity!r}")
+        return cls(between, None if common is None else Common.from_json(common, path), provenance, identity)
 
 
 def stated_video(folder: Path) -> dict[str, Any] | None:

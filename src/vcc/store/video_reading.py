@@ -12,9 +12,11 @@ from typing import Any, overload
 
 from vcc.base.errors import InputError
 from vcc.base.reading import check_path, expanded, reading, shown
+from vcc.store.held import Held, stated_of
 from vcc.store.reading import StoredLightField, is_store, open_store
-from vcc.store.video_layout import Between, Common, Place, VideoAttributes, places, stated_video
+from vcc.store.video_layout import VIDEO, Between, Common, Place, VideoAttributes, places, stated_video
 
+WHAT = "video"
 KEPT = 8
 """Frames that stay open, those that were asked for last: disparities are then measured once."""
 
@@ -32,12 +34,15 @@ class StoredVideo(Sequence[StoredLightField]):
         path: folder of the video.
         attributes: what it states; see `vcc.store.video_layout.VideoAttributes`.
         places: of the frames.
+        held: that the video is still the one that was opened.
     """
 
     path: Path
     attributes: VideoAttributes
     places: tuple[Place, ...]
+    held: Held
     _open: OrderedDict[int, StoredLightField] = field(default_factory=OrderedDict)
+    _known: dict[int, str] = field(default_factory=dict)
 
     @property
     def times(self) -> tuple[float, ...]:
@@ -90,7 +95,7 @@ class StoredVideo(Sequence[StoredLightField]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What is open stays here."""
-        return StoredVideo, (self.path.absolute(), self.attributes, self.places)
+        return _opened_elsewhere, (self.path.absolute(), self.attributes, self.places, self.held.stated)
 
     def __repr__(self) -> str:
         name = f"StoredVideo({self.path}: "
@@ -107,10 +112,12 @@ class StoredVideo(Sequence[StoredLightField]):
 
     def _opened(self, place: Place) -> StoredLightField:
         try:
-            frame = open_store(self.path / place.name)
+            with self.held.through():
+                frame = open_store(self.path / place.name)
             if not frame.complete:
                 raise InputError(f"{frame.path} was not finished")
         except InputError as error:
+            self.held.check()
             said = shown(str(error), 300)
             raise InputError(
                 f"{place.words}, of {self.path} cannot be used: {said}. Copy the frame again"
@@ -121,7 +128,25 @@ class StoredVideo(Sequence[StoredLightField]):
                 f"{place.words}, of {self.path} has another grid than the video states: {difference}. Copy the "
                 "frame again"
             )
+        stated = "" if frame.held is None else frame.held.stated
+        if self._known.setdefault(place.number, stated) != stated:
+            raise InputError(
+                f"{place.words}, of {self.path} is another one than before: it was replaced while the video was "
+                "read. Open the video again"
+            )
         return frame
+
+
+def _opened_elsewhere(
+    path: Path, attributes: VideoAttributes, places: tuple[Place, ...], stated: str
+) -> StoredVideo:
+    """A video that another process has open: no frame is opened here of any other one."""
+    return StoredVideo(path, attributes, places, Held(path, WHAT, _identity, stated))
+
+
+def _identity(folder: Path) -> Any:
+    """What tells a video from another; the grid comes with the first frame."""
+    return stated_of(folder, VIDEO, but=("grid",))
 
 
 def common_of(frame: StoredLightField) -> Common:
@@ -144,13 +169,14 @@ def open_video(path: str | PathLike[str]) -> StoredVideo:
     if not is_store(folder):
         raise InputError(f"{folder} is no video of light fields: it holds no zarr.json")
     with reading(folder, "a video of light fields"):
-        found = tuple(
-            places(folder)
-        )  # before what they have in common, which is stated before the first one comes
+        held = Held.now(folder, WHAT, _identity)
+        # Before what they have in common, which is stated before the first one comes.
+        found = tuple(places(folder))
         attributes = VideoAttributes.read(folder)
+        held.check()
         if found and attributes.common is None:
             raise InputError(f"{folder} states no grid, and holds a frame, {found[0].name}: see docs/store.md")
-        return StoredVideo(folder, attributes, found)
+        return StoredVideo(folder, attributes, found, held)
 
 
 def is_video(path: str | PathLike[str]) -> bool:

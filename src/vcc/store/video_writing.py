@@ -26,11 +26,12 @@ from vcc.base.reading import expanded
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import atomic_path
-from vcc.files.parts import clear_folder, clear_leftovers, part_of, settle, settle_names
+from vcc.files.parts import check_name, clear_folder, clear_leftovers, part_of, settle, settle_names
 from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import Transfer, plain, written_here
 from vcc.store.compression import Compression, Pixels
 from vcc.store.converting import as_kept
+from vcc.store.held import drawn
 from vcc.store.reading import restored
 from vcc.store.video_layout import UNFINISHED, VIDEO, Between, Common, Place, VideoAttributes
 from vcc.store.video_reading import is_video, open_video
@@ -281,6 +282,7 @@ def create_video(
     plain(provenance or {}, "provenance")
     names = None if channel_names is None else tuple(channel_names)
     packing = Packing(transfer, None if dtype is None else np.dtype(dtype), names, chunks, compression)
+    check_name(folder)
     restored(folder)
     there = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
     if there and not is_video(folder):
@@ -289,7 +291,8 @@ def create_video(
     try:
         clear_leftovers(folder, lock.patience)
         if not there:
-            made = VideoAttributes(between or "linear", None, written_here() if provenance is None else provenance)
+            origin = written_here() if provenance is None else provenance
+            made = VideoAttributes(between or "linear", None, origin, drawn())
             _begin(folder, made)
         video = open_video(folder)
         if between not in (None, video.between):

@@ -22,13 +22,14 @@ from vcc.base.errors import InputError
 from vcc.base.measures import decibels
 from vcc.base.progress import Progress, tell
 from vcc.base.words import first_few
+from vcc.base.workers import uninterrupted
 from vcc.fields.arrays import one_view
 from vcc.fields.disparity import DisparityMaps
 from vcc.fields.grid import Grid, Sample
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import refusal
-from vcc.files.parts import clear_leftovers, part_of, put_in_place
-from vcc.files.writer_lock import WriterLock
+from vcc.files.parts import check_name, clear_leftovers, part_of, put_in_place
+from vcc.files.writer_lock import WriterLock, in_turn
 from vcc.store.attributes import (
     ARRAY,
     AXES,
@@ -44,6 +45,7 @@ from vcc.store.attributes import (
 )
 from vcc.store.compression import Compression, Lossless, Lossy, Pixels, layout
 from vcc.store.disparity_maps import keep_maps
+from vcc.store.held import drawn
 from vcc.store.reading import StoredLightField, is_store, open_store, read_metadata, restored
 
 
@@ -116,7 +118,7 @@ class StoreWriter:
             )
         view = self._fitting(np.asarray(samples), f"view ({row}, {column}) for {self.path}")
         try:
-            self.array[row, column] = view
+            uninterrupted(self.array.__setitem__, (row, column), view)
         except OSError as error:
             kept = nv * nu - len(self.missing())
             raise InputError(
@@ -263,9 +265,11 @@ def create_store(
         provenance,
         None if made is None else plain(made, "description"),
         sample=sample,
+        identity=drawn(),
     )
     attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
     attributes.as_json()  # refuses what JSON cannot hold, before anything is made
+    check_name(folder)
     restored(folder)
     there = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
     if there:
@@ -355,20 +359,22 @@ def write_views(
         InputError: see `save_store`.
     """
     folder = Path(path).expanduser()
-    restored(folder)
-    if os.path.lexists(folder):
-        _check_replaceable(folder, overwrite)
-    lock = WriterLock(folder)
-    try:
-        clear_leftovers(folder, lock.patience)
-        stated |= {"disparity_range": grid.disparity_range, "sample": grid.sample}
-        part = part_of(folder)
-        begin = partial(create_store, part, grid.frame, grid.shape, grid.kind, **stated)
-        with in_one_piece(folder, part, begin, partial(_put_in_place, part, folder, overwrite)) as writer:
-            write_all(writer, view, progress, disparity)
-    finally:
-        lock.give_back()
-    return open_store(folder)
+    check_name(folder)
+    with in_turn(folder):
+        restored(folder)
+        if os.path.lexists(folder):
+            _check_replaceable(folder, overwrite)
+        lock = WriterLock(folder)
+        try:
+            clear_leftovers(folder, lock.patience)
+            stated |= {"disparity_range": grid.disparity_range, "sample": grid.sample}
+            part = part_of(folder)
+            begin = partial(create_store, part, grid.frame, grid.shape, grid.kind, **stated)
+            with in_one_piece(folder, part, begin, partial(_put_in_place, part, folder, overwrite)) as writer:
+                write_all(writer, view, progress, disparity)
+        finally:
+            lock.give_back()
+        return open_store(folder)
 
 
 @contextmanager
@@ -451,7 +457,8 @@ def _make(
         raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
     cut = layout(shape, kind, packing, chunks)
     part = part_of(folder)
-    try:
+
+    def make() -> None:
         store = zarr.storage.LocalStore(part)
         group = zarr.create_group(store, attributes={KEY: attributes.as_json()})
         group.create_array(
@@ -462,6 +469,9 @@ def _make(
             dimension_names=AXES[: len(shape)],
             **cut,
         )
+
+    try:
+        uninterrupted(make)
         part.replace(folder)
     except OSError as error:
         raise InputError(f"{folder} cannot be made: {error.strerror or error}") from error
@@ -496,9 +506,12 @@ def _continued(folder: Path, wanted: Attributes) -> Attributes:
 def _write_attributes(folder: Path, attributes: Attributes) -> None:
     import zarr
 
-    try:
+    def write() -> None:
         group = zarr.open_group(store=zarr.storage.LocalStore(folder), mode="r+")
         group.attrs[KEY] = attributes.as_json()
+
+    try:
+        uninterrupted(write)
     except OSError as error:
         raise InputError(
             f"{folder} could not be finished: {error.strerror or error}. All views are kept"

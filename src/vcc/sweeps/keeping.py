@@ -23,7 +23,7 @@ from vcc.base.errors import InputError
 from vcc.base.reading import check_path, expanded, in_words, read_bytes, read_json, stated_at
 from vcc.base.version import VERSION
 from vcc.files.atomic import refusal
-from vcc.files.parts import clear_leftovers, part_of
+from vcc.files.parts import check_name, clear_leftovers, part_of
 from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import difference, plain, same
 from vcc.sweeps.metrics import KNOWN
@@ -74,6 +74,7 @@ class InStore(Results):
     ) -> None:
         super().__init__(swept)
         self.path = Path(path).expanduser()
+        check_name(self.path)
         if not self.path.parent.is_dir():
             raise InputError(f"{self.path} cannot be made: there is no folder {self.path.parent}; make it first")
         stated = None if description is None else plain({**description, "pictures": picture}, "description")
@@ -213,6 +214,7 @@ def save_sweep(swept: Sweep, path: str | PathLike[str]) -> None:
         InputError: there is something of that name; the disk refuses.
     """
     folder = Path(path).expanduser()
+    check_name(folder)
     if os.path.lexists(folder):
         raise InputError(f"{folder} is there already: choose another name")
     picture = None if swept.pictures is None else swept.pictures.shape[len(swept.shape) :]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -96,4 +97,6 @@ class Table(Brief):
             core.Array(column.tolist(), kinds.get(column.dtype.kind, core.DataType.string()))
             for column in self.columns.values()
         ]
-        io.write_parquet(core.Table.from_arrays(arrays, names=self.headings), path)
+        packed = BytesIO()  # told to write to a disk that is full, it panics
+        io.write_parquet(core.Table.from_arrays(arrays, names=self.headings), packed)
+        path.write_bytes(packed.getbuffer())
