@@ -285,7 +285,8 @@ class Camera(Train):
         Args:
             light_field: given at the entrance plane z = 0.
             exposure: exposure time, seconds, or ``"auto"``: the time after which the brightest 0.1 % of the
-                pixels are at 90 % or more of their full well or of the largest number, whichever comes first.
+                pixels are at 90 % or more of their full well or of the largest number, whichever comes first, each
+                in its brightest channel.
             seed: of the sensor's noise, a whole number. Recordings with different seeds are independent; the
                 same seed gives the same numbers, on any number of threads.
             radiance: what a sample value of 1 stands for, W/(m²·sr), in each channel's band.
