@@ -10,6 +10,7 @@ from typing import Any, Literal, Self, TypeVar, Unpack
 from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
 from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.explain import Explanation, explained
+from vcc.advice.no_focus import no_image
 from vcc.base import checks, late
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
@@ -185,10 +186,11 @@ class Camera(Train):
 
         Warns:
             ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
-                tolerance was not reached, the cells of an array are smaller than a pixel, or the picture is 0
-                everywhere although the light field is not dark (by footprints, and no mask closes the camera).
+                tolerance was not reached, the cells of an array are smaller than a pixel, the lenses diverge so
+                that no point can be sharp, or the picture is 0 everywhere although the light field is not dark (by
+                footprints, and no mask closes the camera).
                 Where the picture is 0, a quarter of the rays or more is missing, or the picture is nearly black,
-                and a length is 1 m or more, or a pitch 2 cm, it asks whether millimetres were meant.
+                and a length is 1 m or more, a pitch 2 cm or a pixel 1 mm, it asks whether a thousandth was meant.
 
         Raises:
             InputError: an option that does not exist or does not go with the method, an element that returns
@@ -213,6 +215,8 @@ class Camera(Train):
     def _image(self, plan: Plan, light_field: Samples, found: Recorded, absurd: str) -> Image:
         """The picture that was recorded; what it is to be read with care for is said."""
         if caution := _caution(plan, light_field, found, absurd):
+            warn_of_result(caution)
+        if caution := no_image(self, light_field.grid):
             warn_of_result(caution)
         return Image(
             found.values,
