@@ -10,6 +10,7 @@ from typing import Any, Literal, Self, TypeVar, Unpack
 from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
 from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.explain import Explanation, explained
+from vcc.advice.no_focus import no_image
 from vcc.advice.noise import why_noisy
 from vcc.base import checks, late
 from vcc.base.errors import InputError, warn_of_result
@@ -188,10 +189,11 @@ class Camera(Train):
             ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
                 tolerance was not reached, the sampling error of rays exceeds 1 % of the brightest pixel (40 dB)
                 and neither samples nor a tolerance were given (the warning reports how many rays suffice), the
-                cells of an array are smaller than a pixel, or the picture is 0 everywhere although the light field
-                is not dark (by footprints, and no mask closes the camera). Where the picture is 0, a quarter of
-                the rays or more is missing, or the picture is nearly black, and a length is 1 m or more, or a
-                pitch 2 cm, it asks whether millimetres were meant.
+                cells of an array are smaller than a pixel, the lenses diverge so that no point can be sharp, masks
+                are finer than parts of cells and samples show, or the picture is 0 everywhere although the light
+                field is not dark (by footprints, and no mask closes the camera). Where the picture is 0, a quarter of the rays or more is missing, or the picture is nearly
+                black, and a length is 1 m or more, a pitch 2 cm or a pixel 1 mm, it asks whether a thousandth was
+                meant.
 
         Raises:
             InputError: an option that does not exist or does not go with the method, an element that returns
@@ -219,6 +221,8 @@ class Camera(Train):
     def _image(self, plan: Plan, light_field: Samples, found: Recorded, absurd: str) -> Image:
         """The picture that was recorded; what it is to be read with care for is said."""
         if caution := _caution(plan, light_field, found, absurd):
+            warn_of_result(caution)
+        if caution := no_image(self, light_field.grid):
             warn_of_result(caution)
         return Image(
             found.values,
@@ -291,7 +295,8 @@ class Camera(Train):
         Args:
             light_field: given at the entrance plane z = 0.
             exposure: exposure time, seconds, or ``"auto"``: the time after which the brightest 0.1 % of the
-                pixels are at 90 % or more of their full well or of the largest number, whichever comes first.
+                pixels are at 90 % or more of their full well or of the largest number, whichever comes first, each
+                in its brightest channel.
             seed: of the sensor's noise, a whole number. Recordings with different seeds are independent; the
                 same seed gives the same numbers, on any number of threads.
             radiance: what a sample value of 1 stands for, W/(m²·sr), in each channel's band.

@@ -130,8 +130,8 @@ class Image(Shown):
         Args:
             path: where to; or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
             exposure: the factor that brings the values to the range 0…1 of an sRGB file. "auto" takes 1 over the
-                99.5th percentile of the luminance: the brightest 0.5 % of the pixels may clip. It is returned, so
-                that a second picture can be written with the same.
+                99.5th percentile of the pixels' brightest channels: at most 0.5 % of the pixels clip. It is
+                returned, so that a second picture can be written with the same.
             upright: turn a real image (which lies upside down on the sensor) so that people see it upright.
             bits: bits per sample for PNG and TIFF.
             format: of a buffer: "png", "tif", "exr" or "npy".

@@ -173,7 +173,8 @@ def expose_image(
         image: irradiance on that sensor, from `vcc.Camera.capture`: radiance × steradian.
         sensor: with electronics.
         exposure: exposure time, seconds, or ``"auto"``: the time after which the brightest 0.1 % of the pixels
-            are at 90 % or more of their full well or of the largest number, whichever comes first.
+            are at 90 % or more of their full well or of the largest number, whichever comes first, each in its
+            brightest channel.
         seed: of the noise, a whole number; recordings with different seeds are independent.
         radiance: what a light field's sample value of 1 stands for, W/(m²·sr), in each channel's band.
         threads: how many work at once; None takes as many as this process may use cores. The numbers are the same.

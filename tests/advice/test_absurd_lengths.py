@@ -34,15 +34,15 @@ SENSOR = vcc.Sensor(52 * mm, (10, 10), 0.3 * mm)
             [vcc.Lens(50)],
             vcc.Sensor(52, (4, 4), 3 * mm),
             r"hardly any light will reach the sensor. focal_length of lens at z = 0 mm is 50 m, "
-            r"z of the sensor is 52 m: these are metres; "
-            r"did you mean 50 mm \(50 \* mm in Python\)\?",
+            r"z of the sensor is 52 m; did you mean 50 mm "
+            r"\(50 \* mm in Python, where a number without a unit is metres\)\?",
             id="lens and sensor far apart",
         ),
         pytest.param([vcc.Lens(50 * mm, 16)], SENSOR, r"diameter of .* did you mean 16 mm", id="diameter"),
         pytest.param(
             [vcc.Lens(50 * mm, 4 * mm)],
             vcc.Sensor(52 * mm, (10, 10), 48),
-            r"pitch of the sensor is 48 m.*did you mean 48 um \(48 \* um in Python\)",
+            r"pitch of the sensor is 48 m.*did you mean 48 um \(48 \* um in Python,",
             id="pitch in micrometres",
         ),
         pytest.param(
@@ -83,6 +83,17 @@ def test_light_that_all_views_give_the_sensor():
     share = light_share(camera, field.grid)
     assert share == pytest.approx(3 * 2 * 4 * 1 / 50**2)
     assert camera.capture(field).to_numpy()[1, 1] == pytest.approx(share, rel=1e-5)
+
+
+@pytest.mark.parametrize("pitch", ["96", "5.3"])
+def test_pixels_of_a_file_in_the_next_unit(pitch, tmp_path):
+    """Pixels of a real sensor in millimetres instead of micrometres."""
+    (tmp_path / "camera.toml").write_text(
+        '[[elements]]\nkind = "lens"\nfocal_length = "50 mm"\ndiameter = "10 mm"\n'
+        f'[sensor]\nfocus = "2 m"\nshape = [20, 30]\npitch = "{pitch} mm"\n'
+    )
+    asked = f"pitch of the sensor is {pitch} mm; did you mean {pitch} um ({pitch} * um in Python"
+    assert asked in said(vcc.load_camera(tmp_path / "camera.toml"), views(2 * mm))
 
 
 def test_units_of_files_are_named_too(tmp_path):

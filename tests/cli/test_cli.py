@@ -283,7 +283,7 @@ def test_help_on_making_a_picture_is_that_of_the_record_in_words_for_people():
         option = "--ray-seed" if field.name == "seed" else f"--{field.name.replace('_', '-')}"
         assert f"{option} " in said
     assert "--samples NUMBER Rays a pixel, rounded up to a power of two" in said
-    assert "Default: 64." in said
+    assert "Default: 64, whose error" in said
     assert "None" not in said
     assert "``" not in said
 

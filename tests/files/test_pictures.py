@@ -203,6 +203,22 @@ def test_automatic_exposure_of_dark_pictures() -> None:
     assert auto_exposure(star) == 4
 
 
+@pytest.mark.parametrize(("channel", "name"), [(0, "red"), (1, "green"), (2, "blue")])
+def test_automatic_exposure_keeps_the_hue_of_saturated_colours(channel: int, name: str, tmp_path: Path) -> None:
+    """A picture of one saturated colour: blue has 7 % of white's luminance, by which it clipped everywhere."""
+    rng = np.random.default_rng(1)
+    values = 0.05 * rng.random((40, 50, 3)).astype(np.float32)
+    values[..., channel] = rng.random((40, 50)) + 0.2
+    saved = image(values).save(tmp_path / "a.png", upright=False)
+    assert saved.clipped <= 0.005
+    assert np.count_nonzero(values.max(axis=2) > 1.0001 / saved.exposure) == 9  # 0.5 % of 2000, the 10th is white
+    assert f"auto: the 99.5th percentile of the brightest channel, here {name}, is white" in saved.description
+    shown = transfer.decode(read_picture(saved.path)[0])
+    kept = values.max(axis=2) * saved.exposure <= 1
+    # Half a code is 0.0045 of white at most (files.md): ratios of the channels are those of the light.
+    assert np.abs(shown[kept] - values[kept] * saved.exposure).max() < 0.0045
+
+
 def test_negative_values_are_shown_black_and_said(tmp_path: Path) -> None:
     saved = image(np.array([[-1, 1.0]], np.float32)).save(tmp_path / "a.png", exposure=1)
     assert "50.00% below 0" in saved.description

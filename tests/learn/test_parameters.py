@@ -149,7 +149,7 @@ def test_choices_and_functions_are_none():
         ),
         (
             {"code.pattern": np.full((3, 4), 1.5)},
-            r"code.pattern: mask \"code\": transmission lies between 0 and 1",
+            r"code.pattern \(pattern of mask \"code\"\) goes from 1.5 to 1.5, and transmission lies between 0",
         ),
         ({"code.pattern": np.ones((3, 3))}, r"code.pattern has the shape \(3, 4\), and numbers of shape \(3, 3\)"),
         ({"main.diameter": -1.0}, r"main.diameter: diameter of lens \"main\" must be greater than 0 m, not -1.0"),

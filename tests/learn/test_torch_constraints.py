@@ -54,7 +54,33 @@ def test_the_derivative_of_the_total_light_is_that_of_the_factor_too():
     assert gradient.abs().max() < 1e-12
 
 
+@pytest.mark.parametrize("share", [0.1, 0.2, 0.3, 0.4, 0.8])
+@pytest.mark.parametrize("mask", [torch.rand(3, 20, 25, dtype=torch.float64), torch.full((3, 20, 25), 0.3)])
+def test_what_is_binary_keeps_the_total_light(share, mask):
+    """The brightest cells are open, as many as the share asks for: none that is closed is brighter."""
+    given = mask.clone().requires_grad_()
+    found = binary(total_light(given, share))
+    assert found.detach().unique().tolist() == [0.0, 1.0]
+    assert found.sum(dim=(1, 2)).tolist() == [500 * share] * 3
+    for cells, opened in zip(mask, found.detach(), strict=True):
+        assert cells[opened == 1].min() >= cells[opened == 0].max()
+    weights = torch.randn_like(mask)
+    (gradient,) = torch.autograd.grad((weights * found).sum(), given)
+    (grey,) = torch.autograd.grad((weights * total_light(given, share)).sum(), given)
+    torch.testing.assert_close(gradient, grey)
+    assert torch.equal(binary(mask, share), found.detach())
+
+
+def test_an_even_mask_opens_cells_that_are_spread_evenly():
+    opened = binary(total_light(torch.full((32, 32), 0.5), 0.25))
+    parts = opened.reshape(4, 8, 4, 8).mean(dim=(1, 3))
+    # 16 of 64 cells in each part; the whole first quarter open would be 64 in four of them.
+    assert (parts - 0.25).abs().max() <= 3 / 64
+    assert binary(total_light(torch.rand(3, 4), 0.01)).sum() == 1  # one at least
+
+
 @pytest.mark.parametrize("share", [0.0, 1.0, 1.5])
-def test_a_share_lies_between_none_and_all(share):
+@pytest.mark.parametrize("function", [total_light, binary])
+def test_a_share_lies_between_none_and_all(share, function):
     with pytest.raises(vcc.InputError, match="share of the light"):
-        total_light(MASK, share)
+        function(MASK, share)

@@ -118,14 +118,33 @@ def test_gradients_go_through_the_noise():
     assert gradient.item() == pytest.approx(1.5**2 * 100, rel=0.05)  # 5 σ of 40,000 squares: 5·√(2/40,000) = 3.5 %
 
 
+def gradient_of(light, time=TIME):
+    light = light.requires_grad_()
+    found = expose(light, SENSOR, time, generator=torch.Generator().manual_seed(1)).sum()
+    return torch.autograd.grad(found, light)[0]
+
+
 def test_what_clips_has_no_gradient_and_no_light_a_finite_one():
-    for electrons, clips in ((5000.0, True), (-50.0, True), (0.0, False), (1e-3, False)):
-        light = even(electrons).requires_grad_()
-        (gradient,) = torch.autograd.grad(
-            expose(light, SENSOR, TIME, generator=torch.Generator().manual_seed(1)).sum(), light
-        )
+    for electrons, clips in ((-50.0, True), (0.0, False), (1e-3, False)):
+        gradient = gradient_of(even(electrons))
         assert torch.isfinite(gradient).all()
         assert (gradient == 0).all() == clips
+
+
+@pytest.mark.parametrize(("electrons", "saturated"), [(5000.0, 1.0), (3000.0, 0.5)])
+def test_what_is_saturated_has_no_gradient_and_says_so(electrons, saturated):
+    light = even(electrons)
+    light[: round(40 * (1 - saturated))] /= 100
+    with pytest.warns(vcc.base.errors.ResultWarning, match="and its gradients are 0") as told:
+        gradient = gradient_of(light.clone())
+    assert ((gradient == 0).double().mean().item()) == pytest.approx(saturated)
+    said = str(told[0].message)
+    # The full well of 2000 electrons is reached before 4095 numbers of 1.5 an electron; 0.9 of it is left.
+    assert f"{saturated:.1%} of what is recorded in 10 ms is saturated" in said
+    shorter = TIME * 0.9 * 2000 / electrons
+    assert f"{shorter * 1e3:.3g} ms saturates nothing" in said
+    assert (gradient_of(light.clone(), shorter) != 0).all()
+    expose(light, SENSOR, TIME)  # without gradients nothing is lost
 
 
 def test_the_same_generator_draws_the_same_noise():

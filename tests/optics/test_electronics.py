@@ -231,6 +231,16 @@ def test_auto_exposure_brings_the_brightest_to_ninety_percent():
     )
 
 
+def test_auto_exposure_of_colours_goes_by_the_pixels_brightest_channel():
+    """3 of 1000 pixels are 4 times as blue: 0.1 % of all numbers are, but 0.3 % of the pixels, which saturated."""
+    on = sensor(shape=(20, 50))
+    values = np.full((20, 50, 3), 0.25, np.float32)
+    values[:3, 0, 2] = 1.0
+    got = vcc.expose_image(vcc.Image(values, on.frame), on, "auto")
+    assert got.saturated == 0
+    assert got.electrons().max() == pytest.approx(9000, rel=0.05)  # 5 standard deviations of Poisson(9000)
+
+
 def test_auto_exposure_of_stars_goes_by_the_brightest():
     on = sensor()
     stars = np.zeros(on.shape, np.float32)

@@ -359,6 +359,7 @@ def test_coplanar_elements_commute_exactly_in_the_fold():
 # -- refinement
 
 
+@pytest.mark.filterwarnings("ignore:a mask near the sensor is finer:vcc.ResultWarning")  # of refine=2
 @pytest.mark.parametrize("interpolation", ["linear", "cubic", "sharp"])
 def test_refining_samples_converges_to_brute_force_for_a_fine_mask_near_the_sensor(interpolation):
     # Samples 4 pixels wide on the sensor, a mask of 3 samples a period at 0.97 of the way: the detail is

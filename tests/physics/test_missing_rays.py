@@ -133,7 +133,7 @@ def random_camera(seed: int) -> tuple[vcc.LightField, vcc.Camera]:
     return lf, vcc.Camera(elements, vcc.Sensor(d, (12, 15), size / 15))
 
 
-def missing_by_rays(lf: vcc.LightField, camera: vcc.Camera, number: int = 17) -> float:
+def missing_by_rays(lf: vcc.LightField, camera: vcc.Camera, number: int = 19) -> float:
     """The share of rays from the sensor through all stops that have no sample, traced one element at a time."""
     from scipy.stats import qmc
 

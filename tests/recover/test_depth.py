@@ -118,7 +118,7 @@ def test_no_texture_no_confidence(method) -> None:
 def test_progress_and_figures() -> None:
     seen = []
     field = field_of([TexturedPlane(waves(1.1, 1), 1.1)], (1, 3))
-    depth_by_plane_sweep(field, (0, 1), step=0.25, progress=lambda done, total: seen.append((done, total)))
+    depth_by_plane_sweep(field, (0.25, 1.25), step=0.25, progress=lambda done, total: seen.append((done, total)))
     assert seen == [(n, 5) for n in range(1, 6)]
     truth = np.zeros((4, 4))
     found = truth + np.array([0, 0.05, 0.1, 1])
@@ -160,6 +160,77 @@ def test_a_range_that_cannot_be_measured_is_asked_for() -> None:
         depth_by_plane_sweep(field)
 
 
+NEAR, FAR, HOLE = 1.2, 6.0, 24
+"""Metres, and pixels: a wall with a square hole in it, 3 % of its area, through which another wall is seen."""
+
+
+@lru_cache
+def wall_with_a_hole() -> tuple[vcc.LightField, np.ndarray]:
+    """The light field, nothing stated of its depth, and where only what is far is seen."""
+    rows, columns = 120, 160
+    planes = [TexturedPlane(waves(FAR, 6), FAR)]
+    for n, (along, axis) in enumerate(((rows, 1), (rows, 1), (columns, 0), (columns, 0))):
+        side, width = (-1) ** n, (along - HOLE) / 2 * SLOPE * NEAR
+        middle = side * (along + HOLE) / 4 * SLOPE * NEAR
+        placed = {"height": width, "width": 2.0} if axis else {"width": width, "height": 2.0}
+        place = (0.0, middle) if axis else (middle, 0.0)
+        planes.append(TexturedPlane(waves(NEAR, 7 + n), NEAR, middle=place, **placed))
+    field = PlanesScene(planes).light_field(
+        (5, 5), (rows, columns), spacing=SPACING, slope_per_pixel=SLOPE, focus_distance=FOCUS, dtype="float32"
+    )
+    across, down = (np.abs(np.arange(n) - (n - 1) / 2) < HOLE / 2 - 2 for n in (columns, rows))
+    return vcc.LightField(field.values, field.frame), down[:, None] & across
+
+
+@both
+def test_the_automatic_range_holds_what_the_measured_one_leaves_out(method) -> None:
+    """2 % of what is measured are left out at either end: most of what is seen through the hole."""
+    field, hole = wall_with_a_hole()
+    low, _ = field.measured_disparity_range()
+    assert low - 0.3 > disparity(FAR) + 1
+    found = method(field)
+    if method is depth_by_structure_tensor:  # whose lines are cut at the hole's rim: its middle
+        hole = hole & np.roll(hole, 6, 0) & np.roll(hole, -6, 0) & np.roll(hole, 6, 1) & np.roll(hole, -6, 1)
+    # A hundredth of a pixel is 1.5 % of 6 m: dZ/Z = dd·p·Z/du.
+    assert np.abs(found.disparity[hole] - disparity(FAR)).max() < 0.1
+    np.testing.assert_allclose(found.distance[hole], FAR, rtol=0.16)
+
+
+@both
+def test_where_the_search_ended_there_is_no_distance(method) -> None:
+    field, _ = wall_with_a_hole()
+    with pytest.warns(vcc.ResultWarning, match=r"the search ended for \d\.\d% of the pixels") as told:
+        found = method(field, (-1.5, 1.0))
+    said = str(told[0].message)
+    # 1/Z = 1/F + d·p/du
+    assert f"at a disparity of -1.5 ({1 / (1 / FOCUS - 1.5 * SLOPE / SPACING):.4g} m)" in said
+    ended = np.isnan(found.distance)
+    assert float(said.split("ended for ")[1].partition("%")[0]) == pytest.approx(100 * ended.mean(), abs=0.051)
+    assert (found.confidence[ended] == 0).all()
+    assert ended[54:66, 74:86].mean() > 0.9  # the middle of the hole
+    assert np.isfinite(found.distance[8:40, 8:-8]).all()
+
+
+@both
+@pytest.mark.filterwarnings("ignore:the search ended:vcc.ResultWarning")
+@pytest.mark.filterwarnings("ignore:.* of the pixels lie beyond infinity:vcc.ResultWarning")
+def test_nothing_is_farther_than_infinity(method) -> None:
+    """Without texture any disparity fits; those beyond infinity's, −2.67, were distances of −76 m and the like."""
+    field = field_of([TexturedPlane(waves(1.1, 7), 1.1)])
+    flat = field.values.copy()
+    flat[..., :36, :] = 0.5 + 1e-3 * np.random.default_rng(1).random(flat[..., :36, :].shape)
+    found = method(field.replaced(flat), (-6, 3))
+    beyond = found.disparity < disparity(math.inf)
+    assert beyond.mean() > 0.04
+    assert not (found.distance <= 0).any()
+    assert (np.isinf(found.distance) | np.isnan(found.distance))[beyond].all()
+    if method is depth_by_plane_sweep:
+        with pytest.warns(
+            vcc.ResultWarning, match="4.2% of the pixels lie beyond infinity, and their distance is"
+        ):
+            method(field.replaced(flat), (-6, 3))
+
+
 def turned() -> vcc.Affine:
     """Views and pixels by 30°, but pixels the other way."""
     c, s = math.cos(0.5), math.sin(0.5)
@@ -168,6 +239,7 @@ def turned() -> vcc.Affine:
     return vcc.Affine(matrix)
 
 
+@pytest.mark.filterwarnings("ignore:the search ended for 2.6%:vcc.ResultWarning")  # walls of no contrast
 @pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the HCI light field is not on this machine")
 @pytest.mark.parametrize(
     ("method", "bad", "square"), [(depth_by_structure_tensor, 0.30, 43), (depth_by_plane_sweep, 0.14, 12.2)]

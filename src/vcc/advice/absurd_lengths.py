@@ -1,4 +1,4 @@
-"""Lengths that no camera has, where a picture shows that something is wrong: millimetres given as metres."""
+"""Lengths that no camera has, where a picture shows that something is wrong: a thousand times too long."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vcc.base.units import short
+from vcc.base.units import as_python, short
 from vcc.fields.grid import Block, Grid
 from vcc.fields.samples import Samples
 from vcc.optics.train import Train
@@ -19,6 +19,8 @@ LONG = 1.0
 """Metres from which on a length of a camera, but for pitches, may be one of millimetres (or of a telescope)."""
 WIDE_PITCH = 0.02
 """Likewise a pitch of pixels or lenslets, metres."""
+WIDE_PIXEL = 1e-3, 0.01
+"""Likewise a pitch of pixels, metres, that is also such a share of the sensor's distance."""
 FAINT = 1e-5
 """Share of the scene's radiance below which a picture is nearly black: what passes at f/280, π/4/N²."""
 MANY_MISSING = 0.25
@@ -31,18 +33,22 @@ def metres_meant(train: Train, grid: Grid) -> str:
 
     Large cameras have such lengths by right: this is to be said only where rays are missing or a picture is dark.
     """
-    absurd = [(what, value) for what, value in _lengths(train, grid) if _is_absurd(what, value)]
+    wide_pixel = min(max(WIDE_PIXEL[0], WIDE_PIXEL[1] * train.sensor.z), WIDE_PITCH)
+    absurd = [(what, value) for what, value in _lengths(train, grid) if _is_absurd(what, value, wide_pixel)]
     if not absurd:
         return ""
     named = ", ".join(f"{what} is {short(value)}" for what, value in absurd[:_NAMED])
     more = ", …" if len(absurd) > _NAMED else ""
     what, value = absurd[0]
-    unit = "um" if "pitch" in what and abs(value) >= LONG else "mm"
-    return f"{named}{more}: these are metres; did you mean {value:g} {unit} ({value:g} * {unit} in Python)?"
+    # 48 in Python may stand for 48 um, 0.096 for 0.096 mm, and "96 mm" in a file for the same 96 um.
+    meant = short(value * (1e-6 if "pitch" in what and abs(value) >= LONG else 1e-3))
+    python = f"{as_python(meant)} in Python, where a number without a unit is metres"
+    return f"{named}{more}; did you mean {meant} ({python})?"
 
 
-def _is_absurd(what: str, value: float) -> bool:
-    return math.isfinite(value) and abs(value) >= (WIDE_PITCH if what.startswith("pitch") else LONG)
+def _is_absurd(what: str, value: float, wide_pixel: float) -> bool:
+    limit = wide_pixel if what == "pitch of the sensor" else WIDE_PITCH if what.startswith("pitch") else LONG
+    return math.isfinite(value) and abs(value) >= limit
 
 
 def _lengths(train: Train, grid: Grid) -> Iterator[tuple[str, float]]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vcc.advice import words
 from vcc.advice.folded import Folded, enough, singular, stretch, widest
 from vcc.advice.mask_limits import mask_limits
+from vcc.advice.no_focus import why_unfocused
 from vcc.advice.view_gaps import ROUNDING, ViewGaps, distance_of
 from vcc.advice.words import SamplingItem, SamplingLimits
 from vcc.base import checks
@@ -76,6 +77,8 @@ def sampling_limits(
 def _notes(optics: Folded) -> tuple[str, ...]:
     stages = optics.train.stages
     notes = [] if optics.blocking is None else [words.blocked(optics.blocking.element.label)]
+    if why := why_unfocused(optics):
+        notes.append(why)
     notes += [
         words.spreads(stage.element.label, _reach(optics, stage))
         for stage in stages

@@ -292,7 +292,7 @@ class SamplingLimits:
             behind the entrance plane, as behind a lens.
         free_of_ghosts: (near, far) between which no ghost copies are seen, metres; None where there is no such
             depth, or it is not given.
-        notes: what is not given and why, and what diffusers hide.
+        notes: what is not given and why, why nothing is in focus, and what diffusers hide.
         gaps: between views, as a function of distance; None where they are not given.
         pixel: the smaller pitch of the sensor, metres.
         views: (rows, columns) of views.

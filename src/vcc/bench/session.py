@@ -21,6 +21,7 @@ import numpy as np
 
 from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.limits import sampling_limits
+from vcc.advice.no_focus import no_image
 from vcc.base import units
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
@@ -578,6 +579,8 @@ class Session:
         said = list(taken.plan.cautions)
         if dark := why_dark(taken.plan, field, taken.found) or why_darker(taken.found):
             said.append(dark)
+        if unfocused := no_image(train, field.grid):
+            said.append(unfocused)
         far_near = vergences(field.grid, None)
         scene = None if far_near is None else (float(far_near.min()), float(far_near.max()))
         told = {item.advice: item for item in sampling_limits(train, field.grid, scene).to_watch}

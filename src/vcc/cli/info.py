@@ -17,7 +17,7 @@ from vcc.base.units import short
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
 from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, told
-from vcc.cli.store_words import looked_at, store_facts, video_facts
+from vcc.cli.store_words import looked_at, places_of, store_facts, video_facts
 from vcc.cli.view_grid import Views, draw
 from vcc.fields.grid import SAMPLES_IN_WORDS, pair
 from vcc.formats import FolderInfo, keep_geometry, lytro_lfp, open_sparse_views, read_geometry
@@ -260,13 +260,8 @@ def _disparities(field: LightField, facts: FolderInfo) -> str:
         return "none to measure: one view, or pictures without texture"
     low, high = known
     source = "measured" if facts.disparity_range is None else "stated"
-    words = f"{low:.3g} to {high:.3g} pixels per view ({source})"
-    near, far = field.distance_of(high), field.distance_of(low)
-    if 0 < near < far:
-        places = f"{short(near, digits=3)} to {short(far, digits=3)}"
-        words += f": things {places} away"
-        words += " if what is assumed is right" if facts.unknown else ""
-    return words
+    words = f"{low:.3g} to {high:.3g} pixels per view ({source}): {places_of(field.grid, low, high)}"
+    return words + (" if what is assumed is right" if facts.unknown else "")
 
 
 def _sparse_disparities(sparse: Any, facts: FolderInfo) -> str:

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter, Token
 
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, warn_of_result
 from vcc.cli.console import check_output, progress, show
 from vcc.cli.options import (
     MAKING,
@@ -16,6 +16,7 @@ from vcc.cli.options import (
     Size,
     length,
 )
+from vcc.cli.store_words import BEYOND, places_of
 from vcc.files.pictures import WRITE_ENDINGS
 from vcc.formats.films import ENDINGS
 from vcc.light_field import LightField
@@ -122,5 +123,7 @@ def _distances_of(field: LightField | StoredLightField) -> tuple[float, ...]:
             "all of the scene seems to lie beyond infinity: the spacing, focus distance or orientation of the "
             "views is wrong, see vcc info"
         )
+    if field.distance_of(found[0]) < 0 and field.grid.disparity_of(float("inf")) - found[0] > BEYOND:
+        warn_of_result(f"{places_of(field.grid, *found)}: see vcc info. Infinity is the farthest focus")
     farthest = 1 / vergences[0] if vergences[0] > 0 else float("inf")
     return focus_distances(1 / vergences[1], farthest, PICTURES_WITHOUT_STACK)

@@ -8,12 +8,15 @@ from typing import Any
 
 from vcc.base.showing import spread
 from vcc.base.units import short
-from vcc.fields.grid import SAMPLES_IN_WORDS
+from vcc.fields.grid import SAMPLES_IN_WORDS, Grid
 from vcc.store import StoredLightField, StoredVideo
 from vcc.store.video_layout import Between
 
 LOOKED_AT = 3
 """Frames of which a video's size on the disk and its brightness are told."""
+BEYOND = 0.3
+"""Pixels per view beyond infinity, up to which it is noise of what is measured far away."""
+WRONG = "The spacing, focus distance or orientation of the views is wrong"
 EVENLY = 1e-6
 """How much of a gap between frames the others may differ by, and be told as evenly spaced."""
 BETWEEN_IN_WORDS: dict[Between, str] = {
@@ -53,13 +56,26 @@ def store_facts(stored: StoredLightField, quick: bool) -> dict[str, str]:
     if known is not None:
         source = "measured" if stored.disparity_range is None else "stated"
         lines["disparities"] = f"{known[0]:.3g} to {known[1]:.3g} pixels per view ({source})"
-        near, far = stored.distance_of(known[1]), stored.distance_of(known[0])
-        if 0 < near < far:
-            lines["disparities"] += f": things {short(near, digits=3)} to {short(far, digits=3)} away"
+        lines["disparities"] += f": {places_of(stored.grid, *known)}"
     for name, value in stored.provenance.items():
         if not isinstance(value, dict | list):
             lines[str(name).replace("_", " ")] = str(value)
     return lines
+
+
+def places_of(grid: Grid, low: float, high: float) -> str:
+    """Where things of these disparities are, pixels per view along u, in words; beyond infinity, too."""
+    near, far = grid.distance_of(high), grid.distance_of(low)
+    if 0 < near < far:
+        return f"things {short(near, digits=3)} to {_far(far)} away"
+    if near > 0:
+        words, beyond = f"things {short(near, digits=3)} to infinity away", abs(grid.disparity_of(math.inf) - low)
+        return words if beyond <= BEYOND else f"{words}, and {beyond:.2g} pixels per view beyond. {WRONG}"
+    return f"all beyond infinity: light that a lens has gathered; or {WRONG[0].lower()}{WRONG[1:]}"
+
+
+def _far(distance: float) -> str:
+    return "infinity" if math.isinf(distance) else short(distance, digits=3)
 
 
 def _assumed(provenance: dict[str, Any]) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -30,7 +31,7 @@ RAW_ENDINGS = (".tif", ".tiff", ".png", ".npy")
 Exposure = float | Literal["auto"]
 """A factor on light before the sRGB curve; "auto" is that of `auto_exposure`."""
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)  # IEC 61966-2-1
+_COLOURS = ("red", "green", "blue")
 _BRIGHT_PERCENTILE = 99.5
 
 
@@ -225,17 +226,41 @@ def save_numbers(
 
 
 def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
-    """The exposure that "auto" stands for: 1 over the 99.5th percentile of the luminance (1 if
+    """The exposure that "auto" stands for: 1 over the 99.5th percentile of the pixels' brightest channels (1 if
     black).
 
+    Luminance would not do: a saturated blue has 7 % of the luminance of white, and would clip long before.
+
     Args:
-        values: linear, shape (rows, columns) or (rows, columns, 3).
+        values: linear, shape (rows, columns) or (rows, columns, channels).
+
+    Returns:
+        The factor with which at most 0.5 % of the pixels exceed 1 in any channel.
     """
-    luminance = values @ _LUMINANCE if values.ndim == 3 else values
-    bright = float(np.percentile(luminance, _BRIGHT_PERCENTILE))
+    brightest = _brightest_channel(values)
+    bright = float(np.percentile(brightest, _BRIGHT_PERCENTILE, method="higher"))
     if bright <= 0:
-        bright = float(luminance.max())  # a few points of light on black
+        bright = float(brightest.max())  # a few points of light on black
     return 1.0 / bright if bright > 0 else 1.0
+
+
+def auto_in_words(values: NDArray[np.floating[Any]], exposure: float) -> str:
+    """What `auto_exposure` made white, for people; it names the channel of colour that is brightest there.
+
+    Args:
+        values: linear, shape (rows, columns), (rows, columns, 1) or (rows, columns, 3).
+        exposure: that `auto_exposure` found for them.
+    """
+    channel = ""
+    if values.shape[2:] == (3,):
+        bright = values[_brightest_channel(values) >= 1 / exposure * (1 - 1e-6)]
+        channel = f" of the brightest channel, here {_COLOURS[int(bright.sum(axis=0).argmax())]},"
+    return f"auto: the {_BRIGHT_PERCENTILE}th percentile{channel or ' of the pixels'} is white"
+
+
+def _brightest_channel(values: NDArray[Any]) -> NDArray[Any]:
+    """Each pixel's largest channel, shape (rows, columns)."""
+    return functools.reduce(np.maximum, np.moveaxis(values, 2, 0)) if values.ndim == 3 else values
 
 
 def averaged(values: NDArray[Any], factor: int) -> NDArray[np.float32]:
@@ -309,7 +334,7 @@ def _save_display(
     said = replace(statement, transfer="srgb", exposure=coded.exposure, automatic=automatic, clipped=coded.clipped)
     with place.opened() as temporary:
         write_codes(coded.codes, temporary, ending, said)
-    reason = " (auto: the 99.5th percentile of the luminance is white)" if automatic else ""
+    reason = f" ({auto_in_words(values, coded.exposure)})" if automatic else ""
     below = f", {coded.negative:.2%} below 0 and shown black" if coded.negative > 0 else ""
     description = (
         f"{place.words}: {_size(values)}, {bits}-bit sRGB, exposure {coded.exposure:.6g}{reason}, "

@@ -23,7 +23,7 @@ class Codes:
         bits: 8 or 16.
         curve: "srgb" for display-referred numbers, "linear" for numbers proportional to light.
         exposure: factor on the radiance (of which 1, or the full scale of integers, becomes the largest
-            number); "auto" takes 1 over the 99.5th percentile of the luminance of the middle view.
+            number); "auto" takes 1 over the 99.5th percentile of the brightest channels in the middle view.
 
     Raises:
         InputError: other bits, an unknown curve, or an exposure that is neither "auto" nor a finite number
@@ -62,8 +62,7 @@ class Codes:
     def _automatic(self) -> float:
         rows, columns = self._light_field.grid.shape[:2]
         samples, full_scale = stored_view(self._light_field, rows // 2, columns // 2)
-        light = samples.astype(np.float32) / np.float32(full_scale)
-        return auto_exposure(light if light.ndim == 2 or light.shape[2] == 3 else light.max(axis=2))
+        return auto_exposure(samples.astype(np.float32) / np.float32(full_scale))
 
 
 def stored_view(light_field: Samples, row: int, column: int) -> tuple[NDArray[Any], float]:

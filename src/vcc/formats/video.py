@@ -157,7 +157,7 @@ def save(
             right (the column, if there is but one).
         frames_per_second: how fast.
         exposure: factor before the sRGB curve; "auto" takes 1 over the 99.5th percentile of
-            the luminance of the middle view.
+            the brightest channels in the middle view.
         quality: libx264's constant rate factor: 0 (best) to 51.
         lossless: keep each 8-bit sample exactly (H.264 in RGB: large, and few players know it).
 

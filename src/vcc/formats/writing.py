@@ -174,7 +174,8 @@ def save_folder(
         bits: 8 or 16.
         transfer: "linear" stores numbers proportional to light; the pictures say so.
         ending: of the pictures: ``.png``; with "views" also ``.tif`` and ``.exr`` (linear float32, no exposure).
-        exposure: factor from radiance to full scale; "auto" takes 1 over the 99.5th percentile of the luminance.
+        exposure: factor from radiance to full scale; "auto" takes 1 over the 99.5th percentile of the
+            brightest channels in the middle view.
         progress: called as progress(done, total) after each view.
 
     Warns:

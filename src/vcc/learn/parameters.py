@@ -335,9 +335,22 @@ def _checked(found: Parameter, value: Any) -> Any:
             f"{found.name} ({found.field} of {found.owned_by}) is {numbers[~good][0]}{place}: the step that "
             "led here was too long, or a loss was not finite. Take a smaller learning rate, or look at the loss"
         )
+    if _is_transmission(found) and not (numbers.min() >= 0 and numbers.max() <= 1):
+        raise InputError(
+            f"{found.name} ({found.field} of {found.owned_by}) goes from {numbers.min():.6g} to "
+            f"{numbers.max():.6g}, and transmission lies between 0 and 1. Learn free numbers below a constraint "
+            "(sigmoid_mask of vcc.torch, jax.nn.sigmoid), or clamp it to 0 and 1 after each step"
+        )
     if isinstance(found.value, np.ndarray):
         return numbers
     return _as_tuple(numbers.tolist())
+
+
+def _is_transmission(found: Parameter) -> bool:
+    """Whether a parameter is the cells of a mask."""
+    return found.field == (CONTENT if isinstance(found.holder, Cells) else "pattern") and (
+        isinstance(found.holder, Cells) or _is_plain_mask(found.holder)
+    )
 
 
 def _as_tuple(numbers: Any) -> Any:

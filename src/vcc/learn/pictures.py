@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, NoReturn
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vcc.advice.explain import explained
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.fingerprint import Untold, fingerprint
 from vcc.fields.grid import Grid
 from vcc.fields.samples import InMemory, Samples
 from vcc.learn.chain import Chain
@@ -23,7 +24,7 @@ from vcc.learn.parameters import put
 from vcc.learn.scales import scale
 from vcc.learn.verdicts import following
 from vcc.optics.train import Train
-from vcc.plan.how import How
+from vcc.plan.how import OF_THE_RUN, How
 from vcc.plan.protocol import Gradient, Partial
 from vcc.run.backwards import Backwards
 from vcc.run.drive import Drive, rounds_of
@@ -67,6 +68,22 @@ class Work:
         Drive.of_linear(chain.plan(), light_field, how)
         return cls(camera, light_field, how, chain, {name: following(chain, name) for name in names})
 
+    def planned_for(self) -> dict[str, str]:
+        """What was planned for, a short hash each: equal ones give equal plans, but for the seed of rays.
+
+        An empty text stands for what tells nothing of its content, such as a function of Python.
+        """
+        grid, how = self.light_field.grid, self.how
+        disparities = None if how.scene_distance is not None else grid.measured_disparity_range()
+        # Rounded: other machines may measure disparities otherwise in the last digits.
+        seen = disparities and [round(float(each), 3) for each in disparities]
+        decisive = [field.name for field in fields(How) if field.name not in (*OF_THE_RUN, "seed")]
+        return {
+            "camera": _told(self.camera),
+            "light field": _told(grid.shape[:4], grid.frame.matrix, grid.sample, grid.extent, seen),
+            "options": _told({name: getattr(how, name) for name in decisive}),
+        }
+
     @property
     def picture_shape(self) -> tuple[int, ...]:
         """(rows, columns[, channels]) of a picture."""
@@ -77,6 +94,13 @@ class Work:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Work.of, (self.camera, self.light_field, self.how, self.chain.names)  # all is decided alike there
+
+
+def _told(*parts: Any) -> str:
+    try:
+        return fingerprint(*parts)
+    except Untold:
+        return ""
 
 
 def listed(learn: Any) -> tuple[str, ...]:

@@ -18,11 +18,14 @@ from typing import Any
 import torch
 
 from vcc.base import checks
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, warn_of_result
+from vcc.base.units import short
 from vcc.optics.electronics import LIGHT_SPEED, PLANCK, Electronics
 from vcc.optics.sensor import Sensor
-from vcc.run.expose import electronics_of, fixed_pattern
+from vcc.run.expose import AUTO_LEVEL, electronics_of, fixed_pattern
 
+MUCH_SATURATED = 0.1
+"""The share of what is recorded from which on it is said that it is saturated, and has no gradients."""
 FEWEST = 1.0
 """Electrons below which the derivative of √n is that at so many: at none at all it would be infinite."""
 NUMBERS = tuple(field.name for field in dataclasses.fields(Electronics) if str(field.type).startswith("float"))
@@ -59,6 +62,9 @@ def expose(
     Raises:
         InputError: a picture of another shape than the sensor or not finite, channels that the sensor cannot
             record, a sensor without electronics, no exposure above 0, numbers that do not exist.
+
+    Warns:
+        ResultWarning: gradients are wanted, and a tenth of what is recorded or more is saturated: it has none.
     """
     return exposed(picture, sensor, exposure, numbers, radiance, sensor.sensitive_area, generator, noise)
 
@@ -92,7 +98,30 @@ def exposed(
         mean = mean * torch.clamp(1 + known["prnu"] * sensitivity, min=0.0)
         offset = known["dsnu"] * unlike
     charge = _charge(mean + known["dark_current"] * seconds, known, generator, noise)
-    return _numbers(charge + offset, known, electronics)
+    found = _numbers(charge + offset, known, electronics)
+    if found.requires_grad:
+        with torch.no_grad():
+            _warn_of_saturation(
+                mean + known["dark_current"] * seconds, known, electronics, torch.as_tensor(seconds)
+            )
+    return found
+
+
+def _warn_of_saturation(
+    mean: torch.Tensor, known: dict[str, Any], electronics: Electronics, seconds: torch.Tensor
+) -> None:
+    """Say where much of what is recorded is at the end of its range, from which no gradient comes back."""
+    most = (electronics.largest_number - known["black_level"]) / known["gain"]
+    full = torch.minimum(most, known["full_well"])
+    share = float((mean >= full).double().mean())
+    if share >= MUCH_SATURATED:
+        time, shorter = (
+            short(float(each), "time", 3) for each in (seconds.detach(), seconds * AUTO_LEVEL * full / mean.max())
+        )
+        warn_of_result(
+            f"{share:.1%} of what is recorded in {time} is saturated, and its gradients are 0: nothing is learned "
+            f"from it. {shorter} saturates nothing"
+        )
 
 
 def _charge(mean: Any, known: dict[str, Any], generator: torch.Generator | None, noise: bool) -> Any:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, warn_of_result
+from vcc.base.version import VERSION
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.learn.parameters import SENSOR, Parameter, parameter, put, read
@@ -33,6 +34,10 @@ from vcc.plan.how import How
 
 Constraint = Callable[[torch.Tensor], torch.Tensor]
 
+_NUMBERS_ALONE = (
+    'To take its numbers alone: state.pop("_extra_state"), model.load_state_dict(state, strict=False), '
+    "model.replan()"
+)
 AREA = ("pitch", "fill_factor")
 """Of the sensor, what pictures and what is recorded of them depend on."""
 
@@ -286,22 +291,57 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
 
     # --- the state ---
 
-    def get_extra_state(self) -> dict[str, float]:
-        """The scales of the parameters, which their numbers in the state are multiples of."""
-        return {name: learned.scale for name, learned in self._learned.items()}
+    def get_extra_state(self) -> dict[str, Any]:
+        """The scales, which numbers in the state are multiples of, and by what the picture was planned.
 
-    def set_extra_state(self, state: dict[str, float]) -> None:
-        """Refuse a state of other scales.
+        Plans follow from what they are planned for: kept are the numbers that the parameters had then, the seed of
+        rays, and hashes of all else.
+        """
+        work = self._work
+        return {
+            "scales": {name: learned.scale for name, learned in self._learned.items()},
+            "planned": {name: torch.as_tensor(read(work.camera, name)) for name in self._learned},
+            "planned for": work.planned_for(),
+            "seed": work.how.seed,
+            "version": VERSION,
+        }
+
+    def set_extra_state(self, state: dict[str, Any]) -> None:
+        """Plan as the module did whose state this is, so that its pictures are the same.
 
         Raises:
-            InputError: the state is of a module whose camera began otherwise.
+            InputError: the state is of a module whose camera began otherwise, with another light field or other
+                options; or it does not contain by what was planned.
+
+        Warns:
+            ResultWarning: another version planned.
         """
+        if "planned" not in state:
+            raise InputError(f"this state, of an earlier version, has no record of the planning. {_NUMBERS_ALONE}")
         for name, learned in self._learned.items():
-            if name in state and not np.isclose(state[name], learned.scale, rtol=1e-9, atol=0):
+            scale = state["scales"].get(name, learned.scale)
+            if not np.isclose(scale, learned.scale, rtol=1e-9, atol=0):
                 raise InputError(
-                    f"{name} is kept in multiples of {learned.scale:.6g}, and in this state of {state[name]:.6g}: "
+                    f"{name} is kept in multiples of {learned.scale:.6g}, and in this state of {scale:.6g}: "
                     "make the module of the camera with which that learning began, or go on from model.camera()"
                 )
+        work = self._work
+        then = {name: _array(state["planned"][name]) for name in self._learned if name in state["planned"]}
+        there = replace(work, camera=put(work.camera, then), how=replace(work.how, seed=state["seed"]))
+        theirs, ours = state["planned for"], there.planned_for()
+        other = [what for what, told in ours.items() if told and theirs[what] and told != theirs[what]]
+        if other:
+            raise InputError(
+                f"this state was planned for another {', another '.join(other)}, and the same plan cannot be made "
+                f"here: make the module as that one was made. {_NUMBERS_ALONE}"
+            )
+        if state["version"] != VERSION:
+            warn_of_result(
+                f"this state was planned by version {state['version']}, and this is {VERSION}: pictures may "
+                "differ. model.replan() decides anew, by what was learned"
+            )
+        if (there.camera, there.how) != (work.camera, work.how):
+            self._work = Work.of(there.camera, work.light_field, there.how, work.chain.names)
 
     def extra_repr(self) -> str:
         """What is learned, and the size of the picture."""

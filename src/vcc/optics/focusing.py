@@ -51,7 +51,8 @@ def focused_train(elements: Iterable[Element], sensor: Sensor, distance: float, 
     beam, slopes = (rays[rows, :2] + rays[rows, 2:] / distance for rows in (slice(0, 2), slice(2, 4)))
     behind = _meeting(beam, slopes, distance, end)
     if behind < 0 and not touch(end + behind, end):
-        raise InputError(_why_not_behind(listed, end + behind, distance))
+        diverging = float((rays[:2, :2] * rays[2:, :2]).sum()) >= 0  # even parallel light spreads
+        raise InputError(_why_not_behind(listed, end + behind, distance, diverging))
     return Train(listed, _at(sensor, end + max(behind, 0.0)), name=name)
 
 
@@ -75,15 +76,20 @@ def _meeting(beam: NDArray[np.float64], slopes: NDArray[np.float64], distance: f
     return d
 
 
-def _why_not_behind(elements: tuple[Element, ...], image: float, distance: float) -> str:
-    bending = [element for element in elements if _bends(element)]
+def _why_not_behind(elements: tuple[Element, ...], image: float, distance: float, diverging: bool) -> str:
+    bending = [element for element in elements if bends(element)]
     if not bending:
         return f"nothing here focuses: light of {_point(distance)} spreads on. Add a lens, or say the sensor's z"
     last = max(bending, key=lambda element: element.z + element.length)
     if image < last.z + last.length:
         return (
             f"light of {_point(distance)} forms no real image: behind {last.label} it spreads, as if from "
-            f"z = {short(image)}. Take a point farther away, or a shorter focal length"
+            f"z = {short(image)}. Take "
+            + (
+                "a lens of positive focal length"
+                if diverging
+                else "a point farther away, or a shorter focal length"
+            )
         )
     hidden = max(elements, key=lambda element: element.z + element.length)
     return (
@@ -92,7 +98,7 @@ def _why_not_behind(elements: tuple[Element, ...], image: float, distance: float
     )
 
 
-def _bends(element: Element) -> bool:
+def bends(element: Element) -> bool:
     """Whether an element has a part that is affine and does more than to shift slopes."""
     for part in element.parts():
         step = part if isinstance(part, Affine) else part.affine

@@ -18,9 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning, warn_of_result
 from vcc.base.memory import check_memory
 from vcc.base.showing import Shown
+from vcc.base.units import short
 from vcc.camera import Camera
 from vcc.fields.sampled import to_numpy
 from vcc.image import Image
@@ -29,6 +30,8 @@ from vcc.recover.recorded import numbers_of
 
 Array = NDArray[np.float64]
 
+MANY_AT_ENDS = 0.1
+"""The share of blocks from which on it is said that they take an outermost candidate."""
 _VIEWS_PER_PIXEL = 4  # of a kernel's width
 _FEWEST_VIEWS = 64
 _SAMPLE = 0.02  # of a pixel: the least size of the point that kernels are made of
@@ -210,6 +213,10 @@ def depth_from_defocus(
         InputError: candidates that are not two or more, that cross the focal plane or cannot be told apart, a
             kernel larger than the picture or a block or not of sum 1, a picture with NaNs or too small for one
             block, a noise of zero or less, more memory needed than allowed.
+
+    Warns:
+        ResultWarning: a tenth of the blocks or more, by their confidence, take the nearest or the farthest
+            candidate: they may lie beyond.
     """
     numbers = numbers_of(image, "the picture")
     values = numbers.reshape(*numbers.shape[:2], -1)
@@ -235,13 +242,32 @@ def depth_from_defocus(
     difference, scatter = lost.sum(axis=-1), (lost**2).sum(axis=-1)
     trusted = np.divide(2 * difference**2, scatter, out=np.zeros_like(scatter), where=scatter > 0)
     away = tuple(float(distance) for distance in distances)
+    decided = _decided(-np.minimum(difference, trusted), away)
+    _warn_of_ends(decided["distance"], decided["confidence"], away)
     return DefocusDepth(
-        **_decided(-np.minimum(difference, trusted), away),
+        **decided,
         rows=np.asarray(starts[0] + (block - 1) / 2, np.float64),
         columns=np.asarray(starts[1] + (block - 1) / 2, np.float64),
         block=block,
         distances=away,
     )
+
+
+def _warn_of_ends(found: Array, confidence: Array, distances: tuple[float, ...]) -> None:
+    """Say how many blocks take an outermost candidate, beyond which nothing was tried."""
+    weight = float(confidence.sum())
+    ends = (min(distances), max(distances))
+    shares = [float(confidence[found == end].sum()) / weight if weight else 0.0 for end in ends]
+    if sum(shares) >= MANY_AT_ENDS:
+        which = " and ".join(
+            f"{share:.0%} the {name} ({short(end)})"
+            for name, share, end in zip(("nearest", "farthest"), shares, ends, strict=True)
+            if share > 0
+        )
+        warn_of_result(
+            f"of the blocks, by confidence, {which} of the candidates explains best: they may lie beyond, where "
+            "nothing was tried. Add a candidate beyond, to tell"
+        )
 
 
 def _block_starts(shape: tuple[int, ...], kernels: list[Array], block: int, step: int) -> list[NDArray[np.intp]]:

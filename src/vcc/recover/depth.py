@@ -8,26 +8,30 @@ Two ways that err differently:
   middle one: slower, sharp at borders, and sound beside things that hide what lies behind them.
 
 Disparities are those of `vcc.fields.parallax`: along u, pixels per view, positive = nearer than where the views
-converge. Both give the distance in metres through the frame of the light field.
+converge. Both give the distance in metres through the frame of the light field. Where the search ended at the
+nearest or farthest disparity that it tried, the distance is NaN; beyond infinity it is infinite.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.affine import Affine
 from vcc.base.checks import above_zero
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, warn_of_result
 from vcc.base.memory import check_memory
 from vcc.base.progress import Progress
 from vcc.base.showing import Shown
-from vcc.fields.cross import Arm, arms, check_axes, moved, range_to_search
-from vcc.fields.grid import Grid
+from vcc.base.units import short
+from vcc.fields.cross import LARGEST_RANGE, MARGIN, Arm, arms, check_axes, moved, range_to_search
+from vcc.fields.grid import Block, Grid
 from vcc.fields.plane_sweep import FINEST_STEP, NOISE, WINDOW, disparity_maps, plane_sweep
+from vcc.fields.sampled import to_numpy
 from vcc.light_field import LightField
 from vcc.store import StoredLightField
 
@@ -42,6 +46,16 @@ __all__ = [
 
 Array = NDArray[np.float32]
 
+MANY_ENDED = 0.01
+"""The share of the pixels from which on it is said that the search ended, or that they lie beyond infinity."""
+_AT_AN_END = 0.01
+"""Pixels per view: what is no farther from the end of a search is at it. Between steps nothing comes as near."""
+_BEYOND = 0.1
+"""Pixels per view beyond infinity from which on it is no noise of what is far away."""
+_COARSE_SIDE, _COARSEST = 48, 4
+"""Pixels a side of the views that the first look over a wide range is taken at, and how many are one at most."""
+_OUTERMOST = 0.005
+"""Of the confidence: what the first look finds outside of the rest is left out at either end."""
 _FARTHEST_TILT = 0.75  # pixels per view from the nearest whole shear: beyond, the next shear sees it better
 _SMOOTHING = (3 / 16, 10 / 16, 3 / 16)
 _ALIASED = np.float32(1e3)  # larger than the energy of any derivative
@@ -53,10 +67,12 @@ class DepthMap(Brief, Shown):
 
     Args:
         disparity: pixels per view along u, positive = nearer than where the views converge, shape (t, s).
-        distance: metres before the plane where the light field is given, shape (t, s): infinite at the disparity
-            of infinity; negative where rays meet behind that plane (light that a lens has gathered, or an error
-            beyond the disparity of infinity).
-        confidence: 0 (nothing to hold on to: no texture, or views that disagree) to 1, shape (t, s).
+        distance: metres before the plane where the light field is given, shape (t, s): NaN where the search ended
+            at the nearest or farthest disparity that it tried; infinite at the disparity of infinity and on that
+            side of it on which fewer pixels lie; negative where rays meet behind that plane (light that a lens has
+            gathered).
+        confidence: 0 (nothing to hold on to: no texture, views that disagree, or a search that ended) to 1, shape
+            (t, s).
         view: (row, column) of the view.
     """
 
@@ -145,25 +161,27 @@ def depth_by_structure_tensor(
 
     Args:
         light_field: 3×1 or 1×3 views at least, its views' axes along those of its pixels.
-        disparity_range: (lowest, highest) disparity along u to be found, pixels per view; None takes
-            `vcc.LightField.measured_disparity_range`, widened by 0.3 if it was measured.
+        disparity_range: (lowest, highest) disparity along u to be found, pixels per view; None takes it from the
+            data: see `depth_by_plane_sweep`.
         inner_scale: σ of the Gaussian under which derivatives are taken, pixels and views.
         outer_scale: σ of the Gaussian over which their products are summed, pixels and views.
         memory_limit: bytes that the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Returns:
-        Depth of the middle view (row (n − 1) // 2, likewise column). Disparities are not held to the range to
-        better than a shear's reach, three quarters of a pixel.
+        Depth of the middle view (row (n − 1) // 2, likewise column), within the range.
 
     Raises:
         InputError: too few views, a frame whose view axes are not along the pixels', a range that is no range or
             cannot be measured, a scale of zero or less, more memory needed than allowed.
+
+    Warns:
+        ResultWarning: as `depth_by_plane_sweep`.
     """
     for name, scale in (("inner_scale", inner_scale), ("outer_scale", outer_scale)):
         above_zero(name, scale)
     grid = light_field.grid
     check_axes(grid, fewest=3)
-    low, high = range_to_search(grid, disparity_range)
+    low, high = _searched(light_field, disparity_range, memory_limit)
     cross = arms(light_field)
     samples = max(arm.views.size for arm in cross)
     # Beside the samples of one arm: its shear, two derivatives, a product and its smoothed copy.
@@ -173,8 +191,7 @@ def depth_by_structure_tensor(
         found, clarity = _best_shear(arm, grid, (low, high), inner_scale, outer_scale)
         clearer = clarity >= confidence
         disparity[clearer], confidence[clearer] = found[clearer], clarity[clearer]
-    disparity = np.clip(disparity, low, high)
-    return _depth(grid, disparity, confidence)
+    return _depth(grid, np.clip(disparity, low, high), confidence, (low, high))
 
 
 def depth_by_plane_sweep(
@@ -197,8 +214,10 @@ def depth_by_plane_sweep(
 
     Args:
         light_field: two views at least, its views' axes along those of its pixels.
-        disparity_range: (lowest, highest) disparity along u to be tried, pixels per view; None takes
-            `vcc.LightField.measured_disparity_range`, widened by 0.3 if it was measured.
+        disparity_range: (lowest, highest) disparity along u to be tried, pixels per view; None takes it from the
+            data: `vcc.LightField.measured_disparity_range`, and what a first look at coarser views finds in a
+            range up to infinity and as far again on the near side. A range that the light field states is taken as
+            it is. Either is widened by 0.3 pixels at both ends, but not beyond infinity.
         step: between the disparities tried, pixels per view.
         window: side of the window, pixels, an odd number.
         memory_limit: bytes that the costs and the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
@@ -210,16 +229,131 @@ def depth_by_plane_sweep(
     Raises:
         InputError: too few views, a frame whose view axes are not along the pixels', a range that is no range or
             cannot be measured, a step or window that cannot be, more memory needed than allowed.
+
+    Warns:
+        ResultWarning: for 1 % of the pixels or more the search ended at an end of the range, or they lie beyond
+            infinity.
     """
-    found = plane_sweep(
-        light_field, disparity_range, step=step, window=window, memory_limit=memory_limit, progress=progress
-    )
-    return _depth(light_field.grid, found.disparity, found.confidence)
+    above_zero("step", step)
+    check_axes(light_field.grid, fewest=2)
+    ends = _searched(light_field, disparity_range, memory_limit)
+    found = plane_sweep(light_field, ends, step=step, window=window, memory_limit=memory_limit, progress=progress)
+    return _depth(light_field.grid, found.disparity, found.confidence, ends)
 
 
-def _depth(grid: Grid, disparity: Array, confidence: Array) -> DepthMap:
-    """What was found of the middle view."""
-    return DepthMap(disparity, grid.distances(disparity).astype(np.float32), confidence, grid.middle_view)
+# --- where is searched, and where the search ended ---
+
+
+def _searched(
+    light_field: LightField | StoredLightField, given: tuple[float, float] | None, memory_limit: int | None
+) -> tuple[float, float]:
+    """(lowest, highest) disparity that is searched; see `depth_by_plane_sweep`."""
+    grid = light_field.grid
+    low, high = range_to_search(grid, given)
+    if given is not None:
+        return low, high
+    # No farther than infinity, unless a tenth of what was measured lies on either side of it.
+    infinity, length = grid.disparity_of(math.inf), high - low
+    before, behind = high - infinity, infinity - low
+    ends_there = math.isfinite(infinity) and min(before, behind) < 0.1 * length + MARGIN
+    lowest = infinity if ends_there and before >= behind else -float(LARGEST_RANGE)
+    highest = infinity if ends_there and before < behind else float(LARGEST_RANGE)
+
+    def within(least: float, most: float) -> tuple[float, float]:
+        return max(least, lowest), min(most, highest)
+
+    if grid.disparity_range is not None:
+        return within(low - MARGIN, high + MARGIN)
+    reach = (lowest if lowest == infinity else low - length, highest if highest == infinity else high + length)
+    seen = _first_look(light_field, within(min(reach[0], low), max(reach[1], high)), memory_limit)
+    return within(min(low, seen[0] - MARGIN), max(high, seen[1] + MARGIN))
+
+
+def _first_look(
+    light_field: LightField | StoredLightField, ends: tuple[float, float], memory_limit: int | None
+) -> tuple[float, float]:
+    """(lowest, highest) disparity that a sweep of coarser views finds, by confidence but for the outermost."""
+    factor = min(max(min(light_field.grid.shape[2:4]) // _COARSE_SIDE, 1), _COARSEST)
+    coarse = (ends[0] / factor, ends[1] / factor)
+    found = plane_sweep(_Coarser(light_field, factor), coarse, memory_limit=memory_limit)
+    order = np.argsort(found.disparity, axis=None)
+    share = np.cumsum(found.confidence.ravel()[order], dtype=np.float64)
+    if share[-1] == 0:
+        return math.inf, -math.inf
+    places = np.searchsorted(share, share[-1] * np.array([_OUTERMOST, 1 - _OUTERMOST]))
+    low, high = factor * found.disparity.ravel()[order[places]].astype(np.float64)
+    return float(low), float(high)
+
+
+@dataclass(frozen=True, eq=False)
+class _Coarser:
+    """A light field with so many pixels each way in one, whole views of it."""
+
+    whole: LightField | StoredLightField
+    factor: int
+
+    @property
+    def grid(self) -> Grid:
+        """Of the coarser pixels."""
+        fine, n = self.whole.grid, self.factor
+        shape = (*fine.shape[:2], fine.shape[2] // n, fine.shape[3] // n, *fine.shape[4:])
+        middle = (n - 1) / 2
+        frame = fine.frame @ Affine.translation(0, 0, middle, middle) @ Affine.scaling(1, 1, n, n)
+        return replace(fine, shape=shape, frame=frame)
+
+    def read(self, block: Block) -> Array:
+        """The samples of whole views."""
+        n, (rows, columns) = self.factor, self.grid.shape[2:4]
+        views = to_numpy(self.whole.read(replace(block, pixel_rows=(0, rows * n), pixel_columns=(0, columns * n))))
+        parts = views.reshape(*views.shape[:2], rows, n, columns, n, *views.shape[4:])
+        return np.asarray(parts.mean(axis=(3, 5), dtype=np.float32))
+
+
+def _depth(grid: Grid, disparity: Array, confidence: Array, ends: tuple[float, float]) -> DepthMap:
+    """What was found of the middle view; where the search ended, nothing was."""
+    infinity = grid.disparity_of(math.inf)
+    searched = ends[1] - ends[0] > 2 * _AT_AN_END  # else the range says where all is
+    ended = [
+        (np.abs(disparity - end) <= _AT_AN_END) & searched & (abs(end - infinity) > _AT_AN_END) for end in ends
+    ]
+    lost = ended[0] | ended[1]
+    confidence = np.where(lost, np.float32(0), confidence)
+    # The side of infinity on which most of what was found lies.
+    before = disparity > infinity
+    weights = confidence if confidence.any() else np.ones_like(confidence)
+    side = 1 if weights[before].sum() >= weights[~before].sum() else -1
+    past = side * (infinity - disparity) if math.isfinite(infinity) else np.full(disparity.shape, -np.inf)
+    distance = grid.distances(disparity)
+    distance[past >= -_AT_AN_END / 10] = np.inf
+    distance[lost] = np.nan
+    _warn(grid, ends, [float(each.mean()) for each in ended], float((past[~lost] > _BEYOND).sum() / past.size))
+    return DepthMap(disparity, distance.astype(np.float32), confidence.astype(np.float32), grid.middle_view)
+
+
+def _warn(grid: Grid, ends: tuple[float, float], ended: list[float], beyond: float) -> None:
+    """Say for how many pixels there is no result."""
+    said = []
+    if sum(ended) >= MANY_ENDED:
+        where = " and ".join(
+            f"for {share:.1%} of the pixels at a disparity of {end:.3g} ({_away(grid.distance_of(end))})"
+            for share, end in zip(ended, ends, strict=True)
+            if share > 0
+        )
+        said.append(
+            f"the search ended {where}: they lie beyond what was searched, or have no texture, and their distance "
+            "is NaN. A wider disparity_range=(lowest, highest), pixels per view, tells which"
+        )
+    if beyond >= MANY_ENDED:
+        said.append(
+            f"{beyond:.1%} of the pixels lie beyond infinity, and their distance is inf: they have no texture, or "
+            "the spacing or focus distance of the views is wrong"
+        )
+    if said:
+        warn_of_result(". ".join(said))
+
+
+def _away(distance: float) -> str:
+    return short(distance, digits=4) if distance > 0 else "beyond infinity"
 
 
 def _best_shear(

@@ -19,7 +19,7 @@ from vcc.base.progress import Progress, tell
 from vcc.base.showing import Shown
 from vcc.files import transfer
 from vcc.files.destination import Destination, Target
-from vcc.files.pictures import auto_exposure, checked_exposure
+from vcc.files.pictures import auto_exposure, auto_in_words, checked_exposure
 from vcc.formats.films import ENDINGS, Film
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -154,7 +154,7 @@ class FocalStack(Brief, Shown):
                 Or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
             frames_per_second: pictures a second, at most 50 in a GIF, whose clock counts hundredths of a second.
             exposure: factor before the sRGB curve, the same for all pictures; "auto" brings the 99.5th percentile
-                of the stack's luminance to white.
+                of the brightest channels in the stack to white.
             there_and_back: append the pictures in reverse order, so that the film can be played over and over.
             format: of a buffer: "mp4" or "gif".
 
@@ -172,11 +172,8 @@ class FocalStack(Brief, Shown):
         if channels.shape[3] not in (1, 3):
             raise InputError(f"a film has 1 or 3 channels, and this focal stack has {channels.shape[3]}")
         flat = channels.reshape(count * rows, columns, -1)
-        factor = (
-            auto_exposure(flat if flat.shape[2] == 3 else flat[..., 0])
-            if exposure == "auto"
-            else checked_exposure(exposure)
-        )
+        factor = auto_exposure(flat) if exposure == "auto" else checked_exposure(exposure)
+        reason = f" ({auto_in_words(flat, factor)})" if exposure == "auto" else ""
         clipped = float((channels * factor > 1 + 0.5 / 255).any(axis=3).mean())
         way = [*range(count), *(range(count - 2, 0, -1) if there_and_back else ())]
 
@@ -188,7 +185,7 @@ class FocalStack(Brief, Shown):
             film.write((codes(number) for number in way), temporary, place.words)
         return (
             f"{place.words}: {count} pictures of {columns}×{rows} pixels in {len(way)} frames, "
-            f"{frames_per_second:g} a second, exposure {factor:.6g}, {clipped:.2%} of the pixels clipped"
+            f"{frames_per_second:g} a second, exposure {factor:.6g}{reason}, {clipped:.2%} of the pixels clipped"
         )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, warn_of_result
 from vcc.base.showing import Shown
 from vcc.camera import Camera
 from vcc.image import Image
@@ -24,6 +24,8 @@ from vcc.recover.recorded import grey, numbers_of
 
 Array = NDArray[np.float64]
 
+MANY_ENDED = 0.01
+"""The share of the blocks from which on it is said that their search ended."""
 _FLOOR = 2e-3  # of the brightest pixel: contrast below is no texture
 _REFINEMENTS = 6
 _AHEAD = 0.05  # correlation by which the best match leads the next one, where it is trusted in full
@@ -37,7 +39,7 @@ class StereoDepth(Brief, Shown):
         separation: of the block's two pictures, pixels, shape (block rows, block columns); NaN where a block could
             not be matched inside the picture.
         distance: metres before the entrance plane, likewise; infinite where a separation is at or beyond that of
-            infinity.
+            infinity; NaN where a block could not be matched, or best at an end of the range.
         confidence: 0 (no texture, no match, or several alike) to 1, likewise.
         rows: the row of each block's middle, pixels, shape (block rows,).
         columns: likewise the column, shape (block columns,).
@@ -131,6 +133,9 @@ def depth_by_biprism(
     Raises:
         InputError: a camera that is no such stereo camera, a picture of another size than its sensor's, turned
             upright or with NaNs, a range that is none, or a picture that holds no block and its partner.
+
+    Warns:
+        ResultWarning: 1 % of the blocks or more match best at an end of the range.
     """
     stereo, lens = _parts(camera)
     values = _checked(image, camera)
@@ -156,7 +161,18 @@ def depth_by_biprism(
     confidence[lost] = 0
     separation[~found] = np.nan
     separation[found & lost] = shifts[best][found & lost]
-    distance = np.array([math.nan if math.isnan(s) else stereo.distance_of(s * pitch) for s in separation.ravel()])
+    ended = (found & at_end).mean(dtype=np.float64)
+    if ended >= MANY_ENDED:
+        warn_of_result(
+            f"{ended:.1%} of the blocks match best at an end of distance_range: they lie beyond it, or have no "
+            "texture, and their distance is NaN. A wider range tells which"
+        )
+    distance = np.array(
+        [
+            math.nan if is_lost else stereo.distance_of(each * pitch)
+            for each, is_lost in zip(separation.ravel(), lost.ravel(), strict=True)
+        ]
+    )
     return StereoDepth(
         separation, distance.reshape(separation.shape), confidence, rows.astype(float), columns.astype(float)
     )

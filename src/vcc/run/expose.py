@@ -114,7 +114,8 @@ class Exposure:
     Args:
         sensor: with electronics.
         time: seconds, or ``"auto"``: that after which the brightest 0.1 % of the pixels are at 90 % or more of
-            their full well or of the largest number, whichever comes first.
+            their full well or of the largest number, whichever comes first, each in its brightest
+            channel.
         seed: of the noise, a whole number.
         radiance: what a light field's sample value of 1 stands for, W/(m²·sr), in each channel's band.
         threads: how many work at once; None takes as many as this process may use cores.
@@ -238,9 +239,10 @@ def _photo_electrons_per_second(
 
 
 def _auto_exposure(rate: NDArray[np.float64], electronics: Electronics) -> float:
-    bright = float(np.quantile(rate, 1 - AUTO_SHARE, method="lower"))
+    brightest = rate.max(axis=2) if rate.ndim == 3 else rate  # a pixel saturates in the channel that fills first
+    bright = float(np.quantile(brightest, 1 - AUTO_SHARE, method="lower"))
     if bright <= 0:
-        bright = float(rate.max())  # a few points of light on black
+        bright = float(brightest.max())  # a few points of light on black
     if bright <= 0:
         raise InputError('exposure="auto" needs light, and the picture is black: give a time in seconds')
     return AUTO_LEVEL * electronics.saturation / (bright + electronics.dark_current)

@@ -365,9 +365,11 @@ class Cells(Value, Pattern):
             raise InputError(f"a transmission array of shape {values.shape} is empty")
         checks.all_finite("a transmission array", values)
         if values.min() < 0 or values.max() > 1:
+            counted = values.min() >= 0 and values.max() >= 2
+            way_out = "divide it by its full scale (255 for 8-bit values)" if counted else "clip it to 0 and 1"
             raise InputError(
                 f"transmission lies between 0 and 1; this array goes from {values.min():g} to {values.max():g}: "
-                "divide it by its full scale (255 for 8-bit values)"
+                f"{way_out}"
             )
         object.__setattr__(self, "values", values)
         checks.above_zero("width of cells", self.width, unit="m")

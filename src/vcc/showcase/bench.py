@@ -216,7 +216,7 @@ def _lit(light_field: LightField) -> tuple[LightField, str]:
     """The light field with its white near 1, and what was done for that."""
     rows, columns = light_field.shape[:2]
     view = light_field.view(rows // 2, columns // 2).to_numpy()
-    gain = auto_exposure(view[..., 0] if view.shape[2:] == (1,) else view)
+    gain = auto_exposure(view)
     if light_field.full_scale != 1 or DIMMEST_WHITE <= 1 / gain <= 1:
         return light_field, ""  # stored numbers that are shares of a full scale stay as they are
     words = f"Its radiance was multiplied by {gain:.3g}, so that the brightest 0.5 % of its middle view are white"

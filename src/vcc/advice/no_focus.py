@@ -1,0 +1,107 @@
+"""Why nothing before a camera is sharp on its sensor, in a sentence: lenses that diverge, or a sensor too near."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.advice.folded import Folded, stretch
+from vcc.advice.mask_limits import finest_detail
+from vcc.advice.view_gaps import ROUNDING
+from vcc.base.errors import InputError
+from vcc.base.units import short
+from vcc.fields.grid import Grid
+from vcc.optics.focusing import bends
+from vcc.optics.train import Stage, Train
+
+AS_A_PINHOLE = 0.1
+"""Of the sensor's shorter side: a point whose light covers less of it shows as the image of a pinhole."""
+
+
+def no_image(train: Train, grid: Grid) -> str:
+    """A sentence about lenses that bring no point before the camera to a focus; empty where any could be.
+
+    Empty too where no lens bends light, where plates, arrays, diffusers or the detail of masks make the picture,
+    and where stops are so small that they image as pinholes do.
+
+    Args:
+        train: any.
+        grid: of the light field, which bounds the light where no stop does.
+    """
+    bending = [element for element in train.elements if bends(element)]
+    if not bending or any(_codes(stage) for stage in train.stages):
+        return ""
+    behind = max(element.z + element.length for element in train.elements if element.length or element in bending)
+    rays = train.rays_at(behind).linear
+    if _focuses(rays):
+        return ""
+    optics, power = Folded(train, grid, None), -float(rays[2, 0])
+    covered = (
+        None if optics.half_width is None else 2 * optics.half_width * stretch(optics.to_sensor.linear[:2, :2])
+    )
+    height, width = train.sensor.size
+    if covered is not None and covered < AS_A_PINHOLE * min(height, width):
+        return ""
+    size = "" if covered is None else f": that of a distant point over {short(covered, digits=2)} of the sensor's "
+    size += "" if covered is None else f"{short(width, digits=3)} × {short(height, digits=3)}"
+    which = f"{bending[0].label} diverges" if len(bending) == 1 else "its lenses together diverge"
+    focal = f"a focal length of {short(1 / power)}" if power else "no power"
+    way_out = f" (was {short(-1 / power)} meant?)" if power and len(bending) == 1 else ""
+    return (
+        f"this camera forms no image: {which}, with {focal}, and the light of every point spreads on{size}. Take "
+        f"a lens of positive focal length{way_out}, or add one"
+    )
+
+
+def why_unfocused(optics: Folded) -> str:
+    """A sentence that says why nothing is in focus; empty where something is, or where no lens bends light.
+
+    Args:
+        optics: of the camera and its light field.
+    """
+    gaps = optics.gaps
+    if gaps is None or gaps.focus is None or gaps.focus >= -ROUNDING:
+        return ""
+    if words := no_image(optics.train, optics.grid):
+        return words
+    a, c = (float(optics.to_sensor.linear[row, 0]) for row in (0, 2))
+    behind = -a / c if c else math.inf
+    if not 0 < behind < math.inf:
+        return ""
+    z = optics.train.sensor.z
+    return (
+        f"the sensor stands {short(behind, digits=3)} before the plane in which distant points are sharp, "
+        f"z = {short(z + behind)}: move it there, or farther for what is nearer (Camera.focused)"
+    )
+
+
+def _codes(stage: Stage) -> bool:
+    """Whether a stage does more than lenses, prisms and plain openings do."""
+    faces = stage.faces
+    if faces.bending is not None or faces.spread is not None:
+        return True
+    try:
+        return faces.pattern is not None and finest_detail(faces.pattern) is not None
+    except InputError:
+        return True
+
+
+def _focuses(rays: NDArray[np.float64]) -> bool:
+    """Whether some point before the camera has a real image along x or y, behind the place that rays lead to.
+
+    Light of a point at 1/Z = V arrives at A + B·V with the slope C + D·V, for a place of 1 at the entrance: it
+    meets −(A + B·V)/(C + D·V) behind that, which changes its sign at two values of V only. Optics that are rotated
+    about the axis are taken to focus: their axes do not separate.
+    """
+    blocks = [rays[rows, columns] for rows in (slice(0, 2), slice(2, 4)) for columns in (slice(0, 2), slice(2, 4))]
+    if any(np.abs(block - np.diag(np.diag(block))).max() > ROUNDING * np.abs(rays).max() for block in blocks):
+        return True
+    for a, b, c, d in zip(*(np.diag(block) for block in blocks), strict=True):
+        turns = [-one / other for one, other in ((a, b), (c, d)) if other and -one / other > 0]
+        ends = [0.0, *sorted(turns), 2 * max([1.0, *turns])]
+        if any((a + b * v) * (c + d * v) < 0 for v in ((low + high) / 2 for low, high in pairwise(ends))):
+            return True
+    return False
