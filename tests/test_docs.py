@@ -81,7 +81,7 @@ def test_own_element_makes_rings_of_its_closed_form():
     near = radius < 95e-6  # where other rings hardly reach
     ring = (radius > inner - margin) & (radius < outer + margin)
     assert image[near & ring].sum() > 0.999 * image[near].sum()
-    assert image[radius < inner - margin].max() == 0
+    assert abs(image[radius < inner - margin]).max() < 1e-6 * image.max()
 
 
 WITHOUT = ("vcc.cli", "vcc.engines", "vcc.plan", "vcc.__main__", "vcc.run.torch_physics")

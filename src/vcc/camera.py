@@ -189,9 +189,10 @@ class Camera(Train):
             ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
                 tolerance was not reached, the sampling error of rays exceeds 1 % of the brightest pixel (40 dB)
                 and neither samples nor a tolerance were given (the warning reports how many rays suffice), the
-                cells of an array are smaller than a pixel, the lenses diverge so that no point can be sharp, masks
-                are finer than parts of cells and samples show, or the picture is 0 everywhere although the light
-                field is not dark (by footprints, and no mask closes the camera). Where the picture is 0, a quarter of the rays or more is missing, or the picture is nearly
+                cells of an array are smaller than a pixel, the lenses diverge so that no point can be sharp,
+                masks are finer than parts of cells and samples show, images of views stay apart (ghosting), or the
+                picture is 0 everywhere although the light field is not dark (by footprints, and no mask closes the
+                camera). Where the picture is 0, a quarter of the rays or more is missing, or the picture is nearly
                 black, and a length is 1 m or more, a pitch 2 cm or a pixel 1 mm, it asks whether a thousandth was
                 meant.
 

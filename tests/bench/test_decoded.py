@@ -30,6 +30,10 @@ SENSOR = {"z": "53.73 mm", "shape": [LENSLETS * PIXELS] * 2, "pitch": "0.2 mm"}
 PLENOPTIC_CAMERA = Document({"elements": [LENS, ARRAY], "sensor": SENSOR}, "plane")
 
 
+# Decoding is tested, not the noise of 64 rays a pixel.
+pytestmark = pytest.mark.filterwarnings("ignore:the sampling error of:vcc.ResultWarning")
+
+
 def plane() -> vcc.LightField:
     """Views of noise on a plane `AWAY`, some pixels of a decoded view fine; brighter at the top than below."""
     shape = (7, 7, 90, 90)

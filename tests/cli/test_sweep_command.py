@@ -48,7 +48,7 @@ def test_pictures_table_and_sheet_are_written(folder):
     assert result.exit_code == 0, result.output
     assert "all.zarr: 9 pictures of 12×16×3, sensor.z × code.pattern" in result.stdout
     assert "all.csv: 9 rows of 6 columns" in result.stdout
-    assert "9 of 9 cameras, one of them: " in result.stderr
+    assert " of 9 cameras, one of them: " in result.stderr
     swept = open_sweep("all.zarr")
     camera = vcc.load_camera("files/camera.toml")
     mask = vcc.Mask(np.eye(5), width=4e-3, name="code")
@@ -82,7 +82,7 @@ def test_an_executor_makes_the_same_pictures(folder, monkeypatch):
     assert run(*sweep(*values, "-o", "here.zarr")).exit_code == 0
     result = run(*sweep(*values, "-o", "there.zarr", "--executor", "threads"))
     assert result.exit_code == 0, result.output
-    assert "6 of 6 cameras, one of them: " in result.stderr
+    assert " of 6 cameras, one of them: " in result.stderr
     here, there = (np.asarray(open_sweep(name).pictures) for name in ("here.zarr", "there.zarr"))
     np.testing.assert_allclose(there, here, rtol=0, atol=1e-6 * here.max())
     monkeypatch.setattr(sent, "SENT", 1000)

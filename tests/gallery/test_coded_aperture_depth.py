@@ -21,6 +21,10 @@ NEAR, FAR = 0.8, 2.0
 SPACING, SLOPE, CONVERGENCE, PIXELS = 20 * mm / 13, 0.0018, 1.2, 200
 
 
+# The planes of the scene are the ends of the candidates.
+pytestmark = pytest.mark.filterwarnings("ignore:of the blocks, by confidence:vcc.ResultWarning")
+
+
 def natural(seed: int, width: float) -> Picture:
     """A texture of amplitudes 1/f, as natural pictures have."""
     size = 400

@@ -53,8 +53,8 @@ def test_the_worst_depth_counts_most(example):
 
 
 def test_a_plate_is_learned_from_next_to_none(example):
-    """Light moves by a fifth of a pixel at most, first; in six steps four starts gained 2.0 to 2.8 dB at worst."""
-    effort = replace(example["QUICK"], measured=Sizes(depths=3, target=64), frame=20, rays=128, steps=6)
+    """Light moves by a fifth of a pixel at most, first; in eight steps it gains 1.5 dB at worst, and more."""
+    effort = replace(example["QUICK"], measured=Sizes(depths=3, target=64), frame=20, rays=128, steps=8)
     pair = example["gallery_pair"](effort.measured)
     start = example["next_to_none"](effort.points, 1)
     places = np.linspace(-4.9e-3, 4.9e-3, 40)

@@ -63,7 +63,7 @@ def test_a_mask_too_fine_for_its_texture_is_told(period, told):
     )
     mask = vcc.Mask(patterns.CosineSum((period, math.inf)), z=51 * mm, name="fine")
     camera = vcc.Camera([vcc.Lens(50 * mm), mask], vcc.Sensor(52 * mm, (4, 1500), 3 * um))
-    notes = [note for note in camera.compile(light_field, method="footprints").notes if "its texture" in note]
+    notes = [note for note in camera.compile(light_field, method="footprints").cautions if "its texture" in note]
     assert bool(notes) is told
     if told:
         assert "fine" in notes[0]

@@ -26,7 +26,7 @@ def sections(run: Drive) -> tuple[list[str], float | None]:
     core = run.plan.core
     assert isinstance(core, Footprints)
     seconds = expected_seconds(run) if run.given.whole() is not None else None
-    return [_sampling(run.plan, core), _cost(run, core, seconds), _warnings(run.plan, core)], seconds
+    return [_sampling(run.plan, core), _cost(run, core, seconds), _warnings(run.plan)], seconds
 
 
 def _sampling(plan: Plan, core: Footprints) -> str:
@@ -92,15 +92,10 @@ def _memory(run: Drive) -> int:
     return run.engine.memory(run.plan.core, run.channels, run.threads) + blurred + between
 
 
-def _warnings(plan: Plan, core: Footprints) -> str:
+def _warnings(plan: Plan) -> str:
     lines = []
     if plan.missing_rays > 1e-3:
         lines.append(f"  {plan.missing_rays:.1%} of the rays asked for are missing: {plan.missing_reason}")
-    if plan.expected_ghosting > 1.5 * max(1.0, abs(core.row_step)):
-        lines.append(
-            f"  ghosting: views' pictures of some depths stay {plan.expected_ghosting:.2g} pixels apart; "
-            "the light field has too few views for this defocus"
-        )
     lines += [f"  {caution}" for caution in plan.cautions]
     return "Warnings\n" + ("\n".join(lines) if lines else "  none")
 

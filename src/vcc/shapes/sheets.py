@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
+from vcc.shapes.lattice import CellApertures
 from vcc.shapes.patterns import (
     FEWEST_PER_CELL,
     Bounded,
@@ -290,6 +291,15 @@ def clear_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:
         else:
             return np.zeros_like(clear)
     return clear
+
+
+def has_edges(pattern: Pattern) -> bool:
+    """Whether a pattern is made of areas with hard edges, such as cells and polygons. Bounds do not count."""
+    if isinstance(pattern, Product):
+        return any(has_edges(factor) for factor in pattern.factors)
+    if isinstance(pattern, (Shifted, Bounded)):
+        return has_edges(pattern.pattern)
+    return isinstance(pattern, (Cells, Circle, Polygon, Tiles, CellApertures))
 
 
 def dark_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:

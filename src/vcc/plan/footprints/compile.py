@@ -23,7 +23,7 @@ from vcc.optics.train import Stage, Train
 from vcc.plan.decisions import ANEW, Decisions, plan_again
 from vcc.plan.footprints import against_sensor as masks
 from vcc.plan.footprints.aperture import Aperture
-from vcc.plan.footprints.cells import Detail, Geometry, divide_samples, divide_views
+from vcc.plan.footprints.cells import Detail, Geometry, SampleDivision, divide_samples, divide_views
 from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
 from vcc.plan.footprints.linear_in_cells import by_masks_against_sensor, by_view_planes
 from vcc.plan.footprints.mask_textures import ROUNDING, Textured, mask_as_met, mask_in_path
@@ -107,7 +107,7 @@ class InPath(Brief):
         textures: how theirs were made.
         between: what is between views.
         geometry: of the samples.
-        divided: how cells of views are, and into how many parts samples are.
+        divided: how cells of views are, and how samples are.
     """
 
     at_views: list[Plane]
@@ -115,14 +115,14 @@ class InPath(Brief):
     textures: tuple[Textured, ...]
     between: BetweenViews
     geometry: Geometry
-    divided: tuple[CellDivision, int]
+    divided: tuple[CellDivision, SampleDivision]
 
     def same_by(self, detail: Detail, how: How) -> bool:
         """Whether the same would have been decided of other patterns of the same size; see `divide_views`."""
         division = divide_views(self.at_views, self.planes, self.between, self.geometry, how.refine, detail)
         own, fine = self.divided
-        samples, _ = divide_samples(self.planes, self.geometry, division, how.refine, detail)
-        return division.like(own) and fine == samples
+        samples = divide_samples(self.planes, self.geometry, division, how.refine, detail)
+        return division.like(own) and (fine.parts, fine.hard) == (samples.parts, samples.hard)
 
 
 def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisions = ANEW) -> Compiled:
@@ -165,11 +165,12 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         lambda: divide_views(view_planes, path_planes, between, geometry, how.refine),
         CellDivision.like,
     )
-    fine, spilt = decisions.keep(
+    finer = decisions.keep(
         "parts of samples",
         lambda: divide_samples(path_planes, geometry, division, how.refine),
-        lambda one, other: one[0] == other[0],
+        lambda one, other: (one.parts, one.hard) == (other.parts, other.hard),
     )
+    fine = finer.parts
     taps = Taps.of(views, division)
     aperture = Aperture(view_planes, taps, between.motion, samples, decisions)
     parts = decisions.made(
@@ -200,7 +201,7 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
     lookups = tuple(lookup for lookup, _ in met)
     core = Footprints(
         raster_shape=sensor.shape,
-        interpolation=_sharp_footprint(step, fine, decisions) if sharp else how.interpolation,
+        interpolation=_sharp_footprint(step, finer, decisions) if sharp else how.interpolation,
         scale=grid.sample_volume / (sensor.pitches[0] * sensor.pitches[1]),
         view_rows=kept_taps.rows,
         view_columns=kept_taps.columns,
@@ -224,7 +225,9 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         after.append(OnSensor(guard, transmission, detail))
     decisions.note(by_view_planes(aperture, keep, path_planes))
     decisions.note(by_masks_against_sensor(sensor, against_sensor, len(after) - 1, detail is not None, decisions))
-    notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, (fine, spilt), swapped)
+    notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, finer, swapped)
+    ghosts = 0.0 if how.between_views == "none" else between.gap_left
+    cautions = cautions_of(division, finer, ghosts, max(1.0, abs(core.row_step)))
     plan = Plan(
         sensor_shape=sensor.shape,
         grid_shape=given.shape[:4],
@@ -233,12 +236,14 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         after=tuple(after),
         expected_ghosting=between.gap_left,
         notes=notes + blurs.notes,
-        cautions=cautions_of(division, (fine, spilt)) + coarse_textures(lookups),
+        cautions=cautions + coarse_textures(lookups),
     )
     # Gaps between views' pictures that are filled ask for parts of cells where a mask is fine.
     alone = not path_planes and (how.refine == 1 or max(between.gap_filled) <= 1)
     as_met = replace(aperture, taps=kept_taps)
-    in_path = InPath(view_planes, path_planes, tuple(kept for _, kept in met), between, geometry, (division, fine))
+    in_path = InPath(
+        view_planes, path_planes, tuple(kept for _, kept in met), between, geometry, (division, finer)
+    )
     return Compiled(plan, as_met, kept_taps.shares, alone, in_path)
 
 
@@ -281,7 +286,7 @@ class _Sharpened:
         losses = TENT + (MEAN if sample == "mean" else 0)
         if core.refine > 1:
             core = replace(core, sharpen_samples=along_axis(losses, 1.0))
-            losses = BOX + MEAN
+            losses = (BOX if core.interpolation == "box" else TENT) + MEAN
         footprint = BOX if core.interpolation == "box" else TENT
         step = core.step / core.refine
         (xk, xl), (yk, yl) = step
@@ -339,15 +344,22 @@ def _after(
     return guard + sharpened.reach + detail, after
 
 
-def _sharp_footprint(step: Array, fine: int, decisions: Decisions) -> str:
+def _sharp_footprint(step: Array, divided: SampleDivision, decisions: Decisions) -> str:
     """The footprint that is sharpened: a tent, which is quick; a spline where pixels would see a tent's bends.
 
-    Samples that are divided fill their own cells, for a mask cuts them off there.
+    Behind hard edges samples that are divided fill their own cells, for the mask cuts them off there.
     """
     parted = not (step[0, 1] or step[1, 0])
     finer = max(abs(step[0, 0]), abs(step[1, 1])) > FINER_PIXELS
     return decisions.keep(
-        "footprint of samples", lambda: "box" if fine > 1 else "spline" if parted and finer else "linear"
+        "footprint of samples",
+        lambda: (
+            "box"
+            if divided.parts > 1 and divided.hard
+            else "spline"
+            if divided.parts == 1 and parted and finer
+            else "linear"
+        ),
     )
 
 

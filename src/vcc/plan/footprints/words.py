@@ -6,7 +6,7 @@ import numpy as np
 
 from vcc.base.affine import Affine
 from vcc.optics.train import Train
-from vcc.plan.footprints.cells import ERROR
+from vcc.plan.footprints.cells import ERROR, SampleDivision
 from vcc.plan.footprints.mask_textures import texture_error
 from vcc.plan.footprints.model import MaskLookup
 from vcc.plan.footprints.planes import Plane
@@ -16,6 +16,8 @@ from vcc.plan.parallax_rule import BetweenViews
 
 TOO_MUCH = 5e-3
 """Error, as a share of the light, from which on a picture says it; estimates are about twice what errors are."""
+GHOSTS = 1.5
+"""Pixels, or samples, between views' pictures of one thing from which on these are seen apart."""
 COARSE_TEXTURE = 5e-3
 """Error of a mask's texture between its points, as a share of its largest value, from which on a plan says it."""
 
@@ -27,7 +29,7 @@ def notes_of(
     against_sensor: list[Plane],
     between: BetweenViews,
     division: CellDivision,
-    samples: tuple[int, float],
+    samples: SampleDivision,
     swapped: bool,
 ) -> tuple[str, ...]:
     """What was folded, pulled to the samples and to the sensor, and how finely cells are divided."""
@@ -66,7 +68,7 @@ def notes_of(
             "elements in different planes still vary together within these cells, and are taken as independent "
             f"there: an error of up to {division.error:.1%} of the light. More views would make it smaller"
         )
-    fine, spilt = samples
+    fine, spilt, _ = samples
     if fine > 1:
         notes.append(f"samples divided {fine}×{fine}: a mask near the sensor is finer than a sample")
     if spilt > ERROR:
@@ -77,15 +79,27 @@ def notes_of(
     return tuple(notes)
 
 
-def cautions_of(division: CellDivision, samples: tuple[int, float]) -> tuple[str, ...]:
-    """What a picture by these cells lacks so much of that it is to be said with the picture."""
+def cautions_of(division: CellDivision, samples: SampleDivision, ghosts: float, pixel: float) -> tuple[str, ...]:
+    """What a picture by these cells lacks so much of that it is to be said with the picture.
+
+    Args:
+        division: of views' cells.
+        samples: how these are divided.
+        ghosts: how far views' pictures of some depths stay apart, pixels; 0 where nobody asks to close gaps.
+        pixel: what views' pictures may lie apart unseen: a pixel, or a sample where it is wider.
+    """
     found = []
+    if ghosts > GHOSTS * pixel:
+        found.append(
+            f"ghosting: views' images of some depths stay {ghosts:.2g} pixels apart; the light field has too "
+            'few views for this defocus. Pass between_views="depth", or more views'
+        )
     if division.error > TOO_MUCH:
         found.append(
             "elements in different planes vary together within parts of views' cells: an error of up to "
             f"{division.error:.1%} of the light. Pass {_finer(max(division.finer, division.parts))}more views"
         )
-    fine, spilt = samples
+    fine, spilt, _ = samples
     if spilt > TOO_MUCH:
         found.append(
             f"a mask near the sensor is finer than the samples: an error of about {spilt:.1%} of the light beside "
