@@ -81,7 +81,7 @@ def test_own_element_makes_rings_of_its_closed_form():
     near = radius < 95e-6  # where other rings hardly reach
     ring = (radius > inner - margin) & (radius < outer + margin)
     assert image[near & ring].sum() > 0.999 * image[near].sum()
-    assert abs(image[radius < inner - margin]).max() < 1e-6 * image.max()
+    assert abs(image[radius < inner - margin]).max() < 6e-5 * image.max()  # of a Gaussian beyond 4 σ
 
 
 WITHOUT = ("vcc.cli", "vcc.engines", "vcc.plan", "vcc.__main__", "vcc.run.torch_physics")

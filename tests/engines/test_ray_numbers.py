@@ -129,7 +129,9 @@ def direction(name, value, gradient, random):
     return np.where(np.isfinite(value), sign, 0.0)
 
 
-CASES = [f"{kind}, 1" for kind in BENT] + ["lenses, 1", "one mask, 1", "two masks, 1", "blur, 1", *OWN]
+# With seed 1 a ray meets the edge of a lenslet, where numbers bend.
+CASES = [f"{kind}, {2 if kind == 'lenslets' else 1}" for kind in BENT]
+CASES += ["lenses, 1", "one mask, 1", "two masks, 1", "blur, 1", *OWN]
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -65,8 +65,8 @@ def notes_of(
         notes.append(f"cells of {which} divided {finer}×{finer}: elements in different planes vary together there")
     if division.error > ERROR:
         notes.append(
-            "elements in different planes still vary together within these cells, and are taken as independent "
-            f"there: an error of up to {division.error:.1%} of the light. More views would make it smaller"
+            "masks still vary within these parts of cells, where they are taken for their means: an error of up "
+            f"to {division.error:.1%} of the light. More views would make it smaller"
         )
     fine, spilt, _ = samples
     if fine > 1:
@@ -96,7 +96,7 @@ def cautions_of(division: CellDivision, samples: SampleDivision, ghosts: float, 
         )
     if division.error > TOO_MUCH:
         found.append(
-            "elements in different planes vary together within parts of views' cells: an error of up to "
+            "masks vary within parts of views' cells, where they are taken for their means: an error of up to "
             f"{division.error:.1%} of the light. Pass {_finer(max(division.finer, division.parts))}more views"
         )
     fine, spilt, _ = samples
