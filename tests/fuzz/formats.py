@@ -85,6 +85,7 @@ FORMATS = {
     "zarr jpegxl": Format(seeds.store("jpegxl"), "s.zarr", readers.store, checked=True),
     "zarr avif": Format(seeds.store("avif"), "s.zarr", readers.store, checked=True),
     "zarr video": Format(seeds.light_field_video, "v.zarr", readers.light_field_video, checked=True),
+    "sweep": Format(seeds.sweep, "s.zarr", readers.sweep),
     "camera npy": Format(seeds.camera(".npy"), "camera.toml", readers.camera),
     "camera csv": Format(seeds.camera(".csv"), "camera.toml", readers.camera),
     "camera png": Format(seeds.camera(".png"), "camera.toml", readers.camera),

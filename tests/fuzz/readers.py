@@ -19,6 +19,7 @@ from vcc.sources.meshes import loaded
 from vcc.sources.mitsuba.renderer import _contents
 from vcc.sources.pbrt import PbrtScene
 from vcc.store import open_store, open_video
+from vcc.sweeps import open_sweep
 
 Read = dict[str, Any]
 """``digest`` of all that was read, and whether it is ``sane``: no radiance is NaN, infinite or negative."""
@@ -41,6 +42,12 @@ def light_field_video(path: Path) -> Read:
     frames = open_video(path)
     values = [np.asarray(frame.read().values) for frame in frames]
     return _read(frames.times, frames.between, *values, sane=all(map(_is_light, values)))
+
+
+def sweep(path: Path) -> Read:
+    swept = open_sweep(path)
+    pictures = [swept[place].values for place in np.ndindex(*swept.shape) if swept.done[place]]
+    return _read(swept.table, *pictures)
 
 
 def lytro(path: Path) -> Read:

@@ -256,6 +256,11 @@ def light_field_video(folder: Path) -> None:
             frames.append(light_field(), n / 24)
 
 
+def sweep(folder: Path) -> None:
+    camera = vcc.Camera([vcc.Lens(0.05, name="main")], vcc.Sensor(0.052, (6, 8), 0.0005))
+    vcc.sweep(camera, light_field(), {"sensor.z": "51mm:53mm:3"}, metrics=["sharpness"], output=folder / "s.zarr")
+
+
 def camera(ending: str) -> Maker:
     def make(folder: Path) -> None:
         cells = scene(1, 1, channels=None)[0, 0][:8, :8]

@@ -5,6 +5,9 @@ from __future__ import annotations
 import errno
 import json
 import os
+import random
+import re
+import shutil
 import subprocess
 import sys
 
@@ -266,7 +269,7 @@ def test_a_damaged_sweep_is_named(tmp_path):
     vcc.sweep(CAMERA, FIELD, VALUES, output=path)
     stated = json.loads((path / "done" / "zarr.json").read_text())
     (path / "done" / "zarr.json").write_text(json.dumps({**stated, "data_type": "nonsense"}))
-    with pytest.raises(vcc.InputError, match=r"sweep.zarr cannot be used as a sweep"):
+    with pytest.raises(vcc.InputError, match=r"sweep.zarr/done/zarr.json cannot be read as an array of a sweep"):
         open_sweep(path)
 
 
@@ -290,3 +293,66 @@ def test_patterns_as_things_are_told_apart(tmp_path):
         vcc.sweep(
             CAMERA, FIELD, {"code.pattern": [Circle(8 * mm), Circle(5 * mm)]}, output=tmp_path / "sweep.zarr"
         )
+
+
+def _damaged(data, rnd):
+    """Bits turned, the end cut off, nothing left, or a number of JSON that is another."""
+    numbers = list(re.finditer(rb"\d+", data)) if data.startswith(b"{") else []
+    how = rnd.choice(["bits", "cut", "empty", *["number"] * 2 * bool(numbers)])
+    if how == "bits":
+        turned = bytearray(data)
+        for _ in range(rnd.choice([1, 4])):
+            turned[rnd.randrange(len(turned))] ^= 1 << rnd.randrange(8)
+        return bytes(turned)
+    if how == "number":
+        found = rnd.choice(numbers)
+        other = rnd.choice([b"0", b"-1", b"100000000000", b"null", b'"a"'])
+        return data[: found.start()] + other + data[found.end() :]
+    return data[: rnd.randrange(len(data))] if how == "cut" else b""
+
+
+def test_damaged_sweeps_are_refused_or_read(tmp_path):
+    """No error of a library comes out, whatever is damaged; what is refused is named."""
+    whole, damaged, rnd, refused = tmp_path / "sweep.zarr", tmp_path / "damaged.zarr", random.Random(1), []
+    vcc.sweep(CAMERA, FIELD, {"sensor.z": "51mm:53mm:3"}, metrics=["sharpness"], output=whole)
+    files = sorted(path.relative_to(whole) for path in whole.rglob("*") if path.is_file())
+    for _ in range(200):
+        shutil.rmtree(damaged, ignore_errors=True)
+        shutil.copytree(whole, damaged)
+        file = damaged / rnd.choice(files)
+        file.write_bytes(_damaged(file.read_bytes(), rnd))
+        try:
+            swept = open_sweep(damaged)
+            for n in range(3):
+                if swept.done[n]:
+                    assert swept[n].values.shape == (12, 16, 3)
+        except vcc.InputError as error:
+            refused.append(str(error))
+    assert len(refused) > 100
+    assert all("damaged.zarr" in said for said in refused)
+
+
+@pytest.mark.parametrize("name", ["done", "pictures"])
+def test_a_chunk_larger_than_it_can_be_is_not_read(tmp_path, name):
+    vcc.sweep(CAMERA, FIELD, {"sensor.z": "51mm:53mm:3"}, output=tmp_path / "sweep.zarr")
+    with (tmp_path / "large").open("wb") as large:
+        large.truncate(1_300_000_000)
+    chunk = next(path for path in sorted((tmp_path / "sweep.zarr" / name / "c").rglob("0")) if path.is_file())
+    chunk.unlink()
+    chunk.symlink_to(tmp_path / "large")
+    with pytest.raises(vcc.InputError, match="1,300,000,000 bytes"):
+        np.asarray(open_sweep(tmp_path / "sweep.zarr").pictures)
+    chunk.unlink()
+    os.mkfifo(chunk)
+    with pytest.raises(vcc.InputError, match="named pipe"):
+        np.asarray(open_sweep(tmp_path / "sweep.zarr").pictures)
+
+
+def test_a_picture_whose_file_is_missing_is_refused(tmp_path):
+    """Zarr would give NaN for it."""
+    vcc.sweep(CAMERA, FIELD, {"sensor.z": "51mm:53mm:3"}, output=tmp_path / "sweep.zarr")
+    (tmp_path / "sweep.zarr" / "pictures" / "c" / "1" / "0" / "0" / "0").unlink()
+    swept = open_sweep(tmp_path / "sweep.zarr")
+    assert np.isfinite(swept[0].values).all()
+    with pytest.raises(vcc.InputError, match="missing"):
+        swept[1]

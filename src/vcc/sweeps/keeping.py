@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.reading import check_path, expanded, in_words, read_bytes, read_json, stated_at
+from vcc.base.reading import check_path, expanded, in_words, read_bytes, read_json, reading, stated_at
 from vcc.base.version import VERSION
 from vcc.files.atomic import refusal
 from vcc.files.parts import check_name, clear_leftovers, part_of
@@ -28,6 +28,7 @@ from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import difference, plain, same
 from vcc.sweeps.metrics import KNOWN
 from vcc.sweeps.result import PIXEL_AXES, Results, Sweep
+from vcc.sweeps.stored import StoredPictures, member, small
 from vcc.sweeps.values import Varied
 
 KEY = "sweep"
@@ -134,12 +135,15 @@ class InStore(Results):
 
     def finished(self) -> Sweep:
         """See `Results`."""
-        return replace(self.swept, pictures=self._pictures)
+        pictures = self._pictures
+        if pictures is not None:
+            pictures = StoredPictures(self.path / PICTURES, pictures, len(self.swept.shape))
+        return replace(self.swept, pictures=pictures)
 
     def _take_over(self, metrics: dict[str, str | None]) -> None:
         """What is there of the same sweep; room is made for metrics that are not there, or were others."""
         there = _stated(self.path)["metrics"]
-        self.swept.done[...] = self._group[DONE][...]
+        self.swept.done[...] = small(self.path, self._group, DONE, self.swept.shape)
         wanted = {name: metric for name, metric in metrics.items() if there.get(name, "") != metric}
         if wanted and self._pictures is None and self.swept.done.any():
             raise InputError(
@@ -154,7 +158,8 @@ class InStore(Results):
                     _number(self._group, self.swept, name, self.swept.numbers[name])
             # After them: who is killed before finds them wanting again.
             self._group.attrs[KEY] = {**self._group.attrs[KEY], "metrics": {**there, **metrics}}
-        numbers = {name: self._group[name][...] for name in (*KNOWN, *there, *wanted)}
+        shape = self.swept.shape
+        numbers = {name: small(self.path, self._group, name, shape) for name in (*KNOWN, *there, *wanted)}
         self.swept = replace(self.swept, numbers=numbers)
 
     def _note(self) -> None:
@@ -180,27 +185,51 @@ def open_sweep(path: str | PathLike[str]) -> Sweep:
         path: folder of the store.
 
     Raises:
-        InputError: no such folder, or what is no sweep.
+        InputError: no such folder, what is no sweep, or a damaged one (the file is named). A damaged picture is
+            refused when it is read.
     """
     folder = expanded(path)
-    stated = _stated(folder)
-    group = _opened(folder, "r")
-    try:
-        axes = tuple(stated["axes"])
+    with reading(folder, "a sweep"):
+        stated = _stated(folder)
+        group = _opened(folder, "r")
+        axes, parameters = tuple(stated["axes"]), stated["parameters"]
+        together = axes != tuple(each["name"] for each in parameters)
+        sizes = [len(each["labels"]) for each in parameters]
+        shape = tuple(sizes[:1] if together else sizes)
+        if len(axes) != len(shape) or (together and len(set(sizes)) != 1):
+            raise InputError(f"{folder / 'zarr.json'}: {len(parameters)} parameters do not fit the axes {axes}")
         coordinates = tuple(
-            Varied(each["name"], tuple(group[each["name"]][...].tolist()), tuple(each["labels"]), each["unit"])
-            for each in stated["parameters"]
+            Varied(
+                each["name"],
+                tuple(small(folder, group, each["name"], (size,)).tolist()),
+                tuple(each["labels"]),
+                each["unit"],
+            )
+            for each, size in zip(parameters, sizes, strict=True)
         )
+        frames = small(folder, group, FRAME, (3, 3), (*shape, 3, 3))
+        if not np.isfinite(frames).all():
+            raise InputError(f"{folder / FRAME} holds numbers that are not finite")
         return Sweep(
             axes,
             coordinates,
-            {name: group[name][...] for name in (*KNOWN, *stated["metrics"])},
-            group.get(PICTURES),
-            group[FRAME][...],
-            group[DONE][...],
+            {name: small(folder, group, name, shape) for name in (*KNOWN, *stated["metrics"])},
+            _pictures_of(folder, group, shape) if (folder / PICTURES).is_dir() else None,
+            frames,
+            small(folder, group, DONE, shape),
         )
-    except (KeyError, TypeError, ValueError, OSError) as error:
-        raise InputError(f"{folder} cannot be used as a sweep: {in_words(error)}") from error
+
+
+def _pictures_of(folder: Path, group: Any, shape: tuple[int, ...]) -> StoredPictures:
+    """The pictures of a sweep of some shape, one in each chunk."""
+    array, n = member(folder, group, PICTURES), len(shape)
+    one = (*(1,) * n, *array.shape[n:])
+    if tuple(array.shape[:n]) != shape or tuple(array.chunks) != one or len(one) - n not in (2, 3):
+        raise InputError(
+            f"{folder / PICTURES} has the shape {tuple(array.shape)} in chunks of {tuple(array.chunks)}, and the "
+            f"sweep is one of {shape} pictures, a chunk for each"
+        )
+    return StoredPictures(folder / PICTURES, array, n)
 
 
 def save_sweep(swept: Sweep, path: str | PathLike[str]) -> None:

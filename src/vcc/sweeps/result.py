@@ -35,8 +35,9 @@ class Sweep(Shown):
         coordinates: the parameters and their values; along one axis each, or all along ``"camera"``.
         numbers: what is told of each picture, by name, arrays of the sweep's shape; not a number where a picture
             is not there yet.
-        pictures: irradiance, (…, rows, columns[, channels]), as light lands on the sensor; an array, or one of
-            Zarr's, of which parts are read when they are asked for. None where no pictures were kept.
+        pictures: irradiance, (…, rows, columns[, channels]), as light lands on the sensor; an array, or a
+            `vcc.sweeps.stored.StoredPictures`, of which parts are read when they are asked for. None where
+            no pictures were kept.
         frames: from (column, row, 1) to (x, y, 1) on the sensor, metres: (3, 3), or (…, 3, 3) where they differ.
         done: which pictures are there, of the sweep's shape.
         cameras: the cameras, numbered through; None where a sweep was opened from a file.
