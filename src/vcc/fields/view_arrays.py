@@ -1,4 +1,4 @@
-"""Arrays of views as users have them: in one row or in a grid, and what their numbers may be instead of radiance."""
+"""Arrays of views as users have them, in one row or in a grid, and what numbers may be in place of radiance."""
 
 from __future__ import annotations
 
@@ -76,6 +76,6 @@ def warn_of_codes(values: Any) -> None:
         return
     warn_of_result(
         f"the samples are {values.dtype} and whole numbers up to {view.max():g} (in the middle view), as 8-bit "
-        "codes are: taken as radiance, pictures are up to 255 times as bright. Divide by 255, or give uint8, which is "
-        "taken as fractions of 255"
+        "codes are: taken as radiance, pictures are up to 255 times as bright. Divide by 255, or give uint8, "
+        "which is taken as fractions of 255"
     )
