@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import array_api_strict
 import numpy as np
@@ -223,3 +224,47 @@ def test_views_that_converge_beyond_all_rounding_are_called_parallel(distance, w
     """9 views 0.5 mm apart turn by 9·0.5 mm/10¹⁵ m = 5·10⁻¹⁸: nothing beside a pixel of 0.001."""
     lf = vcc.LightField.from_views(np.ones((9, 9, 4, 4)), 0.5e-3, 1e-3, distance)
     assert words in lf.grid.geometry
+
+
+def test_views_along_one_axis_are_asked_for_their_grid():
+    colour = samples(6, 16, 17, 3)
+    with pytest.raises(vcc.InputError, match=r"grid=\(rows, columns\).*channels=False"):
+        LightField.from_views(colour, 1 * mm, 1e-3)
+    lf = LightField.from_views(colour, 1 * mm, 1e-3, grid=(2, 3))
+    assert lf.shape == (2, 3, 16, 17, 3)
+    np.testing.assert_array_equal(lf.values[1, 0], colour[3])
+    assert LightField.from_views(colour[..., 0], 1 * mm, 1e-3, grid=(2, 3)).shape == (2, 3, 16, 17)
+    assert LightField.from_views(colour, 1 * mm, 1e-3, channels=False).shape == (6, 16, 17, 3)
+    strict = array_api_strict.asarray(colour)
+    assert LightField.from_views(strict, 1 * mm, 1e-3, grid=(2, 3)).shape == (2, 3, 16, 17, 3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "how"),
+    [
+        ((6, 5, 5), {"grid": (2, 2)}),
+        ((2, 3, 5, 5, 3), {"grid": (2, 3)}),
+        ((6, 5, 5, 3), {"grid": (2, 3), "channels": False}),
+        ((6, 5, 5), {"grid": (2, 3), "channels": True}),
+        ((6, 5, 5, 3), {"channels": True}),
+        ((2, 3, 5, 5, 3), {"channels": False}),
+    ],
+)
+def test_a_grid_or_channels_that_do_not_fit_are_refused(shape, how):
+    with pytest.raises(vcc.InputError, match="shape"):
+        LightField.from_views(samples(*shape), 1 * mm, 1e-3, **how)
+
+
+def test_a_grid_is_two_whole_numbers():
+    with pytest.raises(vcc.InputError, match="two whole numbers"):
+        LightField.from_views(samples(6, 5, 5), 1 * mm, 1e-3, grid=6)
+
+
+def test_codes_of_8_bits_as_floats_are_told():
+    codes = np.random.default_rng(0).integers(0, 256, (3, 3, 16, 16)).astype(np.float32)
+    with pytest.warns(vcc.ResultWarning, match="Divide by 255"):
+        LightField.from_views(codes, 1 * mm, 1e-3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for sound in (codes / 255, codes.astype(np.uint8), codes * 0.7, codes * 0 + 2):
+            LightField.from_views(sound, 1 * mm, 1e-3)

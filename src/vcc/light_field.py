@@ -14,6 +14,7 @@ from vcc.engines import on_gpu
 from vcc.fields.grid import Sample, camera_array_frame
 from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import InMemory, shape_of
+from vcc.fields.view_arrays import in_grid, warn_of_codes
 from vcc.image import Image
 from vcc.run import operators
 
@@ -64,6 +65,9 @@ class LightField(InMemory):
         disparity_range: tuple[float, float] | None = None,
         sample: Sample = "mean",
         disparity: Any = None,
+        *,
+        grid: tuple[int, int] | None = None,
+        channels: bool | None = None,
     ) -> LightField:
         """A light field from pictures taken by a planar array of parallel cameras, upright, row 0 at the top.
 
@@ -72,7 +76,8 @@ class LightField(InMemory):
         −du·(1/Z − 1/F)/ps pixels per view.
 
         Args:
-            values: the pictures, shape (rows of views, columns of views, rows, columns[, channels]).
+            values: the pictures, shape (rows of views, columns of views, rows, columns[, channels]); with
+                ``grid``, (views, rows, columns[, channels]).
             spacing: distance between neighbouring views, metres: one number or (dv, du).
             slope_per_pixel: pixel pitch over focal length of the cameras: one number or (pt, ps).
             focus_distance: where the views converge, metres (shifted, not rotated, cameras); infinite if
@@ -80,10 +85,19 @@ class LightField(InMemory):
             disparity_range: see `LightField`.
             sample: see `LightField`.
             disparity: see `LightField`.
+            grid: (rows, columns) of views that lie along one axis of ``values``, row by row from the top left.
+            channels: whether the last axis of ``values`` is one of channels; None where the shape says so.
 
         Raises:
-            InputError: a spacing, slope or focus distance of zero or less, or what `LightField` refuses.
+            InputError: a spacing, slope or focus distance of zero or less, or what `LightField` refuses; a grid or
+                channels that do not fit; a shape such as (25, 64, 64, 3), which may be 25 pictures in colour or
+                25×64 views 3 pixels wide: give ``grid``, or ``channels=False``.
+
+        Warns:
+            ResultWarning: floating-point samples look like 8-bit codes, 0 to 255.
         """
+        values = in_grid(values, shape_of(values), grid, channels)
+        warn_of_codes(values)
         frame = camera_array_frame(shape_of(values), spacing, slope_per_pixel, focus_distance)
         return cls(values, frame, disparity_range, sample, disparity)
 

@@ -1,0 +1,81 @@
+"""Arrays of views as users have them, in one row or in a grid, and what numbers may be in place of radiance."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from vcc.base.errors import InputError, warn_of_result
+
+NARROWEST = 16
+"""Pixels: an array (n, a, b, 3) with a and b of at least so many is more likely n pictures in colour."""
+FEWEST_CODES = 16
+"""Different whole numbers in a view from which on they look like 8-bit codes."""
+
+
+def in_grid(values: Any, shape: tuple[int, ...], grid: tuple[int, int] | None, channels: bool | None) -> Any:
+    """Views as (v, u, t, s[, channel]).
+
+    Args:
+        values: an array of any library.
+        shape: of it.
+        grid: (rows, columns) of views that lie along one axis, row by row; None where they lie in a grid.
+        channels: whether the last axis is one of channels; None where the shape says so.
+
+    Raises:
+        InputError: a grid or channels that do not fit; four axes that may be either.
+    """
+    if grid is not None:
+        if not isinstance(grid, tuple | list) or [isinstance(n, int | np.integer) for n in grid] != [True, True]:
+            raise InputError(f"grid is two whole numbers, (rows, columns) of views, not {grid!r}")
+        rows, columns = grid
+        fits = {3: (None, False), 4: (None, True)}.get(len(shape), ())
+        if channels not in fits or rows < 1 or columns < 1 or shape[0] != rows * columns:
+            raise InputError(
+                f"with grid={rows, columns}, values are {rows}×{columns} = {rows * columns} views along one axis, "
+                f"(views, rows of pixels, columns of pixels[, channels]), not the shape {shape}"
+            )
+        new = (rows, columns, *shape[1:])
+        if hasattr(values, "reshape"):
+            return values.reshape(new)
+        return values.__array_namespace__().reshape(values, new)
+    if channels is not None and len(shape) == 4 + (not channels):
+        raise InputError(
+            f"values of the shape {shape} have {'no' if channels else 'an'} axis of channels behind (v, u, t, s)"
+            + ("; for views along one axis give grid=(rows, columns)" if channels else "")
+        )
+    if (
+        channels is None
+        and len(shape) == 4
+        and shape[0] > 1
+        and min(shape[1:3]) >= NARROWEST
+        and shape[3] in (3, 4)
+    ):
+        n, side = shape[0], math.isqrt(shape[0])
+        likely = (side, side) if side * side == n else (1, n)
+        raise InputError(
+            f"values of the shape {shape} are {n}×{shape[1]} views of {shape[2]}×{shape[3]} pixels, or {n} "
+            f"pictures of {shape[3]} channels: say grid=(rows, columns), such as grid={likely}, for pictures, or "
+            f"channels=False for views {shape[3]} pixels wide"
+        )
+    return values
+
+
+def warn_of_codes(values: Any) -> None:
+    """Warn where floating-point samples look like 8-bit codes; the middle view tells.
+
+    Warns:
+        ResultWarning: its samples are whole numbers up to 255, many different ones.
+    """
+    if not isinstance(values, np.ndarray) or values.dtype.kind != "f" or values.ndim < 4 or 0 in values.shape:
+        return
+    view = values[values.shape[0] // 2, values.shape[1] // 2]
+    if not 1.5 < view.max() <= 255 or (view != np.round(view)).any() or len(np.unique(view)) < FEWEST_CODES:
+        return
+    warn_of_result(
+        f"the samples are {values.dtype} and whole numbers up to {view.max():g} (in the middle view), as 8-bit "
+        "codes are: taken as radiance, pictures are up to 255 times as bright. Divide by 255, or give uint8, "
+        "which is taken as fractions of 255"
+    )
