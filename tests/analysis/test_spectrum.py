@@ -184,6 +184,7 @@ def test_the_slice_has_channels_and_refuses_frames_that_mix_x_and_y():
         fft4(Blob(MIXED).light_field).sensor_slice()
 
 
+@pytest.mark.filterwarnings("ignore:the samples are float:vcc.errors.ResultWarning")  # whole numbers, as codes are
 @pytest.mark.parametrize("dtype", [np.float32, np.uint8])
 def test_there_and_back(dtype):
     rng = np.random.default_rng(1)

@@ -106,7 +106,7 @@ CASES = {
     ),
     "a mask against the sensor": Case(vcc.Camera([LENS, mask(D, 0.3 * mm)], SENSOR), has_detail),
     "a mask finer than samples": Case(
-        vcc.Camera([LENS, mask(0.96 * D, 0.5 * mm)], SENSOR),
+        vcc.Camera([LENS, mask(0.98 * D, 0.3 * mm)], SENSOR),
         lambda plan: plan.core.refine > 1 and plan.core.sharpen_samples is not None,
     ),
     "rays": Case(

@@ -90,6 +90,7 @@ def test_a_scene_in_focus_is_not_refocused(light_field):
     assert "not refocused" in result.text
 
 
+@pytest.mark.filterwarnings("ignore:ghosting:vcc.errors.ResultWarning")
 def test_runs_on_a_light_field_of_one_s_own(light_field):
     run = entry.Run(target=96, iterations=15, noises=(0.002, 0.02))
     seen_steps = []

@@ -7,6 +7,8 @@ through a disc is 2·J₁(x)/x. With
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.special import j1
@@ -128,7 +130,10 @@ def test_what_is_in_focus_is_not_blurred(engine):
     sensor = vcc.Sensor(z=1 / (1 / FOCAL_LENGTH - 1 / FOCUS), shape=(40, 40), pitch=SLOPE / 19)
     camera = vcc.Camera([LENS], sensor)
     assert not any(camera.compile(lf).smear)
-    auto = camera.capture(lf, engine=engine).values
+    with pytest.warns(
+        vcc.errors.ResultWarning, match="ghosting: views' images of some depths stay 4 pixels apart"
+    ):
+        auto = camera.capture(lf, engine=engine).values
     none = camera.capture(lf, between_views="none", engine=engine).values
     np.testing.assert_array_equal(auto, none)
     assert auto.std() > 0.1 * auto.mean()
@@ -152,3 +157,24 @@ def test_explain_says_what_is_filled_and_what_is_left():
     assert "ghost copies" in str(in_focus.compile(lf))
     far = vcc.Camera([LENS], sensor_with_gap(6.0, 3.0, (16, 16)))
     assert "spread over" in str(far.compile(lf))
+
+
+@pytest.mark.parametrize("views", [(5, 5), (4, 3)])
+def test_a_rim_beyond_the_middles_of_the_last_views_lets_all_its_light_through(views):
+    # Gaps of 10 pixels are filled between views; beyond the last view nothing is to be interpolated with. An even
+    # field: L·A/d², in single precision.
+    field = vcc.LightField.from_views(np.ones((*views, 80, 80), np.float32), 2 * mm, 2e-3, 1.0, (0.0, 0.0))
+    diameter, distance = (2 * min(views) - 1) * mm, 80 * mm
+    camera = vcc.Camera([vcc.Lens(50 * mm, diameter)], vcc.Sensor(distance, (24, 24), 0.1 * mm))
+    plan = camera.compile(field)
+    assert plan.core.taps_used > 4 * views[0] * views[1]  # spread between views, in parts
+    expected = np.pi / 4 * (diameter / distance) ** 2
+    whole = camera.capture(field, plan=plan).values
+    np.testing.assert_allclose(whole, expected, rtol=2e-6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.errors.ResultWarning)  # a piece lacks what the others have
+        pieces = [camera.capture(field[rows, columns]).values for rows in HALVES for columns in HALVES]
+    np.testing.assert_allclose(sum(pieces), whole, rtol=2e-6)
+
+
+HALVES = slice(None, 2), slice(2, None)

@@ -90,6 +90,7 @@ def pictures(near, far, focus):
     return made, truth(near, far, sensor)
 
 
+@pytest.mark.filterwarnings("ignore:ghosting:vcc.errors.ResultWarning")
 def test_behind_something_in_focus_there_are_no_ghosts():
     made, expected = pictures(0.0, -4.0, 0.0)
     behind, before = ACROSS > 4, ACROSS < -4
@@ -106,6 +107,7 @@ def test_behind_something_in_focus_there_are_no_ghosts():
     )  # what is in focus forbids filling along one parallax
 
 
+@pytest.mark.filterwarnings("ignore:ghosting:vcc.errors.ResultWarning")
 @pytest.mark.parametrize(
     ("near", "far", "focus", "where"),
     [(4.0, 0.0, 0.0, ACROSS < -4), (2.0, -2.0, 0.3, ACROSS < 99), (4.0, -4.0, 0.0, ACROSS < 99)],

@@ -31,6 +31,8 @@ SPILT = 0.25
 SMOOTH = 43.0
 """Of what a sharp picture lacks behind a cosine of whose mean squared finer samples lose a share L: of (6L)³/5,
 but for a smaller power, as of several cosines the finest counts most."""
+SHEARED = 1.3
+"""Width of a footprint of rows that are shifted, in widths of the sample, from which on samples are divided."""
 MISPLACED = 0.1
 """Error of a mask that cuts the cell of a view, as a share of what it cuts off, where the cell's pictures lie a
 pixel apart on the sensor and the shadow of an edge is as wide. Measured on 24 random cameras: 0.04 to 0.13."""
@@ -64,6 +66,7 @@ class Geometry(Brief):
         origin: where sample (0, 0) of view (0, 0) falls, pixels.
         sensor: (rows, columns) of pixels.
         margin: pixels around the sensor from which light is brought in.
+        parts: of samples, along each axis, that their shape on the sensor asks for, see `parts_of_sheared`.
     """
 
     views: tuple[int, int]
@@ -73,6 +76,7 @@ class Geometry(Brief):
     origin: Array
     sensor: tuple[int, int]
     margin: float
+    parts: int = 1
 
     def met(self, plane: Plane, view: Array, parts: int = 1) -> tuple[Array, Array]:
         """The lowest and the highest place (x, y) at which the samples of parts of views meet a plane.
@@ -224,6 +228,19 @@ def _cell(plane: Plane, between: BetweenViews) -> Array:
     return np.asarray(np.sqrt((plane.view_step(between.motion) ** 2).sum(axis=1)))
 
 
+def parts_of_sheared(step: Array) -> int:
+    """Into how many parts samples are divided, each way, that lie turned or sheared on the sensor.
+
+    The footprint of such a sample is taken as rows that are shifted: wider than the sample by 1 + tan² of the
+    angle by which it is turned. The filter that gives sharpness back then finds other detail than there is. On 7
+    cameras turned by more than 28°: 50.4 and 50.5 dB at worst as one part, 56.6 and 65.2 as two.
+
+    Args:
+        step: 2×2, pixels per index step (k, l).
+    """
+    return 2 if abs(np.linalg.det(step)) > SHEARED * abs(step[0, 0] * step[1, 1]) else 1
+
+
 class SampleDivision(NamedTuple):
     """How samples are divided.
 
@@ -267,9 +284,10 @@ def divide_samples(
             return SampleDivision(parts, SPILT * math.sqrt(lost) * size / parts, True)
         return SampleDivision(parts, SMOOTH * lost**2.5, False)
 
+    least = geometry.parts if refine == "auto" else 1
     if refine == 1 or not planes:
-        return SampleDivision(1, 0.0, False)
-    fine, most = (1, LARGEST_REFINEMENT) if refine == "auto" else (int(refine), int(refine))
+        return SampleDivision(least, 0.0, False)
+    fine, most = (least, LARGEST_REFINEMENT) if refine == "auto" else (int(refine), int(refine))
     if refine == "auto" and views.finer >= LARGEST_CHOSEN_DIVISION:  # parts of cells times parts of samples cost
         most = LARGEST_CHOSEN_DIVISION
     for plane in planes:

@@ -23,7 +23,14 @@ from vcc.optics.train import Stage, Train
 from vcc.plan.decisions import ANEW, Decisions, plan_again
 from vcc.plan.footprints import against_sensor as masks
 from vcc.plan.footprints.aperture import Aperture
-from vcc.plan.footprints.cells import Detail, Geometry, SampleDivision, divide_samples, divide_views
+from vcc.plan.footprints.cells import (
+    Detail,
+    Geometry,
+    SampleDivision,
+    divide_samples,
+    divide_views,
+    parts_of_sheared,
+)
 from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
 from vcc.plan.footprints.linear_in_cells import by_masks_against_sensor, by_view_planes
 from vcc.plan.footprints.mask_textures import ROUNDING, Textured, mask_as_met, mask_in_path
@@ -158,7 +165,14 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
 
     views = (grid.shape[0], grid.shape[1])
     geometry = Geometry(
-        views, grid.extent, samples, on_sensor, origin, sensor.shape, MARGIN + max(between.gap_filled)
+        views,
+        grid.extent,
+        samples,
+        on_sensor,
+        origin,
+        sensor.shape,
+        MARGIN + max(between.gap_filled),
+        parts_of_sheared(step) if sharp else 1,
     )
     division = decisions.keep(
         "parts of views' cells",
@@ -171,7 +185,8 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         lambda one, other: (one.parts, one.hard) == (other.parts, other.hard),
     )
     fine = finer.parts
-    taps = Taps.of(views, division)
+    ends = [(before == 0, after == 0) for before, after in grid.beyond[:2]]
+    taps = Taps.of(views, division, (ends[0], ends[1]))
     aperture = Aperture(view_planes, taps, between.motion, samples, decisions)
     parts = decisions.made(
         "what is open of views",

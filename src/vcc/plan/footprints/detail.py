@@ -14,6 +14,10 @@ from vcc.shapes.sheets import Product, product_of_means
 
 Array = NDArray[np.float64]
 
+POINTS = 512
+"""Along each side of a pattern, in which it is looked at."""
+PATCHES = 8
+"""Along a side of a pattern that is finer than so many points show: it is looked at in parts of it."""
 ARRAYS_AT_ONCE = 64
 """Arrays of cells that are looked at together."""
 
@@ -80,13 +84,23 @@ def _details_lost(
         return np.zeros(len(looked_at(np.zeros(1), np.zeros(1), (1.0, 1.0))))
     bounded = np.isfinite(size_of_pattern)
     size = np.minimum(size_of_pattern, 1.0) if bounded.all() else np.full(2, 64 * max(*known, *added))
-    fine = np.maximum(np.maximum(known, added) / 8, size / 512)
-    counts = np.maximum(np.ceil(size / fine).astype(int), 8)
+    fine = np.maximum(known, added) / 8
+    patches = np.where((fine > 0) & (size > POINTS * fine), PATCHES, 1)
+    middles = [_middles_of_patches(side, number) for side, number in zip(size, patches, strict=True)]
+    bounded &= patches == 1
+    size = np.where(patches > 1, fine * (POINTS // PATCHES), size)
+    counts = np.maximum(np.ceil(size / np.maximum(fine, size / POINTS)).astype(int), 8)
     cell = size / counts
-    x, y = (((np.arange(count) + 0.5) / count - 0.5) * side for count, side in zip(counts, size, strict=True))
+    x, y = (
+        (middle[:, None] + ((np.arange(count) + 0.5) / count - 0.5) * side).ravel()
+        for middle, count, side in zip(middles, counts, size, strict=True)
+    )
     # Averaged once as finely as it is looked at, and these means averaged further.
     values = looked_at(x, y, (float(cell[0]), float(cell[1])))
     light = values.mean(axis=(1, 2))
+    each = len(values)
+    values = values.reshape(each, patches[1], counts[1], patches[0], counts[0]).swapaxes(2, 3)
+    values = values.reshape(-1, counts[1], counts[0])
     even = values.var(axis=(1, 2)) < 1e-12
     by_row = np.clip(values, 0.0, 1.0).transpose(1, 0, 2)
     # A pattern without bounds goes on beyond what is looked at: only what lies within is compared.
@@ -102,4 +116,11 @@ def _details_lost(
         return np.asarray(share**2 * means.var(axis=(0, 2)))
 
     lost = variance(known) - variance(np.hypot(known, added))
-    return np.where(even, 0.0, lost / np.where(even, 1.0, light**2))
+    lost = np.where(even, 0.0, lost).reshape(each, -1).mean(axis=1)
+    return np.asarray(lost / np.where(light > 0, light**2, 1.0))
+
+
+def _middles_of_patches(side: float, number: int) -> Array:
+    """Of one in each of so many equal parts of a side, anywhere in its part, so that no period is met alike."""
+    within = np.random.default_rng(0).random(number) if number > 1 else np.full(1, 0.5)
+    return np.asarray(((np.arange(number) + within) / number - 0.5) * side)

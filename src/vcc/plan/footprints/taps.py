@@ -13,6 +13,8 @@ from vcc.base.describe import Brief
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Mesh = tuple[NDArray[np.intp], ...]
+Ends = tuple[bool, bool]
+"""Whether the grid of views ends before the first view, and after the last, along one axis; else it goes on."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,10 +70,15 @@ class Taps(Brief):
     parts: tuple[int, ...]
 
     @classmethod
-    def of(cls, views: tuple[int, int], division: CellDivision) -> Taps:
-        """The taps of a grid of (rows, columns) of views."""
+    def of(
+        cls,
+        views: tuple[int, int],
+        division: CellDivision,
+        ends: tuple[Ends, Ends] = ((True, True), (True, True)),
+    ) -> Taps:
+        """The taps of a grid of (rows, columns) of views, which ends with these, or is a piece of a larger one."""
         (rows, down, row_share, row_level), (columns, across, column_share, column_level) = (
-            _along(count, division, np.asarray(division.where.any(axis=1 - axis)))
+            _along(count, division, np.asarray(division.where.any(axis=1 - axis)), ends[axis])
             for axis, count in enumerate(views)
         )
         index = np.stack(np.broadcast_arrays(columns[None, :], rows[:, None]), axis=-1).astype(np.float64)
@@ -106,16 +113,20 @@ class Taps(Brief):
         )
 
 
-def _along(views: int, division: CellDivision, finer: NDArray[np.bool_]) -> tuple[Numbers, Array, Array, Numbers]:
+def _along(
+    views: int, division: CellDivision, finer: NDArray[np.bool_], ends: Ends
+) -> tuple[Numbers, Array, Array, Numbers]:
     """Views read, shifts from them in views, shares and levels, of the taps along one axis.
 
     Undivided, each view is one tap. Divided, it is one in each part of its cell; or its light is spread over a
-    tent that reaches its neighbours, so that a place between views is interpolated linearly from both.
+    tent that reaches its neighbours, so that a place between views is interpolated linearly from both. Where the
+    grid ends, the last view's light fills its cell evenly, as there is no neighbour to interpolate with.
 
     Args:
         views: how many there are.
         division: of their cells.
         finer: of which of them the cells are divided further.
+        ends: where the grid ends.
     """
     parts = division.parts
     if division.spread:
@@ -125,6 +136,11 @@ def _along(views: int, division: CellDivision, finer: NDArray[np.bool_]) -> tupl
         shift, share = _parts(parts)
     view = np.repeat(np.arange(views), len(shift))
     shifts, shares, level = np.tile(shift, views), np.tile(share, views), np.zeros(len(view), dtype=np.int64)
+    if division.spread:
+        own = (np.abs(shifts) < 0.5) / parts
+        first, last = ends
+        shares = np.where(first & (view == 0) & (shifts < 0), own, shares)
+        shares = np.where(last & (view == views - 1) & (shifts > 0), own, shares)
     if division.finer > parts:
         shift, share = _parts(division.finer)
         number = np.flatnonzero(finer)
