@@ -155,6 +155,21 @@ def with_taps_twice(core: Footprints) -> Footprints:
     )
 
 
+def few_taps_of(core: Footprints) -> Footprints:
+    """Three rows and three columns of view taps: the simulator runs a thread after the other."""
+    some = np.arange(len(core.view_rows))[4:7], np.arange(len(core.view_columns))[4:7]
+    taps = np.ix_(*some)
+    return replace(
+        core,
+        view_rows=core.view_rows[some[0]],
+        view_columns=core.view_columns[some[1]],
+        weights=core.weights[taps],
+        x=core.x[taps],
+        y=core.y[taps],
+        masks=tuple(mask.of_taps(taps) for mask in core.masks),
+    )
+
+
 def cores() -> dict[str, tuple[Footprints, np.ndarray]]:
     """Footprints of every kind, and samples."""
     coloured, plain = samples((2, 2, 4, 5, 3)), samples((2, 2, 3, 3))
@@ -165,8 +180,11 @@ def cores() -> dict[str, tuple[Footprints, np.ndarray]]:
         "three channels": (CAMERAS["in focus"].compile(field(coloured), interpolation="cubic").core, coloured),
         "two masks": (two.compile(field(coloured), refine=1).core, coloured),
         "sheared": (two.compile(turned(tilted, 0.3), refine=1, interpolation="linear").core, tilted.values),
-        "divided": (one.compile(field(plain), refine=2).core, plain),
-        "sheared and divided": (one.compile(turned(field(plain[:, :, :2]), 0.2), refine=2).core, plain[:, :, :2]),
+        "divided": (few_taps_of(one.compile(field(plain), refine=2).core), plain),
+        "sheared and divided": (
+            few_taps_of(one.compile(turned(field(plain[:, :, :2]), 0.2), refine=2).core),
+            plain[:, :, :2],
+        ),
     }
     core, values = made["two masks"]
     weights = core.weights.copy()

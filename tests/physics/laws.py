@@ -388,7 +388,7 @@ def mirrors(case: Case) -> Iterator[Check]:
         other = vcc.LightField(values, frame, _disparities_along(case, 1 if swap else 0), field.sample)
         taken = capture(camera, other)
         back = np.swapaxes(taken.values, 0, 1) if swap else taken.values[:, ::-1]
-        turned = swap and case.kind == "turned mask" and bool(case.light_field.frame.matrix[2, 3])
+        turned = swap and case.kind.startswith("turned") and bool(case.light_field.frame.matrix[2, 3])
         if turned:  # samples lie sheared on the sensor: rows and columns are summed otherwise, and both are right
             error = float(np.sqrt(np.mean((picture.values - back) ** 2)) / picture.values.max())
             yield Check(law, case.kind, case.seed, error, 2 * 10 ** (-TARGETS[case.kind] / 20), "root mean square")
