@@ -58,9 +58,9 @@ def case(seed: int) -> tuple[vcc.Camera, vcc.LightField]:
 
 @pytest.fixture(scope="module")
 def measured() -> list[tuple[np.ndarray, np.ndarray, float]]:
-    """Of 24 diffusers: true errors and stated ones, by 64, 256 and 1024 rays (rows) and 4 seeds, and the peak."""
+    """Of 16 diffusers: true errors and stated ones, by 64, 256 and 1024 rays (rows) and 4 seeds, and the peak."""
     found = []
-    for number in range(24):
+    for number in range(16):
         camera, lf = case(number)
         many = [camera.capture(lf, samples=TABLE, seed=900 + n, method="rays") for n in range(2)]
         truth = np.mean([each.values.astype(float) for each in many], axis=0)
@@ -80,12 +80,12 @@ def test_stated_errors_are_the_true_ones(measured):
 
     With ρ the correlation of their errors, (true / stated)² = (1 + ρ) / (1 − ρ). Points that are evener as a
     whole than their halves have ρ < 0: the error is stated too large. ρ ≤ ½ is required of each picture, so that
-    the true one is at most √3 times the stated one; and ρ ≤ 0 on average, to two standard errors of 288 pictures
-    (5 %).
+    the true one is at most √3 times the stated one; and ρ ≤ 0 on average, to two standard errors of 192 pictures
+    (6 %).
     """
     ratios = np.stack([true / stated for true, stated, _ in measured])
     assert ratios.max() <= np.sqrt(3)
-    assert np.sqrt(np.mean(ratios**2)) <= 1.05
+    assert np.sqrt(np.mean(ratios**2)) <= 1.06
     # One seed tells as much as another: each picture holds many scramblings, so that what it states is a mean.
     spread = ratios.std(axis=-1, ddof=1) / ratios.mean(axis=-1)
     assert np.sqrt(np.mean(spread**2)) < 0.15
