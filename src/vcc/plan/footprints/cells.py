@@ -67,6 +67,8 @@ class Geometry(Brief):
         sensor: (rows, columns) of pixels.
         margin: pixels around the sensor from which light is brought in.
         parts: of samples, along each axis, that their shape on the sensor asks for, see `parts_of_sheared`.
+        beyond: (before, after) along rows and columns of samples, of a view of the light field that this is a piece of:
+            all pieces are divided as the whole is.
     """
 
     views: tuple[int, int]
@@ -77,6 +79,7 @@ class Geometry(Brief):
     sensor: tuple[int, int]
     margin: float
     parts: int = 1
+    beyond: tuple[tuple[int, int], tuple[int, int]] = ((0, 0), (0, 0))
 
     def met(self, plane: Plane, view: Array, parts: int = 1) -> tuple[Array, Array]:
         """The lowest and the highest place (x, y) at which the samples of parts of views meet a plane.
@@ -86,9 +89,10 @@ class Geometry(Brief):
             view: (i, j) of the middles of the parts, (rows, columns, 2).
             parts: of a view's cell, each way.
         """
-        nt, ns = self.samples
+        (above, below), (left, right) = self.beyond
+        nt, ns = self.samples[0] + above + below, self.samples[1] + left + right
         by_view, by_sample = plane.at_index[:, :2], plane.at_index[:, 2:]
-        middle = np.array([(ns - 1) / 2, (nt - 1) / 2])
+        middle = np.array([(ns - 1) / 2 - left, (nt - 1) / 2 - above])
         centre = view @ by_view.T + by_sample @ middle + plane.offset
         half = np.abs(by_view).sum(axis=1) / 2 / parts + np.abs(by_sample) @ np.array([ns, nt]) / 2
         low, high = centre - half, centre + half

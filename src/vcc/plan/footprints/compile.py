@@ -173,6 +173,7 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         sensor.shape,
         MARGIN + max(between.gap_filled),
         parts_of_sheared(step) if sharp else 1,
+        (grid.beyond[3], grid.beyond[2]) if swapped else (grid.beyond[2], grid.beyond[3]),
     )
     division = decisions.keep(
         "parts of views' cells",
