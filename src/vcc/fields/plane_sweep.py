@@ -33,7 +33,7 @@ NOISE = 0.006
 """Of full scale, on the square-root scale: what 8 bits and JPEG leave."""
 FINEST_STEP = 0.06
 """Of a sweep, pixels per view."""
-MOST_STEPS = 160
+MOST_STEPS = 240
 """Of a sweep for what lies between views."""
 WINDOW = 11
 """Pixels a side, over which costs are gathered."""
