@@ -86,9 +86,10 @@ BY_NAME = {
 }
 """Modules that load others by names in strings, and why."""
 
-UPWARDS = {"camera": "bench.widget"}
+UPWARDS = {"camera": "bench.widget", "fields.plane_sweep": "engines.sweep_kernels"}
 """What names something that stands above it: `vcc.Camera.bench` is a verb of cameras, and the bench is built on
-all that there is. It is loaded when it is called, and left out of the graph."""
+all that there is; light fields find their own disparities, by compiled loops. It is loaded when it is called, and
+left out of the graph."""
 
 NEVER = {"torch", "deepinv", "jax", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""

@@ -43,6 +43,6 @@ def test_the_middle_row_and_column_tell_the_disparity_and_no_other_view_is_read(
 
 def test_users_find_it_where_they_recover_depth():
     assert depth.disparity_maps is disparity_maps
-    found = depth.depth_by_plane_sweep(plane(), (0.0, 2.0))
+    found = depth.depth_by_plane_sweep(plane())  # of the range that it states
     np.testing.assert_array_equal(found.disparity, disparity_maps(plane()).values[0])
     assert plane().disparity.maps().values == pytest.approx(found.disparity[None])

@@ -11,29 +11,43 @@ between steps.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import late
+from vcc.base.affine import Affine
 from vcc.base.checks import above_zero
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
-from vcc.base.progress import Progress, tell
+from vcc.base.progress import Progress
 from vcc.base.version import VERSION
-from vcc.fields.cross import Arm, Array, Views, arms, check_axes, cubic_weights, moved, range_to_search
+from vcc.fields.cross import LARGEST_RANGE, MARGIN, Array, Views, arms, check_axes, cubic_weights, range_to_search
 from vcc.fields.disparity import DisparityMaps
+from vcc.fields.grid import Block, Grid
+from vcc.fields.sampled import to_numpy
 
 NOISE = 0.006
 """Of full scale, on the square-root scale: what 8 bits and JPEG leave."""
 FINEST_STEP = 0.06
 """Of a sweep, pixels per view."""
-MOST_STEPS = 160
+MOST_STEPS = 240
 """Of a sweep for what lies between views."""
 WINDOW = 11
 """Pixels a side, over which costs are gathered."""
-_TRUNCATION = 0.02  # of full scale, likewise: a difference that is no match, whatever its size
+UNMATCHED = 0.8
+"""Disagreement from which on views show different things: unrelated textures reach 0.9, borders at their true
+disparity 0.7."""
+MANY_UNMATCHED = 0.02
+"""Share of pixels at which views agree at no disparity, from which on more is searched, and a warning follows."""
+_FEWER = 0.75  # so many of the lost pixels are left at most if it is worth searching farther
+_COARSE_SIDE, _COARSEST = 48, 4
+"""Pixels a side of the views that the first look over a wide range is taken at, and how many are one at most."""
+_OUTERMOST = 0.005
+"""Of the confidence: what the first look finds outside of the rest is left out at either end."""
+_ALIKE = 1e-6  # of full scale: costs without texture differ by rounding alone
 _SOFTNESSES = 9  # fractions of a pixel in sixteenths, up to a half
 
 
@@ -44,10 +58,12 @@ class Swept(Brief):
     Args:
         disparity: pixels per view along u, of the middle view, shape (t, s).
         confidence: 0 to 1, likewise: how much better that disparity is than any that is not its neighbour.
+        disagreement: 0 to 1, likewise: how much the views differ there from the middle one; 1 is unlike.
     """
 
     disparity: Array
     confidence: Array
+    disagreement: Array
 
 
 def plane_sweep(
@@ -85,19 +101,109 @@ def plane_sweep(
     needed = 4 * (rows * columns * (len(tried) + 24) + 3 * sum(arm.views.size for arm in cross))
     what = f"a sweep of {len(tried)} disparities over {rows}×{columns} pixels"
     check_memory(needed, memory_limit, what, "give a part of the light field")
-    rows_of_views = [_RowOfViews(arm) for arm in cross]
-    gather = _GuidedFilter(cross[0].views[cross[0].middle].mean(axis=0), window)
-    costs = np.empty((len(tried), rows, columns), np.float32)
-    for n, disparity in enumerate(tried):
-        disagreement = [
-            row.disagreement(grid.disparities_along(row.arm.along, disparity)) for row in rows_of_views
-        ]
-        costs[n] = gather(np.sum(disagreement, axis=0))
-        tell(progress, n + 1, len(tried))
-    best = costs.argmin(axis=0)
+    softened = [(arm, _as_if_moved(arm.views[arm.middle], arm.axis)) for arm in cross]
+    along = [np.array([grid.disparities_along(arm.along, one) for one in tried], float) for arm in cross]
+    guide = cross[0].views[cross[0].middle].mean(axis=0)
+    costs = late.module("vcc.engines.sweep_kernels").costs(softened, along, guide, window, progress)
+    best = _best(costs)
     offset, lowest = _parabola(costs, best)
     found = tried[best] + offset * (tried[1] - tried[0])
-    return Swept(found.astype(np.float32), _clarity(costs, best, lowest, float(tried[1] - tried[0])))
+    kernels = late.module("vcc.engines.sweep_kernels")
+    clarity = _clarity(costs, best, lowest, float(tried[1] - tried[0]))
+    most = np.float32(kernels.TRUNCATION * len(cross))
+    return Swept(found.astype(np.float32), clarity, np.clip(lowest / most, 0, 1))
+
+
+def range_of_sweep(
+    light_field: Views, given: tuple[float, float] | None, memory_limit: int | None = None
+) -> tuple[float, float]:
+    """(lowest, highest) disparity along u to be tried: as given, as stated, or as far as the views agree.
+
+    Sweeps of coarser views look beyond the measured range, which lacks small things and large steps. The range is
+    doubled while many pixels agree at no disparity, or best at an end; it is used if fewer pixels then do so.
+
+    Args:
+        light_field: as `plane_sweep` takes it.
+        given: by a user, who is taken at his word.
+        memory_limit: see `plane_sweep`.
+
+    Raises:
+        InputError: see `range_to_search`.
+    """
+    grid = light_field.grid
+    low, high = range_to_search(grid, given)
+    if given is not None:
+        return low, high
+    # No farther than infinity, unless a tenth of what was measured lies on either side of it.
+    infinity, length = grid.disparity_of(math.inf), high - low
+    before, behind = high - infinity, infinity - low
+    ends_there = math.isfinite(infinity) and min(before, behind) < 0.1 * length + MARGIN
+    farthest = min(LARGEST_RANGE, max(grid.shape[2:4]) / 4)
+    lowest = infinity if ends_there and before >= behind else min(low, -farthest)
+    highest = infinity if ends_there and before < behind else max(high, farthest)
+
+    def within(least: float, most: float) -> tuple[float, float]:
+        return max(least, lowest), min(most, highest)
+
+    if grid.disparity_range is not None:
+        return within(low - MARGIN, high + MARGIN)
+    reach = (lowest if lowest == infinity else low - length, highest if highest == infinity else high + length)
+    tried = within(min(reach[0], low), max(reach[1], high))
+    seen, lost = _first_look(light_field, tried, memory_limit)
+    ends = tried
+    while lost > MANY_UNMATCHED and ends != (lowest, highest):
+        length = ends[1] - ends[0]
+        ends = within(ends[0] - length / 2, ends[1] + length / 2)
+        wider, left = _first_look(light_field, ends, memory_limit)
+        if left < _FEWER * lost:
+            seen, lost = wider, left
+    return within(min(low, seen[0] - MARGIN), max(high, seen[1] + MARGIN))
+
+
+def _first_look(
+    light_field: Views, ends: tuple[float, float], memory_limit: int | None
+) -> tuple[tuple[float, float], float]:
+    """(lowest, highest) that a sweep of coarser views finds, by confidence but for the outermost; the share lost.
+
+    Lost are pixels at which views agree nowhere, or best at an end of the sweep.
+    """
+    factor = min(max(min(light_field.grid.shape[2:4]) // _COARSE_SIDE, 1), _COARSEST)
+    coarse = (ends[0] / factor, ends[1] / factor)
+    step = max(FINEST_STEP, (coarse[1] - coarse[0]) / MOST_STEPS)
+    found = plane_sweep(_Coarser(light_field, factor), coarse, step=step, memory_limit=memory_limit)
+    at_an_end = ((found.disparity <= coarse[0]) | (found.disparity >= coarse[1])) & (found.confidence > 0)
+    lost = float(((found.disagreement > UNMATCHED) | at_an_end).mean())
+    order = np.argsort(found.disparity, axis=None)
+    share = np.cumsum(found.confidence.ravel()[order], dtype=np.float64)
+    if share[-1] == 0:
+        return (math.inf, -math.inf), lost
+    places = np.searchsorted(share, share[-1] * np.array([_OUTERMOST, 1 - _OUTERMOST]))
+    low, high = factor * found.disparity.ravel()[order[places]].astype(np.float64)
+    return (float(low), float(high)), lost
+
+
+@dataclass(frozen=True, eq=False)
+class _Coarser:
+    """A light field with so many pixels each way in one, whole views of it."""
+
+    whole: Views
+    factor: int
+
+    @property
+    def grid(self) -> Grid:
+        """Of the coarser pixels."""
+        fine, n = self.whole.grid, self.factor
+        shape = (*fine.shape[:2], fine.shape[2] // n, fine.shape[3] // n, *fine.shape[4:])
+        middle = (n - 1) / 2
+        frame = fine.frame @ Affine.translation(0, 0, middle, middle) @ Affine.scaling(1, 1, n, n)
+        return replace(fine, shape=shape, frame=frame)
+
+    def read(self, block: Block) -> Array:
+        """The samples of whole views."""
+        n, (rows, columns) = self.factor, self.grid.shape[2:4]
+        views = to_numpy(self.whole.read(replace(block, pixel_rows=(0, rows * n), pixel_columns=(0, columns * n))))
+        parts = views.reshape(*views.shape[:2], rows, n, columns, n, *views.shape[4:])
+        return np.asarray(parts.mean(axis=(3, 5), dtype=np.float32))
 
 
 def disparity_maps(
@@ -116,48 +222,21 @@ def disparity_maps(
         InputError: as there; the way out is to give the disparities with the light field.
     """
     try:
-        low, high = range_to_search(light_field.grid, None)
+        low, high = ends = range_of_sweep(light_field, None, memory_limit)
         # Neighbouring views are half a view from what is looked at in between: a parabola through steps of this
         # size finds disparities to a hundredth or two of a pixel, which is half of that on the sensor.
         step = max(FINEST_STEP, (high - low) / MOST_STEPS)
-        found = plane_sweep(light_field, step=step, memory_limit=memory_limit, progress=progress)
+        found = plane_sweep(light_field, ends, step=step, memory_limit=memory_limit, progress=progress)
     except InputError as error:
         raise InputError(
             f"disparities between views cannot be found: {error}. Or give them: vcc.LightField(…, disparity=maps)"
         ) from error
     source = f"found for the middle view by vcc.recover.depth_by_plane_sweep, steps of {step:.2g}, vcc {VERSION}"
-    return DisparityMaps(found.disparity[None], (light_field.grid.middle_view,), source)
+    unmatched = float((found.disagreement > UNMATCHED).mean())
+    return DisparityMaps(found.disparity[None], (light_field.grid.middle_view,), source, unmatched=unmatched)
 
 
-class _RowOfViews:
-    """A row or column of views, to be compared with its middle view."""
-
-    def __init__(self, arm: Arm) -> None:
-        self.arm = arm
-        self._softened = _as_if_moved(arm.views[arm.middle], arm.axis)
-
-    def disagreement(self, disparity: NDArray[np.float64]) -> Array:
-        """How much the better half of the views differs from the middle one at a disparity along them, (t, s)."""
-        from scipy.ndimage import uniform_filter
-
-        views, middle = self.arm.views, self.arm.middle
-        halves: list[Array] = []
-        for side in (range(middle), range(middle + 1, len(views))):
-            if not side:
-                continue
-            total = np.zeros(views.shape[2:], np.float32)
-            for n in side:
-                shift = -float(disparity) * (n - middle)
-                # Interpolation softens noise, most so between pixels: unless the middle view is as soft,
-                # disparities that fall there seem to fit better.
-                alike = self._softened[round(16 * abs(shift - round(shift)))]
-                difference = np.abs(moved(views[n], shift, self.arm.axis) - alike)
-                total += np.minimum(difference, _TRUNCATION).mean(axis=0)
-            halves.append(uniform_filter(total / len(side), 3, mode="nearest"))
-        return np.asarray(np.minimum.reduce(halves), np.float32)
-
-
-def _as_if_moved(view: Array, axis: int) -> list[Array]:
+def _as_if_moved(view: Array, axis: int) -> Array:
     """A view where it is, but as soft as interpolation makes it by fractions 0, 1/16 … 1/2 of a pixel."""
     from scipy.ndimage import correlate1d
 
@@ -168,28 +247,21 @@ def _as_if_moved(view: Array, axis: int) -> list[Array]:
         passes = np.abs(sum(weight * np.exp(1j * n * frequencies) for n, weight in enumerate(weights)))
         kernel = np.fft.fftshift(np.fft.irfft(passes))[32 - 6 : 32 + 7]
         softened.append(correlate1d(view, kernel / kernel.sum(), axis=axis, mode="nearest"))
-    return softened
+    return np.array(softened, np.float32)
 
 
-class _GuidedFilter:
-    """A mean over a window that does not reach over borders of a guide (He, Sun and Tang 2013)."""
+def _best(costs: Array) -> NDArray[np.intp]:
+    """The first of the lowest costs of each pixel; the middle one where all are alike, which is at no end.
 
-    def __init__(self, guide: Array, window: int) -> None:
-        self._guide, self._window = guide, window
-        self._mean = self._box(guide)
-        # Contrast of this variance, and more, counts as a border.
-        self._variance = self._box(guide**2) - self._mean**2 + np.float32(0.02**2)
-
-    def __call__(self, values: Array) -> Array:
-        mean = self._box(values)
-        a = (self._box(self._guide * values) - self._mean * mean) / self._variance
-        b = mean - a * self._mean
-        return self._box(a) * self._guide + self._box(b)
-
-    def _box(self, values: Array) -> Array:
-        from scipy.ndimage import uniform_filter
-
-        return np.asarray(uniform_filter(values, self._window, mode="nearest"), np.float32)
+    `numpy.argmin` along the first axis takes ten times as long.
+    """
+    best, lowest, highest = np.zeros(costs.shape[1:], np.intp), costs[0].copy(), costs[0].copy()
+    for n, cost in enumerate(costs):
+        np.copyto(best, n, where=cost < lowest)
+        np.minimum(lowest, cost, out=lowest)
+        np.maximum(highest, cost, out=highest)
+    best[highest - lowest < _ALIKE] = len(costs) // 2
+    return best
 
 
 def _parabola(costs: Array, best: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -120,7 +120,8 @@ def _compiled(train: Train, grid: Grid, how: How, decisions: Decisions) -> Plan:
             lambda one, other: one[0].shape == other[0].shape,
         )
         plan = _compiled(train, made, replace(how, between_views="auto"), decisions.of("views in between"))
-        return replace(plan, views_between=between, notes=(*plan.notes, why))
+        cautions = plan.cautions if between is None else (*plan.cautions, *between.cautions())
+        return replace(plan, views_between=between, notes=(*plan.notes, why), cautions=cautions)
     if not isinstance(by_footprints, str):
         for name, given in (("samples", how.samples), ("tolerance", how.tolerance)):
             if given is not None:

@@ -18,6 +18,7 @@ from vcc.base.errors import InputError
 from vcc.base.values import Value
 from vcc.fields.disparity import Disparities, DisparityMaps
 from vcc.fields.grid import Grid, axes_agree
+from vcc.fields.plane_sweep import MANY_UNMATCHED
 from vcc.optics.train import Train
 
 Array = NDArray[np.float64]
@@ -88,6 +89,19 @@ class ViewsBetween(Value):
     def shape(self, given: tuple[int, ...]) -> tuple[int, ...]:
         """The shape of the denser light field's samples."""
         return (given[0] * self.times[0], given[1] * self.times[1], *given[2:])
+
+    def cautions(self) -> tuple[str, ...]:
+        """Warn of disparities that were searched for and not found."""
+        if self.maps.unmatched <= MANY_UNMATCHED:
+            return ()
+        low, high = self.maps.extent
+        share = f"{self.maps.unmatched:.1%} of the pixels"
+        return (
+            f"disparities were not found for {share}: the views do not agree there at any disparity from "
+            f"{low:.3g} to {high:.3g} pixels per view (noise, glints, or parallax outside of this range). The "
+            "image may show ghosts. Pass true disparities (vcc.LightField(…, disparity=maps)), more views, or "
+            'between_views="none"',
+        )
 
 
 def denser(train: Train, grid: Grid) -> tuple[Grid, ViewsBetween | None, str]:

@@ -15,12 +15,11 @@ nearest or farthest disparity that it tried, the distance is NaN; beyond infinit
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.base.affine import Affine
 from vcc.base.checks import above_zero
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
@@ -28,10 +27,9 @@ from vcc.base.memory import check_memory
 from vcc.base.progress import Progress
 from vcc.base.showing import Shown
 from vcc.base.units import short
-from vcc.fields.cross import LARGEST_RANGE, MARGIN, Arm, arms, check_axes, moved, range_to_search
-from vcc.fields.grid import Block, Grid
-from vcc.fields.plane_sweep import FINEST_STEP, NOISE, WINDOW, disparity_maps, plane_sweep
-from vcc.fields.sampled import to_numpy
+from vcc.fields.cross import Arm, arms, check_axes, moved
+from vcc.fields.grid import Grid
+from vcc.fields.plane_sweep import FINEST_STEP, NOISE, WINDOW, disparity_maps, plane_sweep, range_of_sweep
 from vcc.light_field import LightField
 from vcc.store import StoredLightField
 
@@ -52,10 +50,6 @@ _AT_AN_END = 0.01
 """Pixels per view: what is no farther from the end of a search is at it. Between steps nothing comes as near."""
 _BEYOND = 0.1
 """Pixels per view beyond infinity from which on it is no noise of what is far away."""
-_COARSE_SIDE, _COARSEST = 48, 4
-"""Pixels a side of the views that the first look over a wide range is taken at, and how many are one at most."""
-_OUTERMOST = 0.005
-"""Of the confidence: what the first look finds outside of the rest is left out at either end."""
 _FARTHEST_TILT = 0.75  # pixels per view from the nearest whole shear: beyond, the next shear sees it better
 _SMOOTHING = (3 / 16, 10 / 16, 3 / 16)
 _ALIASED = np.float32(1e3)  # larger than the energy of any derivative
@@ -181,7 +175,7 @@ def depth_by_structure_tensor(
         above_zero(name, scale)
     grid = light_field.grid
     check_axes(grid, fewest=3)
-    low, high = _searched(light_field, disparity_range, memory_limit)
+    low, high = range_of_sweep(light_field, disparity_range, memory_limit)
     cross = arms(light_field)
     samples = max(arm.views.size for arm in cross)
     # Beside the samples of one arm: its shear, two derivatives, a product and its smoothed copy.
@@ -215,9 +209,10 @@ def depth_by_plane_sweep(
     Args:
         light_field: two views at least, its views' axes along those of its pixels.
         disparity_range: (lowest, highest) disparity along u to be tried, pixels per view; None takes it from the
-            data: `vcc.LightField.measured_disparity_range`, and what a first look at coarser views finds in a
-            range up to infinity and as far again on the near side. A range that the light field states is taken as
-            it is. Either is widened by 0.3 pixels at both ends, but not beyond infinity.
+            data: `vcc.LightField.measured_disparity_range`, and the range that a sweep of coarser views finds,
+            up to infinity and as far again on the near side, and farther as long as more pixels agree there. A
+            range that the light field states is used as it is. Either is widened by 0.3 pixels at both ends, but
+            not beyond infinity.
         step: between the disparities tried, pixels per view.
         window: side of the window, pixels, an odd number.
         memory_limit: bytes that the costs and the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
@@ -236,77 +231,12 @@ def depth_by_plane_sweep(
     """
     above_zero("step", step)
     check_axes(light_field.grid, fewest=2)
-    ends = _searched(light_field, disparity_range, memory_limit)
+    ends = range_of_sweep(light_field, disparity_range, memory_limit)
     found = plane_sweep(light_field, ends, step=step, window=window, memory_limit=memory_limit, progress=progress)
     return _depth(light_field.grid, found.disparity, found.confidence, ends)
 
 
-# --- where is searched, and where the search ended ---
-
-
-def _searched(
-    light_field: LightField | StoredLightField, given: tuple[float, float] | None, memory_limit: int | None
-) -> tuple[float, float]:
-    """(lowest, highest) disparity that is searched; see `depth_by_plane_sweep`."""
-    grid = light_field.grid
-    low, high = range_to_search(grid, given)
-    if given is not None:
-        return low, high
-    # No farther than infinity, unless a tenth of what was measured lies on either side of it.
-    infinity, length = grid.disparity_of(math.inf), high - low
-    before, behind = high - infinity, infinity - low
-    ends_there = math.isfinite(infinity) and min(before, behind) < 0.1 * length + MARGIN
-    lowest = infinity if ends_there and before >= behind else -float(LARGEST_RANGE)
-    highest = infinity if ends_there and before < behind else float(LARGEST_RANGE)
-
-    def within(least: float, most: float) -> tuple[float, float]:
-        return max(least, lowest), min(most, highest)
-
-    if grid.disparity_range is not None:
-        return within(low - MARGIN, high + MARGIN)
-    reach = (lowest if lowest == infinity else low - length, highest if highest == infinity else high + length)
-    seen = _first_look(light_field, within(min(reach[0], low), max(reach[1], high)), memory_limit)
-    return within(min(low, seen[0] - MARGIN), max(high, seen[1] + MARGIN))
-
-
-def _first_look(
-    light_field: LightField | StoredLightField, ends: tuple[float, float], memory_limit: int | None
-) -> tuple[float, float]:
-    """(lowest, highest) disparity that a sweep of coarser views finds, by confidence but for the outermost."""
-    factor = min(max(min(light_field.grid.shape[2:4]) // _COARSE_SIDE, 1), _COARSEST)
-    coarse = (ends[0] / factor, ends[1] / factor)
-    found = plane_sweep(_Coarser(light_field, factor), coarse, memory_limit=memory_limit)
-    order = np.argsort(found.disparity, axis=None)
-    share = np.cumsum(found.confidence.ravel()[order], dtype=np.float64)
-    if share[-1] == 0:
-        return math.inf, -math.inf
-    places = np.searchsorted(share, share[-1] * np.array([_OUTERMOST, 1 - _OUTERMOST]))
-    low, high = factor * found.disparity.ravel()[order[places]].astype(np.float64)
-    return float(low), float(high)
-
-
-@dataclass(frozen=True, eq=False)
-class _Coarser:
-    """A light field with so many pixels each way in one, whole views of it."""
-
-    whole: LightField | StoredLightField
-    factor: int
-
-    @property
-    def grid(self) -> Grid:
-        """Of the coarser pixels."""
-        fine, n = self.whole.grid, self.factor
-        shape = (*fine.shape[:2], fine.shape[2] // n, fine.shape[3] // n, *fine.shape[4:])
-        middle = (n - 1) / 2
-        frame = fine.frame @ Affine.translation(0, 0, middle, middle) @ Affine.scaling(1, 1, n, n)
-        return replace(fine, shape=shape, frame=frame)
-
-    def read(self, block: Block) -> Array:
-        """The samples of whole views."""
-        n, (rows, columns) = self.factor, self.grid.shape[2:4]
-        views = to_numpy(self.whole.read(replace(block, pixel_rows=(0, rows * n), pixel_columns=(0, columns * n))))
-        parts = views.reshape(*views.shape[:2], rows, n, columns, n, *views.shape[4:])
-        return np.asarray(parts.mean(axis=(3, 5), dtype=np.float32))
+# --- where the search ended ---
 
 
 def _depth(grid: Grid, disparity: Array, confidence: Array, ends: tuple[float, float]) -> DepthMap:

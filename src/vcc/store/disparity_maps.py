@@ -38,7 +38,8 @@ def read_maps(store: Path, shape: tuple[int, ...]) -> DisparityMaps | None:
         values = np.asarray(array[:], dtype=np.float32)
         stated: Any = array.attrs["views"]
         views = tuple((float(row), float(column)) for row, column in stated)
-        maps = DisparityMaps(values, views, str(array.attrs["source"]))
+        unmatched: Any = array.attrs.get("unmatched", 0.0)  # stores of before have none
+        maps = DisparityMaps(values, views, str(array.attrs["source"]), unmatched=float(unmatched))
         if values.shape[1:] != tuple(shape[2:4]):
             raise ValueError(f"maps of {values.shape[1:]} pixels for views of {tuple(shape[2:4])}")
     except Exception as error:
@@ -69,7 +70,8 @@ def keep_maps(store: Path, maps: DisparityMaps) -> None:
             dtype="float32", fill_value=float("nan"),
         )  # fmt: skip
         array[:] = maps.values
-        array.attrs.update(json.loads(json.dumps({"views": maps.views, "source": maps.source})))
+        stated = {"views": maps.views, "source": maps.source, "unmatched": maps.unmatched}
+        array.attrs.update(json.loads(json.dumps(stated)))
 
     try:
         clear_leftovers(folder)
