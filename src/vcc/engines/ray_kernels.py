@@ -304,19 +304,20 @@ def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def
 
 
 @_inlined
-def add_rays(field, rays, n, second, sums):  # type: ignore[no-untyped-def]
+def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-def]
     """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
 
     Rays from ``second`` on belong to the second half. Places are replaced by indices.
     """
     samples, _, index_from_ray, motion, between = field
-    values, (nv, nu, nt, ns), channels = samples
+    values, (nv, nu, high, wide), channels = samples
+    first_rows, first_columns, nt, ns = begin
     x, y, s, t, share = rays
     to_indices(index_from_ray, rays, n)
     # Where x and y do not mix, the pixels looked at in four views are two columns and two rows.
     parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
     vectors = parted and (channels == 1 or channels == 3 or channels == 4)
-    line, picture, row_of_views = ns * channels, nt * ns * channels, nu * nt * ns * channels
+    line, picture, row_of_views = wide * channels, high * wide * channels, nu * high * wide * channels
     last = len(values) - LANES
     one = np.float32(1)
     # So far outside the pictures all views that a ray is between are dark.
@@ -336,7 +337,7 @@ def add_rays(field, rays, n, second, sums):  # type: ignore[no-untyped-def]
         if not between:
             i0, j0 = int(ci + 0.5), int(cj + 0.5)
             base = j0 * row_of_views + i0 * picture
-            add_view(samples, base, k, l, np.float32(weight), sums[half])
+            add_view(samples, base, k - first_columns[i0], l - first_rows[j0], np.float32(weight), sums[half])
             continue
         i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
         fi, fj = ci - i0, cj - j0
@@ -344,10 +345,10 @@ def add_rays(field, rays, n, second, sums):  # type: ignore[no-untyped-def]
             k0, l0 = k + motion[0, 0] * (i - i0), l + motion[1, 1] * (j - j0)
             k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
             kf0, kf1, lf0, lf1 = math.floor(k0), math.floor(k1), math.floor(l0), math.floor(l1)
-            inside = (
-                min(kf0, kf1) >= 0 and max(kf0, kf1) < ns - 1 and min(lf0, lf1) >= 0 and max(lf0, lf1) < nt - 1
-            )
-            c0, c1, r0, r1 = int(kf0) * channels, int(kf1) * channels, int(lf0) * line, int(lf1) * line
+            c0, c1 = int(kf0) - first_columns[i0], int(kf1) - first_columns[i0 + 1]
+            r0, r1 = int(lf0) - first_rows[j0], int(lf1) - first_rows[j0 + 1]
+            inside = min(c0, c1) >= 0 and max(c0, c1) < wide - 1 and min(r0, r1) >= 0 and max(r0, r1) < high - 1
+            c0, c1, r0, r1 = c0 * channels, c1 * channels, r0 * line, r1 * line
             base = j0 * row_of_views + i0 * picture
             if inside and base + row_of_views + picture + max(r0, r1) + line + max(c0, c1) <= last:
                 fi, fj = np.float32(fi), np.float32(fj)
@@ -379,8 +380,8 @@ def add_rays(field, rays, n, second, sums):  # type: ignore[no-untyped-def]
                 if w == 0.0:
                     continue
                 away_i, away_j = i - (i0 + di), j - (j0 + dj)
-                view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j
-                view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
+                view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j - first_columns[i0 + di]
+                view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j - first_rows[j0 + dj]
                 base = (j0 + dj) * row_of_views + (i0 + di) * picture
                 add_view(samples, base, view_k, view_l, np.float32(w), sums[half])
 
@@ -610,7 +611,7 @@ def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ign
 
 
 @_compiled
-def add_pixels(field, sensor, points, window, cells, steps, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
+def add_pixels(field, begin, sensor, points, window, cells, steps, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
 
     The first picture is what all of a pixel's rays find, the second what its two halves differ by. Once
@@ -618,6 +619,8 @@ def add_pixels(field, sensor, points, window, cells, steps, rare, ended, picture
     a kernel around it that made the arrays took a third of the time to compile.
 
     Args:
+        field: of whole views or of parts of them.
+        begin: where these parts begin.
         window: where to aim; not looked at where there are cells.
         cells: through which to aim, or None: what aims through cells is then not compiled.
         steps: what rays meet.
@@ -665,7 +668,7 @@ def add_pixels(field, sensor, points, window, cells, steps, rare, ended, picture
                         take_few_steps(steps, drawn, rays)
                     else:
                         take_steps(steps, drawn, rays)
-                    add_rays(field, rays, n, samples // 2 - done, sums)
+                    add_rays(field, begin, rays, n, samples // 2 - done, sums)
                     for half in range(2):  # a packet in single precision, the packets in double
                         for lane in range(sums.shape[1]):
                             totals[half, lane] += sums[half, lane]

@@ -492,13 +492,23 @@ class Drive:
         core, run = self._core_and_run(beside)
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
-            return run(core, self.prepared, progress=progress)
+            return run(core, self.taken, progress=progress)
         return self._over_blocks(listed, beside, progress)
 
     def _core_and_run(self, beside: int) -> tuple[Core, Callable[..., Partial]]:
         """The core with so many rays beside those taken, and what runs it."""
         core = self.core.more(beside) if beside else self.core
         return core, partial(self.runner, beside=int(beside > 0), threads=self.threads)
+
+    @cached_property
+    def taken(self) -> Any:
+        """What the core is run on where all samples are in memory: `prepared`, which others may have made already,
+        or what rays prepare where they look at it."""
+        if self.plan.by_rays and "prepared" not in vars(self):
+            found = self.engine.to_prepare(self.core, self.plan.before, self.samples.whole())
+            if found is not None:
+                return found
+        return self.prepared
 
     @cached_property
     def prepared(self) -> Any:
