@@ -28,12 +28,14 @@ def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int |
     rows, length = values.shape[2], int(np.prod(values.shape[3:]))
     channels = values.shape[4] if values.ndim == 5 else 1
 
+    corner = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+
     def sharpen_row(row: int) -> None:
         line = _line(factors, length, channels)
         for column in range(values.shape[1]):
-            view = np.ascontiguousarray(values[row, column], dtype=given).reshape(rows, length)
-            window = 0, rows, 0, length // channels
-            sharpen(view, window, kept[row, column].reshape(-1), channels, factors, whole, line, None, 0)
+            view = np.ascontiguousarray(values[row, column], dtype=given).reshape(1, 1, rows, length)
+            to = kept[row, column].reshape(-1)
+            sharpen(view, None, corner, (rows, length // channels), to, channels, factors, whole, line)
 
     with Workers(threads or cores()) as pool:
         list(pool.map(sharpen_row, range(values.shape[0])))
@@ -107,7 +109,7 @@ class Parts:
             line: likewise.
         """
         views, filtering = self._views, (self.channels, self._factors, self._whole)
-        sharpen_parts(views.reshape(-1), views, rows, columns, self.size, parts, *filtering, line)
+        sharpen(views, views.reshape(-1), (rows, columns), self.size, parts, *filtering, line)
 
 
 def _kinds(kind: np.dtype[Any]) -> tuple[np.dtype[Any], np.dtype[Any]]:
@@ -160,95 +162,72 @@ def given_back(
 
 
 @_compiled
-def sharpen(view, window, kept, channels, weights, whole, line, others, ahead):  # type: ignore[no-untyped-def]
-    """A part of a view filtered along both axes.
+def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  # type: ignore[no-untyped-def]
+    """A part of each view filtered along both axes.
 
     Args:
-        view: (rows, samples in a row).
-        window: first row, the one after the last, and of pixels in a row likewise.
-        kept: where to write, flat: rows × samples in a row of the part.
+        views: (v, u, rows, samples in a row).
+        others: the same, flat, where parts are taken: up to `AT_ONCE` numbers may then be written after the last,
+            as loops of short rows that have a rest take longer. None for whole views.
+        begin: (v,), the first row of the parts of a row of views; (u,), the first pixel of a row of the parts of a
+            column of views.
+        size: rows, and pixels in a row, of a part.
+        kept: where to write, flat, in the order (v, u, row, sample).
         channels: numbers a pixel.
         weights: (3,) of the type of the sums: of 8-bit samples int32 in 2⁻¹⁰, for which
             |Σ| ≤ 255·(1398 + 2·207 + 2·20)² < 2³⁰ for means; else real numbers.
         whole: True for 8-bit samples, whose sums are rounded to `KEPT_DIGITS` digits after the point; else None.
         line: room for a row of sums, longer by `REACH` pixels on each side and by `AT_ONCE` numbers.
-        others: all samples, flat; None where ``view`` stands alone. Where it does not, up to `AT_ONCE` numbers may
-            be written after the last one: loops of short rows then have no rest, which takes longer.
-        ahead: where, in these, the part begins that is asked for next; -1 for none.
     """
-    first, stop, left, right = window
-    rows, pixels, half, kind = len(view), view.shape[1] // channels, 1 << (SHIFT - 1), weights.dtype.type
+    _, nu, rows, row = views.shape
+    pixels, half, kind = row // channels, 1 << (SHIFT - 1), weights.dtype.type
     middle, near, far = weights[0], weights[1], weights[2]
-    low, high = max(left - REACH, 0), min(right + REACH, pixels)
-    before, inner, length = (low - left + REACH) * channels, (high - low) * channels, (right - left) * channels
-    end = length + 2 * REACH * channels
-    down, across = inner, length
+    first_rows, first_columns = begin
+    length, per_line = size[1] * channels, LINE // views.itemsize
+    end, across = length + 2 * REACH * channels, length
     if others is not None:
-        down, across = (inner + AT_ONCE - 1) // AT_ONCE * AT_ONCE, (length + AT_ONCE - 1) // AT_ONCE * AT_ONCE
-    per_line = LINE // view.itemsize
+        across = (length + AT_ONCE - 1) // AT_ONCE * AT_ONCE
     # Slices, as numbers that are subtracted might be negative for all that the compiler knows.
-    sums = line[before:]
     left2, left1, here = line, line[channels:], line[2 * channels :]
     right1, right2 = line[3 * channels :], line[4 * channels :]
-    for r in range(first, stop):
-        if others is not None and ahead >= 0:
-            place = ahead + (r - first) * view.shape[1]
-            for q in range(place, place + inner + per_line, per_line):
-                prefetch(others, q)
-        # Beyond a border its last samples go on.
-        lowest = min(r + 2, rows - 1)
-        above2, above, level = view[max(r - 2, 0)], view[max(r - 1, 0)], view[r]
-        below, below2 = view[min(r + 1, rows - 1)], view[lowest]
-        above2, above, level = above2[low * channels :], above[low * channels :], level[low * channels :]
-        below, below2 = below[low * channels :], below2[low * channels :]
-        if down > (rows - lowest) * view.shape[1] - low * channels:  # no more can be read
-            down = inner
-        for q in range(down):
-            sums[q] = (
-                middle * kind(level[q])
-                + near * (kind(above[q]) + kind(below[q]))
-                + far * (kind(above2[q]) + kind(below2[q]))
-            )
-        for q in range(before):
-            line[q] = line[before + q % channels]
-        for q in range(before + inner, end):
-            line[q] = line[before + inner - channels + q % channels]
-        to = kept[(r - first) * length :]
-        for q in range(across):
-            total = middle * here[q] + near * (left1[q] + right1[q]) + far * (left2[q] + right2[q])
-            if whole is None:  # told apart when compiled
-                to[q] = total
-            else:
-                to[q] = np.int32(total + half) >> SHIFT
-
-
-@_compiled
-def sharpen_parts(values, views, first_rows, first_columns, size, parts, channels, weights, whole, line):  # type: ignore[no-untyped-def]
-    """A part of each view, filtered as by `sharpen`.
-
-    Args:
-        values: all samples, flat.
-        views: the same as (v, u, rows, samples in a row).
-        first_rows: (v,), the first row of the parts of a row of views.
-        first_columns: (u,), the first pixel of a row of the parts of a column of views.
-        size: rows, and pixels in a row, of a part.
-        parts: where to write, flat, in the order (v, u, row, sample), and `AT_ONCE` numbers more.
-        channels: see `sharpen`, as all that follow.
-        weights: see there.
-        whole: see there.
-        line: see there.
-    """
-    part, length = size[0] * size[1] * channels, views.shape[3]
-    for j in range(views.shape[0]):
-        for i in range(views.shape[1]):
-            row, column = first_rows[j], first_columns[i]
-            ahead = -1  # where the next part begins, which lies elsewhere
-            if i + 1 < views.shape[1]:
-                ahead = ((j * views.shape[1] + i + 1) * views.shape[2] + row) * length
-                ahead += max(first_columns[i + 1] - REACH, 0) * channels
-            window = row, row + size[0], column, column + size[1]
-            to = parts[(j * views.shape[1] + i) * part :]
-            sharpen(views[j, i], window, to, channels, weights, whole, line, values, ahead)
+    for part in range(views.shape[0] * nu):
+        j, i = part // nu, part % nu
+        view, first, left = views[j, i], first_rows[j], first_columns[i]
+        low, high = max(left - REACH, 0), min(left + size[1] + REACH, pixels)
+        before, inner = (low - left + REACH) * channels, (high - low) * channels
+        sums, down = line[before:], inner
+        if others is not None:
+            down = (inner + AT_ONCE - 1) // AT_ONCE * AT_ONCE
+        for r in range(first, first + size[0]):
+            if others is not None and i + 1 < nu:  # the same row of the next part, which lies elsewhere
+                place = ((part + 1) * rows + r) * row + max(first_columns[i + 1] - REACH, 0) * channels
+                for q in range(place, place + inner + per_line, per_line):
+                    prefetch(others, q)
+            # Beyond a border its last samples go on.
+            lowest = min(r + 2, rows - 1)
+            above2, above, level = view[max(r - 2, 0)], view[max(r - 1, 0)], view[r]
+            below, below2 = view[min(r + 1, rows - 1)], view[lowest]
+            above2, above, level = above2[low * channels :], above[low * channels :], level[low * channels :]
+            below, below2 = below[low * channels :], below2[low * channels :]
+            if down > (rows - lowest) * row - low * channels:  # no more can be read
+                down = inner
+            for q in range(down):
+                sums[q] = (
+                    middle * kind(level[q])
+                    + near * (kind(above[q]) + kind(below[q]))
+                    + far * (kind(above2[q]) + kind(below2[q]))
+                )
+            for q in range(before):
+                line[q] = line[before + q % channels]
+            for q in range(before + inner, end):
+                line[q] = line[before + inner - channels + q % channels]
+            to = kept[(part * size[0] + r - first) * length :]
+            for q in range(across):
+                total = middle * here[q] + near * (left1[q] + right1[q]) + far * (left2[q] + right2[q])
+                if whole is None:  # told apart when compiled
+                    to[q] = total
+                else:
+                    to[q] = np.int32(total + half) >> SHIFT
 
 
 @_compiled
