@@ -604,7 +604,7 @@ def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ign
 
 
 @_compiled
-def add_pixels(field, begin, sensor, points, window, cells, steps, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
+def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
 
     The first picture is what all of a pixel's rays find, the second what its two halves differ by. Once
@@ -614,10 +614,11 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, rare, ended, 
     Args:
         field: of whole views or of parts of them.
         begin: where these parts begin.
-        window: where to aim; not looked at where there are cells.
-        cells: through which to aim, or None: what aims through cells is then not compiled.
+        window: where to aim, or None where there are cells: what is None is not compiled.
+        cells: through which to aim, or None.
         steps: what rays meet.
-        rare: None where all steps are among `FEW`: the rest is then not compiled.
+        few: True where all steps are among `FEW`, else None.
+        rare: the other way round.
         within: as what `room` makes.
         sums: of a packet, float32, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
     """
@@ -638,18 +639,18 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, rare, ended, 
             if cells is not None:
                 seen = cells_at(True, cells, middle, sensor.sensitive, near)
             for q in range(seen):
-                if cells is None:
+                if window is not None:
                     for number in range(4):
                         flipped[number] = hashed(pixel, seed + 1 + number) >> np.uint32(32 - DIGITS)
-                else:
+                if cells is not None:
                     turn_to(True, cells, seed, pixel, near, q, images, flipped)
                 for done in range(0, samples, PACKET):
                     n = min(PACKET, samples - done)
                     drawn = Drawn(table, first + done, n, flipped)
                     at_pixel(drawn, middle, sensor.sensitive, rays)
-                    if cells is None:
+                    if window is not None:
                         through_window(drawn, window, rays)
-                    else:
+                    if cells is not None:
                         through_cell(drawn, images, cells, rays)
                     sent = 0
                     for p in range(n):
@@ -657,9 +658,9 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, rare, ended, 
                     if sent == 0:
                         continue
                     tally[0] += sent
-                    if rare is None:
+                    if few is not None:
                         take_few_steps(steps, drawn, rays)
-                    else:
+                    if rare is not None:
                         take_steps(steps, drawn, rays)
                     add_rays(field, begin, rays, n, samples // 2 - done, sums)
                     for half in range(2):  # a packet in single precision, the packets in double

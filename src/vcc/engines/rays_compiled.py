@@ -64,9 +64,9 @@ def traced(
     with Workers(threads) as pool:
         sensor, points, aim, steps = given(core, beside)
         # Numba leaves out branches by what is None.
-        cells = aim.cells if aim.by_cell else None
-        rare = None if kernels.FEW.issuperset(steps.codes.tolist()) else True
-        rest = sensor, points, aim.window, cells, steps, rare, pool.ended, pictures
+        window, cells = (None, aim.cells) if aim.by_cell else (aim.window, None)
+        few, rare = (True, None) if kernels.FEW.issuperset(steps.codes.tolist()) else (None, True)
+        rest = sensor, points, window, cells, steps, few, rare, pool.ended, pictures
         if isinstance(values, np.ndarray):
             nv, nu, nt, ns = core.views
             whole = tables.Begin(np.zeros(nv, np.int64), np.zeros(nu, np.int64), nt, ns)
