@@ -13,12 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.affine import Affine
 from vcc.plan.rays.model import Rays
-from vcc.plan.rays.steps import Disc, Move, Rectangle
-from vcc.plan.rays.windows import Window
-
-Array = NDArray[np.float64]
+from vcc.plan.rays.reach import Reach
 
 TILES = 64, 48, 32, 24, 16, 8
 """Pixels a side of the tiles that are tried."""
@@ -26,8 +22,6 @@ CACHE = 2**22
 """Bytes of what a tile looks at, at most: as much as caches hold for each thread."""
 MOST = 3
 """How many times each sample is filtered, at most, where tiles look at the same ones."""
-MARGIN = 1e-6
-"""Pixels by which parts are larger than rays reach, which rounding cannot exceed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +48,11 @@ def patches_of(core: Rays, sample_bytes: int) -> Patches | None:
         core: what is traced.
         sample_bytes: of a sample, all channels.
     """
-    index = _index_from_sensor(core)
-    if index is None or not core.between_views or not isinstance(core.aim, Window) or core.aim.slope_from_scatter:
+    reach, (nv, nu, nt, ns) = core.reach, core.views
+    if reach is None or not core.between_views:
         return None
-    nv, nu, nt, ns = core.views
     for tile in TILES:
-        across, down = (_along(core, index, axis, tile) for axis in (0, 1))
+        across, down = (_along(reach, axis, tile, core.views) for axis in (0, 1))
         if across is None or down is None:
             return None
         (columns, wide), (rows, high) = across, down
@@ -69,48 +62,14 @@ def patches_of(core: Rays, sample_bytes: int) -> Patches | None:
     return None
 
 
-def _index_from_sensor(core: Rays) -> Array | None:
-    """Indices from rays at the sensor, 5×5; None where that is no affine map, or x and y mix in it."""
-    total = Affine.identity()
-    for step in core.steps:
-        if isinstance(step, Move):
-            total = step.before_from_behind @ total
-        elif not isinstance(step, Disc | Rectangle):
-            return None
-    matrix = (core.index_from_ray @ total).matrix
-    mixed = np.r_[matrix[[0, 0, 2, 2], [1, 3, 1, 3]], matrix[[1, 1, 3, 3], [0, 2, 0, 2]]]
-    if mixed.any() or core.motion[0, 1] or core.motion[1, 0]:
-        return None
-    return matrix
-
-
-def _along(core: Rays, index: Array, axis: int, tile: int) -> tuple[NDArray[np.int64], int] | None:
+def _along(reach: Reach, axis: int, tile: int, shape: tuple[int, ...]) -> tuple[NDArray[np.int64], int] | None:
     """The first pixel along an axis that each tile looks at in each view, (tiles, views); how many it looks at."""
-    views, pixels = core.views[1 - axis], core.views[3 - axis]
-    sensor = core.raster_shape[1 - axis]
-    view_from_place, view_from_slope, view_offset = index[axis, [axis, 2 + axis, 4]]
-    from_place, from_slope, offset = index[2 + axis, [axis, 2 + axis, 4]]
-    if view_from_slope == 0 or views < 2:
-        return None
+    pixels, sensor = shape[3 - axis], reach.raster_shape[1 - axis]
     first = np.arange(0, sensor, tile)
-    last = np.minimum(first + tile, sensor) - 1
-    half = core.sensitive[axis] / 2
-    places = core.first_pixel[axis] + core.pitch[axis] * np.stack([first, last], axis=-1)
-    low, high = np.sort(places, axis=-1).T
-    places = np.stack([low - half, high + half], axis=-1)  # (tiles, 2)
-    # A view is looked at by rays that pass it within a view on either side, beyond the outermost by half of one.
-    view = np.arange(views)
-    passed = np.clip(np.stack([view - 1.0, view + 1.0]), -0.5, views - 0.5)  # (2, views)
-    # At place x and view index i the slope is (i − a·x − c)/b: pixel indices are linear in x and i.
-    per_view = from_slope / view_from_slope
-    from_x = from_place - per_view * view_from_place
-    at = (
-        from_x * places[:, :, None, None]
-        + per_view * (passed - view_offset)
-        + offset
-        + core.motion[axis, axis] * (passed - view)
-    ).reshape(len(first), 4, views)
-    start = np.clip(np.floor(at.min(axis=1) - MARGIN), 0, pixels - 1).astype(np.int64)
-    stop = np.clip(np.floor(at.max(axis=1) + MARGIN) + 2, 1, pixels).astype(np.int64)
+    found = reach.samples(axis, first, np.minimum(first + tile, sensor) - 1, shape[1 - axis])
+    if found is None:
+        return None
+    start, last = (np.clip(np.floor(ends), -2, pixels).astype(np.int64) for ends in found)
+    start, stop = np.clip(start, 0, pixels - 1), np.clip(last + 2, 1, pixels)
     size = int(max((stop - start).max(), 1))
     return np.ascontiguousarray(np.minimum(start, pixels - size)), size

@@ -518,7 +518,7 @@ class Drive:
     @cached_property
     def used(self) -> NDArray[np.bool_]:
         """Which views are looked at, (v, u)."""
-        return self.plan.core.used_views(self.samples.grid.shape)
+        return self.plan.used_views(self.samples.grid.shape)
 
     def takes(self) -> Any:
         """Which samples are read, and what is done with their blocks before they are looked at; None where that is
@@ -545,7 +545,7 @@ class Drive:
     def looking_as(self, plan: Plan) -> Drive:
         """The same with all views read that another plan looks at."""
         made = copy(self)
-        made.used = plan.core.used_views(self.samples.grid.shape)
+        made.used = plan.used_views(self.samples.grid.shape)
         return made
 
     def used_in(self, block: Block) -> int:
