@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import vcc
 from vcc.base.units import mm
+from vcc.engines import rays_compiled
 from vcc.fields.grid import Block
 from vcc.plan.how import How
 from vcc.plan.operators import BlurViews, SwapPixelAxes
-from vcc.run import drive
+from vcc.run import blocks, drive
 from vcc.run.blocks import Blocks
 from vcc.shapes.patterns import CosineSum
 from vcc.store import open_store, save_store
@@ -255,3 +257,38 @@ def test_opened_again_it_is_the_same(light_fields):
     camera, options = CAMERAS["strong defocus"]
     one, other = (camera.capture(each, **options).values for each in (on_disk, open_store(on_disk.path)))
     np.testing.assert_array_equal(one, other)
+
+
+def test_rays_of_a_plain_lens_are_traced_for_the_bands_that_they_look_at(tmp_path, monkeypatch):
+    values = np.random.default_rng(0).integers(0, 256, (3, 4, 300, 30, 3), dtype=np.uint8)
+    given = vcc.LightField.from_views(values, 2 * mm, 2e-3, 1.0, disparity_range=(-0.3, 0.2))
+    stored = save_store(given, tmp_path / "a.zarr", chunks=(50, 30))
+    camera = vcc.Camera([LENS], vcc.Sensor(FOCUS, (280, 20), FOCUS * 2e-3))
+    plan = camera.compile(given, method="rays", samples=16)
+    whole = drive.drive(plan, given)
+    # Bands that are worth it whatever their size: four of them, as many as there are 64 rows of pixels.
+    monkeypatch.setattr(blocks, "WORTH", 1)
+    monkeypatch.setattr(blocks.Need, "of", classmethod(without_raster(blocks.Need.of.__func__)))
+    traced = []
+    rows_that_look = rays_compiled.rows_that_look
+
+    def noted(core, tile):
+        traced.append(len(rows_that_look(core, tile)) * tile)
+        return rows_that_look(core, tile)
+
+    monkeypatch.setattr(rays_compiled, "rows_that_look", noted)
+    found = drive.drive(plan, stored)
+    assert len(traced) == 4
+    # Each row of tiles of 32 is traced once, and one more at each border of two bands.
+    assert sum(traced) <= 280 + 32 * 4
+    np.testing.assert_allclose(found.values, whole.values, rtol=0, atol=1e-6 * whole.values.max())
+    assert found.sampling_error == pytest.approx(whole.sampling_error, rel=1e-6)
+    assert (found.rays, found.samples, found.missing_rays) == (whole.rays, whole.samples, whole.missing_rays)
+    with ThreadPoolExecutor(2) as pool:
+        assert drive.drive(plan, stored, executor=pool).values.tobytes() == found.values.tobytes()
+    assert "blocks of up to" in camera.explain(stored, method="rays", samples=16)
+
+
+def without_raster(of):
+    """`Need.of` as if rasters took no memory."""
+    return lambda kind, *given: replace(of(kind, *given), raster=0)

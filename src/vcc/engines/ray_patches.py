@@ -62,6 +62,25 @@ def patches_of(core: Rays, sample_bytes: int) -> Patches | None:
     return None
 
 
+def rows_that_look(core: Rays, tile: int) -> list[int]:
+    """The first rows of the rows of tiles from which rays may look at any row of the views' pixels.
+
+    A band of a light field that is read in parts is looked at from a part of the sensor.
+
+    Args:
+        core: what is traced.
+        tile: pixels a side.
+    """
+    first = np.arange(0, core.raster_shape[0], tile)
+    if core.reach is not None:
+        last = np.minimum(first + tile, core.raster_shape[0]) - 1
+        found = core.reach.samples(1, first, last, core.views[0])
+        if found is not None:
+            low, high = found[0].min(axis=1), found[1].max(axis=1)
+            first = first[(high > -1) & (low < core.views[2])]
+    return [int(row) for row in first]
+
+
 def _along(reach: Reach, axis: int, tile: int, shape: tuple[int, ...]) -> tuple[NDArray[np.int64], int] | None:
     """The first pixel along an axis that each tile looks at in each view, (tiles, views); how many it looks at."""
     pixels, sensor = shape[3 - axis], reach.raster_shape[1 - axis]

@@ -15,7 +15,7 @@ from vcc.base.workers import Workers
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
 from vcc.engines.compiled import read_as
-from vcc.engines.ray_patches import Patches, patches_of
+from vcc.engines.ray_patches import Patches, patches_of, rows_that_look
 from vcc.engines.sharpening_kernels import Parts, ToSharpen
 from vcc.engines.vector_gather import LANES
 from vcc.plan.protocol import Partial
@@ -57,10 +57,12 @@ def traced(
             parts = values.parts(patches.size)
     channels = values.shape[4] if len(values.shape) == 5 else 1
     rows, columns = core.raster_shape
-    pictures = np.empty((2, rows, columns, channels), dtype=np.float32)
+    pictures = np.zeros((2, rows, columns, channels), dtype=np.float32)
     tile = TILE if patches is None else patches.tile
-    tiles = [tables.Tile(r, r + tile, c, c + tile) for r in range(0, rows, tile) for c in range(0, columns, tile)]
-    rays = 0
+    lit = rows_that_look(core, tile)
+    tiles = [tables.Tile(r, r + tile, c, c + tile) for r in lit for c in range(0, columns, tile)]
+    dark = rows - sum(min(tile, rows - r) for r in lit)
+    rays = dark * columns * core.samples  # towards a window all are traced, whatever they look at
     with Workers(threads) as pool:
         sensor, points, aim, steps = given(core, beside)
         # Numba leaves out branches by what is None.

@@ -34,6 +34,7 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial, Room
+from vcc.plan.rays.model import Rays
 from vcc.run.blocks import SUMS, Blocks, Need, cut_evenly
 from vcc.run.executors import Tree, Work, crew, memory_of_task
 from vcc.run.needed import needed, needed_by_all
@@ -385,6 +386,8 @@ class Drive:
         need = Need.of(self.plan, self.samples.grid, taken, self.engine.copies)
         if self.plan.views_between is None:  # views made in between keep what they are made of
             need = need.with_readers(threads, self.limit)
+        if isinstance(self.plan.core, Rays) and self.name == "numba" and not any(map(any, self.plan.beside)):
+            need = replace(need, bands=self.plan.core.bands)
         return need if self.crew is None else need.with_sums()
 
     @cached_property
@@ -525,7 +528,8 @@ class Drive:
         another thing for each plan, or a matter of several rounds."""
         if self.in_memory or self.crew is not None or self.how.tolerance is not None or self.plan.views_between:
             return None
-        return self.samples, self.plan.before, self.plan.core.border, self.plan.by_rays, self.kind, self.limit
+        by_rays = self.need.bands if self.plan.by_rays else 0
+        return self.samples, self.plan.before, self.plan.core.border, by_rays, self.kind, self.limit
 
     @property
     def most_at_once(self) -> int:

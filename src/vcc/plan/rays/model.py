@@ -32,6 +32,10 @@ Array = NDArray[np.float64]
 Cell = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
+LEAST_ROWS = 64
+"""Rows of a picture that a band of the views is worth: at its border rays are traced for two bands."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Rays(Value):
     """How rays traced back from a sensor make a picture of a light field.
@@ -136,6 +140,19 @@ class Rays(Value):
                     pixels[:, :, n] = ends[:, None] if axis == 1 else ends
             pixels[~self.used_views(shape)] = 0
         return pixels
+
+    @property
+    def bands(self) -> int:
+        """Into how many bands of rows of pixels the views may be cut so that few rays look at two of them; 1 where
+        that is not known."""
+        if (reach := self.reach) is None:
+            return 1
+        row = np.array([0, self.raster_shape[0] - 1])
+        found = reach.samples(1, row, row, self.views[0])
+        if found is None:
+            return 1
+        spread = float((found[1].max(axis=1) - found[0].min(axis=1)).max())
+        return max(min(int(self.views[2] / (2 * spread + 1)), self.raster_shape[0] // LEAST_ROWS), 1)
 
     @property
     def rays(self) -> int:
