@@ -28,7 +28,7 @@ from vcc.engines.footprint_samples import FineGrid, on_raster, textures, view_of
 from vcc.engines.footprints_back import samples_back
 from vcc.engines.footprints_of_many import rasters
 from vcc.engines.ray_numbers import ray_numbers_back
-from vcc.engines.ray_patches import CACHE, patches_of
+from vcc.engines.ray_patches import patches_of
 from vcc.engines.vector_sums import EIGHT
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
@@ -221,8 +221,7 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
     """Bytes that a run takes beside the samples and the raster, estimated."""
     if isinstance(core, Rays):
         # Once in the core's steps and once as the kernel reads them; a single large table is not copied.
-        parts = 0 if patches_of(core, channels) is None else threads * CACHE
-        return int(core.points.nbytes + 2 * core.tables_bytes) + parts
+        return int(core.points.nbytes + 2 * core.tables_bytes)
     line = 4 * channels * core.samples[1] * core.refine
     raster = 4 * channels * math.prod(core.raster_shape)
     band = band_height(line)

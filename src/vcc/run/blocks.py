@@ -210,17 +210,15 @@ def cut_evenly(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) ->
 
 
 def _in_bands(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks | None:
-    """Bands of rows of pixels of all views; None where one is enough, or as many as there may be do not fit."""
+    """Bands of rows of pixels of all views, as large as fit; None where all fit, or where too many are needed."""
     _, _, nt, ns = grid.shape[:4]
     rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
     high, wide = rows[1] - rows[0], columns[1] - columns[0]
     total, spare = high * wide * need.view, (limit - need.fixed - need.reading) / need.times
     if spare <= 0:
         return None
-    most = min(need.bands, nt)
-    count = max(min(most, SHARES, int(total / max(WORTH, 8.0 * need.raster))), math.ceil(total / spare))
-    each = math.ceil(nt / count)
-    if not 1 < count <= most or total / nt * each > spare:
+    each = int(spare / total * nt)
+    if not 1 <= each < nt or math.ceil(nt / each) > need.bands:
         return None
     return Blocks(rows, columns, nt, ns, high, wide, each)
 

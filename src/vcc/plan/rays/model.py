@@ -32,8 +32,8 @@ Array = NDArray[np.float64]
 Cell = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
-LEAST_ROWS = 64
-"""Rows of a picture that a band of the views is worth: at its border rays are traced for two bands."""
+LEAST_ROWS = 8
+"""Rows of pixels that a band of the views has at least: at its borders rays are traced for two bands."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,8 +143,8 @@ class Rays(Value):
 
     @property
     def bands(self) -> int:
-        """Into how many bands of rows of pixels the views may be cut so that few rays look at two of them; 1 where
-        that is not known."""
+        """Into how many bands of rows of pixels the views may be cut, each of which a part of the rays looks at; 1
+        where that is not known."""
         if (reach := self.reach) is None:
             return 1
         row = np.array([0, self.raster_shape[0] - 1])
@@ -152,7 +152,7 @@ class Rays(Value):
         if found is None:
             return 1
         spread = float((found[1].max(axis=1) - found[0].min(axis=1)).max())
-        return max(min(int(self.views[2] / (2 * spread + 1)), self.raster_shape[0] // LEAST_ROWS), 1)
+        return max(int(self.views[2] / max(2 * spread, LEAST_ROWS)), 1)
 
     @property
     def rays(self) -> int:
