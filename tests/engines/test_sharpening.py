@@ -182,12 +182,16 @@ def test_memory_counts_the_filtered_samples():
     values = random((4, 4, 800, 800), "uint8")
     lf = field(values)
 
-    def foretold(**options) -> float:
-        words = CAMERA.explain(lf, method="rays", **options)
+    def foretold(camera: vcc.Camera, **options) -> float:
+        words = camera.explain(lf, method="rays", **options)
         return float(words.split(" MB of memory beside")[0].split()[-1])
 
-    more = foretold() - foretold(interpolation="linear")
+    plate = vcc.PhasePlate(vcc.surfaces.Cubic(1.0), diameter=6 * mm)
+    bent = vcc.Camera([LENS, plate], CAMERA.sensor)
+    more = foretold(bent) - foretold(bent, interpolation="linear")
     assert more == pytest.approx(2 * values.size / 1e6, abs=1.0)  # 16 bits for 8; each is rounded to a megabyte
+    # A lens alone filters what its rays look at, and keeps no copy.
+    assert foretold(CAMERA) - foretold(CAMERA, interpolation="linear") == pytest.approx(0, abs=1.0)
 
 
 def test_other_interpolations_are_refused():

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 import vcc
 from vcc.base.units import mm, um
 from vcc.optics import Element, Faces
 from vcc.plan.how import How
 from vcc.plan.model import Plan
-from vcc.plan.rays import steps
+from vcc.plan.rays import points, steps
 from vcc.plan.rays.compile import compile_rays
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.points import TABLE, hashed
@@ -356,3 +359,20 @@ def test_masks_at_the_light_field_that_reach_beyond_it_are_missing_rays():
         picture = picture_of(field(), method="rays", samples=1024)
     # π·7² mm² asked for, 49 held
     assert picture.missing_rays == pytest.approx(1 - 49 / (np.pi * 49), abs=2e-3)
+
+
+@pytest.mark.parametrize("dimensions", [1, 4, 7, 10, 12])
+def test_the_even_sequence_is_that_of_scipy(dimensions):
+    plain = qmc.Sobol(dimensions, scramble=False).random(points.TABLE) * points.TABLE
+    np.testing.assert_array_equal(points._plain(dimensions), plain)
+
+
+def test_a_plan_by_rays_does_not_wait_for_scipy_stats():
+    code = (
+        "import sys, numpy as np, vcc\n"
+        "lf = vcc.LightField.from_views(np.zeros((3, 3, 8, 8)), 2e-3, 2e-3, 1.0)\n"
+        "vcc.Camera([vcc.Lens(focal_length=50e-3, diameter=6e-3)], vcc.Sensor(52e-3, (6, 6), 1e-4))"
+        ".compile(lf, method='rays')\n"
+        "assert 'scipy.stats' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -102,5 +102,36 @@ def test_the_pixels_are_those_that_the_sensor_sees(tmp_path):
     middle = [(first + stop) / 2 for first, stop in samples.block.ranges[2:]]
     np.testing.assert_allclose(middle, [20, 24], atol=1)
     assert needed(plan, samples)[1].grid.shape == samples.grid.shape
-    by_rays = camera.compile(stored, method="rays")
-    assert needed(by_rays, stored) == (by_rays, stored)
+    by_rays = needed(camera.compile(stored, method="rays"), stored)[1]
+    assert isinstance(by_rays, Needed)
+    for size, one, other in zip((8, 10), by_rays.block.ranges[2:], samples.block.ranges[2:], strict=True):
+        assert size <= one[1] - one[0] <= size + 8
+        np.testing.assert_allclose(sum(one), sum(other), atol=2)
+    plate = vcc.PhasePlate(vcc.surfaces.Cubic(5.0), diameter=7 * mm)  # its rays may look anywhere
+    bent = vcc.Camera([LENS, plate], camera.sensor).compile(stored, method="rays")
+    assert needed(bent, stored) == (bent, stored)
+
+
+def test_all_samples_that_rays_look_at_are_needed(tmp_path):
+    """Plain lenses of any place, size and focus: the adjoint is 0 elsewhere, the image from disk the same."""
+    rng = np.random.default_rng(0)
+    given = light_field()
+    stored = save_store(given, tmp_path / "a.zarr", chunks=(8, 8))
+    fewer = 0
+    for number in range(12):
+        middle = tuple(rng.uniform(-2, 2, 2) * mm)
+        lens = vcc.Lens(
+            focal_length=50 * mm, diameter=rng.uniform(0.5, 9) * mm, z=rng.uniform(0, 5) * mm, decentre=middle
+        )
+        sensor = vcc.Sensor(FOCUS * rng.uniform(0.9, 1.1), (7, 9), FOCUS * rng.uniform(0.5, 3) * 1e-3)
+        between = "none" if number % 3 == 2 else "auto"
+        camera, options = vcc.Camera([lens], sensor), {"method": "rays", "samples": 16, "between_views": between}
+        operator = camera.operator(given, engine="reference", **options)
+        back = operator.T(rng.random(operator.picture_shape) + 1)
+        inside = seen(operator.plan, given.shape)
+        assert not ((back != 0) & ~inside).any(), camera
+        fewer += inside.mean() < 0.5
+        whole = camera.capture(given, **options).values
+        here = camera.capture(stored, **options).values
+        np.testing.assert_allclose(here, whole, rtol=0, atol=1e-6 * whole.max())
+    assert fewer > 6

@@ -14,6 +14,7 @@ import pytest
 
 import vcc
 from vcc.base.units import mm
+from vcc.engines import rays_compiled
 from vcc.fields.grid import Block
 from vcc.plan.how import How
 from vcc.plan.operators import BlurViews, SwapPixelAxes
@@ -255,3 +256,43 @@ def test_opened_again_it_is_the_same(light_fields):
     camera, options = CAMERAS["strong defocus"]
     one, other = (camera.capture(each, **options).values for each in (on_disk, open_store(on_disk.path)))
     np.testing.assert_array_equal(one, other)
+
+
+def test_rays_of_a_plain_lens_are_traced_for_the_bands_that_they_look_at(tmp_path, monkeypatch):
+    values = np.random.default_rng(0).integers(0, 256, (3, 4, 300, 30, 3), dtype=np.uint8)
+    given = vcc.LightField.from_views(values, 2 * mm, 2e-3, 1.0, disparity_range=(-0.3, 0.2))
+    stored = save_store(given, tmp_path / "a.zarr", chunks=(50, 30))
+    camera = vcc.Camera([LENS], vcc.Sensor(FOCUS, (280, 20), FOCUS * 2e-3))
+    plan = camera.compile(given, method="rays", samples=16)
+    whole = drive.drive(plan, given)
+
+    def tight(executor=None) -> How:
+        """Room for about a third of each view, and for a view that is read."""
+        run = drive.Drive(plan, stored, How(), executor)
+        assert run.blocks.words.startswith("one block")
+        return How(memory_limit=int(run.need.fixed + 3 * run.need.view + 12 * run.need.view / 3))
+
+    traced = []
+    rows_that_look = rays_compiled.rows_that_look
+
+    def noted(core, tile):
+        traced.append(len(rows_that_look(core, tile)) * tile)
+        return rows_that_look(core, tile)
+
+    monkeypatch.setattr(rays_compiled, "rows_that_look", noted)
+    found = drive.drive(plan, stored, tight())
+    assert len(traced) >= 3
+    # Nine rows of tiles of 32 are traced once, and at each border of two bands at most two of them once more.
+    assert sum(traced) <= 9 * 32 + 2 * 32 * (len(traced) - 1)
+    np.testing.assert_allclose(found.values, whole.values, rtol=0, atol=1e-6 * whole.values.max())
+    assert found.sampling_error == pytest.approx(whole.sampling_error, rel=1e-6)
+    assert (found.rays, found.samples, found.missing_rays) == (whole.rays, whole.samples, whole.missing_rays)
+    traced.clear()
+    with ThreadPoolExecutor(2) as pool:
+        shared = drive.drive(plan, stored, tight(pool), executor=pool).values
+    assert len(traced) >= 3
+    np.testing.assert_allclose(shared, whole.values, rtol=0, atol=1e-6 * whole.values.max())
+    limit = tight().memory_limit
+    words = camera.explain(stored, method="rays", samples=16, memory_limit=limit)
+    assert "rows of pixels of all views" in words
+    assert "rays are traced for the blocks that they look at" in words

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from vcc.advice.explain_footprints import some_views
+from vcc.advice.explain_store import traced_for
 from vcc.fields.grid import Block
 from vcc.run.drive import Counted, Drive, begun
 from vcc.run.executors import Work
@@ -31,7 +32,7 @@ def section(run: Drive, here: float | None) -> tuple[str, float | None]:
     lines = [f"  {run.blocks.words}, {places} at once, {each}"]
     seconds = None
     if run.plan.by_rays:
-        lines.append("  all rays are traced once for each block; the time is not foretold")
+        lines.append(f"  {traced_for(run)}; the time is not foretold")
     else:
         seconds = expected_seconds(run, blocks, max(places, 1))
         lines.append(f"  about {seconds:.2g} s expected (some views were run there and timed)")

@@ -55,7 +55,7 @@ def _pilot(run: Drive, core: Rays) -> _Pilot | None:
         return None
     run.engine.prepared(run.plan.before, whole[:1, :1], run.threads)  # the first run may compile
     start = time.perf_counter()
-    values = run.engine.prepared(run.plan.before, whole, run.threads)
+    values = run.taken
     preparing = time.perf_counter() - start
 
     def traced_in(patches: list[Rays]) -> tuple[list[Partial], float]:
@@ -124,9 +124,9 @@ def _cost(run: Drive, core: Rays, pilot: _Pilot | None) -> str:
 def _memory(run: Drive, core: Rays) -> int:
     """Bytes that a run takes beside the light field and the picture, estimated."""
     whole, copied = run.samples.whole(), 0
-    if isinstance(whole, np.ndarray) and (
-        run.plan.before or run.kind != whole.dtype or not whole.flags.c_contiguous
-    ):
+    in_parts = whole is not None and run.engine.to_prepare(core, run.plan.before, whole) is not None
+    made_anew = not in_parts and bool(run.plan.before or run.kind != getattr(whole, "dtype", None))
+    if isinstance(whole, np.ndarray) and (made_anew or not whole.flags.c_contiguous):
         copied = whole.size * run.kind.itemsize
     return run.engine.memory(core, run.channels, run.threads) + copied
 

@@ -95,6 +95,10 @@ def rays_back(core: Rays, values: Any, raster: Any, **options: Any) -> Gradient:
     raise InputError("engine 'cuda' does not go backwards through rays: use engine='numba', with NumPy arrays")
 
 
+def to_prepare(core: Rays, before: Sequence[operators.Before], values: Any) -> None:
+    """Samples are prepared as a whole; see `vcc.plan.protocol.Engine`."""
+
+
 def prepared(before: Sequence[operators.Before], values: Any, threads: int) -> Any:
     """Samples as a core takes them: of NumPy as `vcc.engines.numba_cpu` has them, else by their own library.
 

@@ -28,6 +28,7 @@ from vcc.engines.footprint_samples import FineGrid, on_raster, textures, view_of
 from vcc.engines.footprints_back import samples_back
 from vcc.engines.footprints_of_many import rasters
 from vcc.engines.ray_numbers import ray_numbers_back
+from vcc.engines.ray_patches import patches_of
 from vcc.engines.vector_sums import EIGHT
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
@@ -92,7 +93,12 @@ def footprints_back(
 
 
 def rays(
-    core: Rays, values: NDArray[Any], *, beside: int = 0, threads: int, progress: Progress | None = None
+    core: Rays,
+    values: NDArray[Any] | sharpening_kernels.ToSharpen,
+    *,
+    beside: int = 0,
+    threads: int,
+    progress: Progress | None = None,
 ) -> Partial:
     """The raster of samples (v, u, t, s[, channels]), float32, by compiled rays."""
     return rays_compiled.traced(core, values, beside, threads, progress)
@@ -119,6 +125,18 @@ def rays_back(
         partial(ray_numbers_back, core, values, raster, wanted, beside, threads) if wanted else None,
         progress,
     )
+
+
+def to_prepare(
+    core: Rays, before: Sequence[operators.Before], values: NDArray[Any]
+) -> sharpening_kernels.ToSharpen | None:
+    """Samples that rays sharpen where they look at them; see `vcc.plan.protocol.Engine`."""
+    match before:
+        case [operators.SharpenViews(weights)]:
+            found = sharpening_kernels.ToSharpen(weights, values)
+            return None if patches_of(core, found.bytes_kept) is None else found
+        case _:
+            return None
 
 
 def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:

@@ -26,10 +26,12 @@ DIGITS_ABOVE, DIGITS_BELOW = np.float32(2.0**DIGITS), 2.0**-DIGITS
 
 _compiled = compiled(borrowing=True, fastmath={"contract", "nsz"})
 _inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
+_inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath={"contract", "nsz"})
+"""Of what compiled code alone calls: no way for Python to call it is compiled."""
 _allocating = compiled(fastmath={"contract", "nsz"})
 
 
-@_compiled
+@_inner
 def cell_of(layout, turn, x, y):  # type: ignore[no-untyped-def]
     """(row, column, centre x, centre y) of the cell that holds a place; turn as `steps._lattice_numbers`."""
     cosine, sine, offset_x, offset_y, pitch, height = turn[0], turn[1], turn[2], turn[3], turn[4], turn[5]
@@ -59,7 +61,7 @@ def cell_of(layout, turn, x, y):  # type: ignore[no-untyped-def]
     )
 
 
-@_compiled
+@_inner
 def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
     """(x, y) of the centre of a cell."""
     shifted = column * turn[4]
@@ -69,7 +71,7 @@ def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
     return turn[0] * shifted - turn[1] * down + turn[2], turn[1] * shifted + turn[0] * down + turn[3]
 
 
-@_compiled
+@_inner
 def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
     """(columns, row, next row, column, next column, way down, way to the right) of a place on a texture."""
     c, c1, right = around((x - real[0]) * real[2], columns)
@@ -77,7 +79,7 @@ def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
     return columns, r, r1, c, c1, down, right
 
 
-@_compiled
+@_inner
 def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
     """One of ``width`` numbers of the texture that begins at ``start``, at a place that `corner` found."""
     columns, r, r1, c, c1, down, right = at
@@ -92,7 +94,7 @@ def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
     )
 
 
-@_compiled
+@_inlined
 def part_affinely(f, n, x, y, s, t):  # type: ignore[no-untyped-def]
     """Step 0: an affine map along x, and one along y."""
     f0, f1, f2, f3, f4, f5 = f[0], f[1], f[2], f[3], f[4], f[5]
@@ -107,15 +109,16 @@ def part_affinely(f, n, x, y, s, t):  # type: ignore[no-untyped-def]
         t[p] = f3 * yp + f4 * tp + f5
 
 
-@_compiled
+@_inlined
 def within_disc(f, n, x, y, share):  # type: ignore[no-untyped-def]
     """Step 6: dark outside a disc."""
     f0, f1, f2 = f[0], f[1], f[2]
     for p in range(n):
-        share[p] = share[p] if (x[p] - f0) ** 2 + (y[p] - f1) ** 2 <= f2 else 0.0
+        dx, dy = x[p] - f0, y[p] - f1
+        share[p] = share[p] if dx * dx + dy * dy <= f2 else 0.0
 
 
-@_compiled
+@_inlined
 def within_rectangle(f, n, x, y, share):  # type: ignore[no-untyped-def]
     """Step 7: dark outside a rectangle."""
     f0, f1, f2, f3 = f[0], f[1], f[2], f[3]
@@ -127,7 +130,7 @@ FEW = frozenset({0, 6, 7})
 """Codes of the steps of a plain lens: affine along x and y apart, a round rim, a rectangular one."""
 
 
-@_compiled
+@_inner
 def take_few_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     """As `take_steps`, where all steps are among `FEW`, which take a tenth of the time to compile."""
     codes, _, real, _, _ = steps
@@ -143,7 +146,7 @@ def take_few_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
             within_rectangle(f, n, x, y, share)
 
 
-@_compiled
+@_inner
 def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     """Take a packet of rays through all steps.
 
@@ -253,7 +256,7 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
                 t[p] -= stretch * points[a[0] + 2 * kernel + 1, first + p]
 
 
-@_compiled
+@_inner
 def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def]
     """Add a view's value at pixel (k, l), interpolated linearly and dark outside, times a weight.
 
@@ -304,19 +307,20 @@ def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def
 
 
 @_inlined
-def add_rays(field, rays, n, second, sums):  # type: ignore[no-untyped-def]
+def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-def]
     """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
 
     Rays from ``second`` on belong to the second half. Places are replaced by indices.
     """
     samples, _, index_from_ray, motion, between = field
-    values, (nv, nu, nt, ns), channels = samples
+    values, (nv, nu, high, wide), channels = samples
+    first_rows, first_columns, nt, ns = begin
     x, y, s, t, share = rays
     to_indices(index_from_ray, rays, n)
     # Where x and y do not mix, the pixels looked at in four views are two columns and two rows.
     parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
     vectors = parted and (channels == 1 or channels == 3 or channels == 4)
-    line, picture, row_of_views = ns * channels, nt * ns * channels, nu * nt * ns * channels
+    line, picture, row_of_views = wide * channels, high * wide * channels, nu * high * wide * channels
     last = len(values) - LANES
     one = np.float32(1)
     # So far outside the pictures all views that a ray is between are dark.
@@ -333,21 +337,20 @@ def add_rays(field, rays, n, second, sums):  # type: ignore[no-untyped-def]
         if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
             continue
         ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
-        if not between:
+        if between:
+            i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
+            fi, fj = ci - i0, cj - j0
+        else:  # one view; there is no motion then
             i0, j0 = int(ci + 0.5), int(cj + 0.5)
-            base = j0 * row_of_views + i0 * picture
-            add_view(samples, base, k, l, np.float32(weight), sums[half])
-            continue
-        i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
-        fi, fj = ci - i0, cj - j0
+            fi, fj = 0.0, 0.0
         if vectors:
             k0, l0 = k + motion[0, 0] * (i - i0), l + motion[1, 1] * (j - j0)
             k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
             kf0, kf1, lf0, lf1 = math.floor(k0), math.floor(k1), math.floor(l0), math.floor(l1)
-            inside = (
-                min(kf0, kf1) >= 0 and max(kf0, kf1) < ns - 1 and min(lf0, lf1) >= 0 and max(lf0, lf1) < nt - 1
-            )
-            c0, c1, r0, r1 = int(kf0) * channels, int(kf1) * channels, int(lf0) * line, int(lf1) * line
+            c0, c1 = int(kf0) - first_columns[i0], int(kf1) - first_columns[i0 + 1]
+            r0, r1 = int(lf0) - first_rows[j0], int(lf1) - first_rows[j0 + 1]
+            inside = min(c0, c1) >= 0 and max(c0, c1) < wide - 1 and min(r0, r1) >= 0 and max(r0, r1) < high - 1
+            c0, c1, r0, r1 = c0 * channels, c1 * channels, r0 * line, r1 * line
             base = j0 * row_of_views + i0 * picture
             if inside and base + row_of_views + picture + max(r0, r1) + line + max(c0, c1) <= last:
                 fi, fj = np.float32(fi), np.float32(fj)
@@ -379,22 +382,13 @@ def add_rays(field, rays, n, second, sums):  # type: ignore[no-untyped-def]
                 if w == 0.0:
                     continue
                 away_i, away_j = i - (i0 + di), j - (j0 + dj)
-                view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j
-                view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
+                view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j - first_columns[i0 + di]
+                view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j - first_rows[j0 + dj]
                 base = (j0 + dj) * row_of_views + (i0 + di) * picture
                 add_view(samples, base, view_k, view_l, np.float32(w), sums[half])
 
 
-@_compiled
-def fold_lanes(sums, channels):  # type: ignore[no-untyped-def]
-    """Add the right pixels' channels to the left ones', where vectors left them apart."""
-    if channels == 1 or channels == 3 or channels == 4:
-        for half in range(2):
-            for channel in range(channels):
-                sums[half, channel] += sums[half, channels + channel]
-
-
-@_compiled
+@_inner
 def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
     """Replace the places and slopes of n rays by their indices (i, j, k, l), by a 4×5 matrix."""
     x, y, s, t, _ = rays
@@ -418,7 +412,7 @@ def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
         t[p] = m[3, 0] * xp + m[3, 1] * yp + m[3, 2] * sp + m[3, 3] * tp + m[3, 4]
 
 
-@_compiled
+@_inner
 def hashed(number, seed):  # type: ignore[no-untyped-def]
     """See `vcc.plan.rays.points.hashed`."""
     h = np.uint32(number & 0xFFFFFFFF) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
@@ -442,7 +436,7 @@ def set_image(image, cells, axis, centre, power, slope):  # type: ignore[no-unty
     image[4] = cells.cell_half[axis]
 
 
-@_compiled
+@_inner
 def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
     """(power, δs, δt) of a cell; divisions are spared where there is one kind, the usual case."""
     rows, columns = kinds.shape[0], kinds.shape[1]
@@ -451,7 +445,7 @@ def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
     return kinds[r, c, 0], kinds[r, c, 1], kinds[r, c, 2]
 
 
-@_compiled
+@_inner
 def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
     """Fill ``near`` with the (row, column) of the cells through which a pixel sees the stop; returns how many."""
     beyond, from_sensor, from_slope = cells.beyond, cells.beyond_from_sensor, cells.beyond_from_slope
@@ -486,7 +480,7 @@ def unit(point, flipped):  # type: ignore[no-untyped-def]
     return (np.float64(np.int32(point * DIGITS_ABOVE) ^ flipped) + 0.5) * DIGITS_BELOW
 
 
-@_compiled
+@_inner
 def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
     """Places of a packet's rays over the sensitive area of a pixel."""
     points, start, n, flipped = drawn
@@ -498,7 +492,7 @@ def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
         y[p] = middle_y + (unit(points[1, start + p], down) - 0.5) * high
 
 
-@_compiled
+@_inner
 def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays towards a window, making up for diffusers; see `vcc.plan.rays.windows.Window`."""
     points, start, n, flipped = drawn
@@ -528,7 +522,7 @@ def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
             t[p] += g0 * a + g1 * b
 
 
-@_compiled
+@_inner
 def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays through what of a cell the stop is seen through; see `CellWindows.aimed`.
 
@@ -610,7 +604,7 @@ def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ign
 
 
 @_compiled
-def add_pixels(field, sensor, points, window, cells, steps, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
+def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
 
     The first picture is what all of a pixel's rays find, the second what its two halves differ by. Once
@@ -618,10 +612,13 @@ def add_pixels(field, sensor, points, window, cells, steps, rare, ended, picture
     a kernel around it that made the arrays took a third of the time to compile.
 
     Args:
-        window: where to aim; not looked at where there are cells.
-        cells: through which to aim, or None: what aims through cells is then not compiled.
+        field: of whole views or of parts of them.
+        begin: where these parts begin.
+        window: where to aim, or None where there are cells: what is None is not compiled.
+        cells: through which to aim, or None.
         steps: what rays meet.
-        rare: None where all steps are among `FEW`: the rest is then not compiled.
+        few: True where all steps are among `FEW`, else None.
+        rare: the other way round.
         within: as what `room` makes.
         sums: of a packet, float32, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
     """
@@ -642,18 +639,18 @@ def add_pixels(field, sensor, points, window, cells, steps, rare, ended, picture
             if cells is not None:
                 seen = cells_at(True, cells, middle, sensor.sensitive, near)
             for q in range(seen):
-                if cells is None:
+                if window is not None:
                     for number in range(4):
                         flipped[number] = hashed(pixel, seed + 1 + number) >> np.uint32(32 - DIGITS)
-                else:
+                if cells is not None:
                     turn_to(True, cells, seed, pixel, near, q, images, flipped)
                 for done in range(0, samples, PACKET):
                     n = min(PACKET, samples - done)
                     drawn = Drawn(table, first + done, n, flipped)
                     at_pixel(drawn, middle, sensor.sensitive, rays)
-                    if cells is None:
+                    if window is not None:
                         through_window(drawn, window, rays)
-                    else:
+                    if cells is not None:
                         through_cell(drawn, images, cells, rays)
                     sent = 0
                     for p in range(n):
@@ -661,17 +658,21 @@ def add_pixels(field, sensor, points, window, cells, steps, rare, ended, picture
                     if sent == 0:
                         continue
                     tally[0] += sent
-                    if rare is None:
+                    if few is not None:
                         take_few_steps(steps, drawn, rays)
-                    else:
+                    if rare is not None:
                         take_steps(steps, drawn, rays)
-                    add_rays(field, rays, n, samples // 2 - done, sums)
+                    add_rays(field, begin, rays, n, samples // 2 - done, sums)
                     for half in range(2):  # a packet in single precision, the packets in double
                         for lane in range(sums.shape[1]):
                             totals[half, lane] += sums[half, lane]
                             sums[half, lane] = 0
-            fold_lanes(totals, channels)
+            # Where vectors left them apart, the right pixels' channels are added to the left ones'.
+            apart = channels == 1 or channels == 3 or channels == 4
             for channel in range(channels):
-                one, two = totals[0, channel] * field.scale / samples, totals[1, channel] * field.scale / samples
+                one, two = totals[0, channel], totals[1, channel]
+                if apart:
+                    one, two = one + totals[0, channels + channel], two + totals[1, channels + channel]
+                one, two = one * field.scale / samples, two * field.scale / samples
                 pictures[0, row, column, channel] = one + two
                 pictures[1, row, column, channel] = 2 * (one - two)

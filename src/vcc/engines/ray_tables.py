@@ -47,6 +47,22 @@ class LightField(NamedTuple):
     between: bool
 
 
+class Begin(NamedTuple):
+    """Which parts of the views of a light field are there, all of one size.
+
+    Args:
+        rows: (v,), the first row of pixels of the parts of a row of views.
+        columns: (u,), the first column of pixels of the parts of a column of views.
+        high: rows of pixels of a whole view.
+        wide: columns of it.
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    high: int
+    wide: int
+
+
 class Sensor(NamedTuple):
     """The picture's pixels.
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
+from threading import local
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,8 @@ from vcc.base.workers import Workers
 from vcc.engines import ray_kernels as kernels
 from vcc.engines import ray_tables as tables
 from vcc.engines.compiled import read_as
+from vcc.engines.ray_patches import Patches, patches_of, rows_that_look
+from vcc.engines.sharpening_kernels import Parts, ToSharpen
 from vcc.engines.vector_gather import LANES
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
@@ -29,43 +33,68 @@ NO_CELLS = tables.Cells(
 
 
 def traced(
-    core: Rays, values: NDArray[Any], beside: int, threads: int, progress: Progress | None = None
+    core: Rays,
+    values: NDArray[Any] | ToSharpen,
+    beside: int,
+    threads: int,
+    progress: Progress | None = None,
 ) -> Partial:
     """The raster by one round of rays.
 
     Args:
         core: what is traced.
-        values: samples (v, u, t, s[, channels]).
+        values: samples (v, u, t, s[, channels]), or such that are to be sharpened first.
         beside: 0, or 1 for the blocks of points beside those of the first round.
         threads: how many work at once. The picture is the same.
         progress: called with (done, total) in tiles.
     """
-    channels = values.shape[4] if values.ndim == 5 else 1
+    patches = parts = None
+    if isinstance(values, ToSharpen):
+        patches = patches_of(core, values.bytes_kept)
+        if patches is None:
+            values = values.whole(threads)
+        else:
+            parts = values.parts(patches.size)
+    channels = values.shape[4] if len(values.shape) == 5 else 1
     rows, columns = core.raster_shape
-    pictures = np.empty((2, rows, columns, channels), dtype=np.float32)
-    tiles = [tables.Tile(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)]
-    rays = 0
+    pictures = np.zeros((2, rows, columns, channels), dtype=np.float32)
+    tile = TILE if patches is None else patches.tile
+    lit = rows_that_look(core, tile)
+    tiles = [tables.Tile(r, r + tile, c, c + tile) for r in lit for c in range(0, columns, tile)]
+    dark = rows - sum(min(tile, rows - r) for r in lit)
+    rays = dark * columns * core.samples  # towards a window all are traced, whatever they look at
     with Workers(threads) as pool:
         sensor, points, aim, steps = given(core, beside)
         # Numba leaves out branches by what is None.
-        cells = aim.cells if aim.by_cell else None
-        rare = None if kernels.FEW.issuperset(steps.codes.tolist()) else True
-        add = partial(
-            _tile,
-            light_field(core, values, channels),
-            sensor,
-            points,
-            aim.window,
-            cells,
-            steps,
-            rare,
-            pool.ended,
-            pictures,
-        )
+        window, cells = (None, aim.cells) if aim.by_cell else (aim.window, None)
+        few, rare = (True, None) if kernels.FEW.issuperset(steps.codes.tolist()) else (None, True)
+        rest = sensor, points, window, cells, steps, few, rare, pool.ended, pictures
+        if isinstance(values, np.ndarray):
+            nv, nu, nt, ns = core.views
+            whole = tables.Begin(np.zeros(nv, np.int64), np.zeros(nu, np.int64), nt, ns)
+            add = partial(_tile, light_field(core, values, channels), whole, *rest)
+        else:
+            assert patches is not None
+            assert parts is not None
+            add = partial(_tile_of_parts, core, parts, patches, rest, local())
         for done, part in enumerate(pool.map(add, tiles), start=1):
             rays += part
             tell(progress, done, len(tiles))
     return Partial(pictures[0], pictures[1], rays, core.samples)
+
+
+def _tile_of_parts(
+    core: Rays, parts: Parts, patches: Patches, rest: tuple[Any, ...], own: local, tile: tables.Tile
+) -> int:
+    """As `_tile`, of the parts of views that the tile looks at; each thread has its own room for them."""
+    if not hasattr(own, "room"):
+        own.room = parts.room()
+        views = (*core.views[:2], *parts.size)
+        own.field = looked_up_as(replace(core, views=views), own.room[0], parts.channels)
+    rows = patches.rows[tile.first_row // patches.tile]
+    columns = patches.columns[tile.first_column // patches.tile]
+    parts.fill(rows, columns, *own.room)
+    return _tile(own.field, tables.Begin(rows, columns, *core.views[2:]), *rest, tile)
 
 
 def _tile(*given: Any) -> int:

@@ -89,6 +89,10 @@ def together(cores: Any, values: Any, **options: Any) -> None:
     """None: several cores run one after the other; see `vcc.plan.protocol.Engine`."""
 
 
+def to_prepare(core: Rays, before: Sequence[operators.Before], values: Any) -> None:
+    """Samples are prepared as a whole; see `vcc.plan.protocol.Engine`."""
+
+
 def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:
     """Samples as a core takes them, filtered in double precision; bytes are sharpened exactly."""
     for operator in before:

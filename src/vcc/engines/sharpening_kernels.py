@@ -9,34 +9,132 @@ from numpy.typing import NDArray
 
 from vcc.base.workers import Workers
 from vcc.engines.compiled import compiled
+from vcc.engines.prefetching import LINE, prefetch
 from vcc.plan.how import cores
 from vcc.plan.operators import KEPT_DIGITS, REACH
 from vcc.plan.operators import WEIGHT_DIGITS as DIGITS
 
 _compiled = compiled(fastmath={"contract", "nsz"})
 SHIFT = 2 * DIGITS - KEPT_DIGITS
+AT_ONCE = 32
+"""Numbers that vectorised loops take at once: whole multiples leave them no rest."""
 
 
 def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int | None = None) -> NDArray[Any]:
     """Samples (v, u, t, s[, channels]) filtered: int16 of uint8, else in floating point, double of double."""
-    small = values.dtype == np.uint8
-    given = np.dtype(np.float32) if values.dtype == np.float16 else values.dtype
-    wide = np.float64 if values.dtype == np.float64 else np.float32
-    kept = np.empty(values.shape, dtype=np.int16 if small else wide)
-    factors = np.array(weights, dtype=np.int32) if small else (np.array(weights) * 2.0**-DIGITS).astype(wide)
+    given, wide = _kinds(values.dtype)
+    kept = np.empty(values.shape, dtype=wide)
+    factors, whole = _factors(weights, values.dtype)
     rows, length = values.shape[2], int(np.prod(values.shape[3:]))
     channels = values.shape[4] if values.ndim == 5 else 1
 
+    corner = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+
     def sharpen_row(row: int) -> None:
-        lines = np.empty((2 * REACH + 2, length), dtype=factors.dtype)
+        line = _line(factors, length, channels)
         for column in range(values.shape[1]):
-            view = np.ascontiguousarray(values[row, column], dtype=given).reshape(rows, length)
-            to = kept[row, column].reshape(rows, length)
-            sharpen(view, to, channels, factors, True if small else None, lines)
+            view = np.ascontiguousarray(values[row, column], dtype=given).reshape(1, 1, rows, length)
+            to = kept[row, column].reshape(-1)
+            sharpen(view, None, corner, (rows, length // channels), to, channels, factors, whole, line)
 
     with Workers(threads or cores()) as pool:
         list(pool.map(sharpen_row, range(values.shape[0])))
     return kept
+
+
+class ToSharpen:
+    """Samples that are filtered when they are looked at, in parts or as a whole.
+
+    Args:
+        weights: of the filter.
+        values: samples (v, u, t, s[, channels]).
+    """
+
+    def __init__(self, weights: tuple[int, int, int], values: NDArray[Any]) -> None:
+        self._weights, self._values = weights, values
+        self._whole: NDArray[Any] | None = None
+        self.shape = values.shape
+
+    @property
+    def bytes_kept(self) -> int:
+        """Of a pixel in parts that are filtered."""
+        return _kept_in_parts(self._values.dtype).itemsize * (self.shape[4] if len(self.shape) == 5 else 1)
+
+    def parts(self, size: tuple[int, int]) -> Parts:
+        """Parts of so many rows and columns of pixels."""
+        return Parts(self._weights, self._values, size)
+
+    def whole(self, threads: int) -> NDArray[Any]:
+        """All of them filtered, once for several rounds of rays."""
+        if self._whole is None:
+            self._whole = filtered(self._weights, self._values, threads)
+        return self._whole
+
+
+class Parts:
+    """Parts of all views, filtered when they are looked at.
+
+    Args:
+        weights: of the filter.
+        values: samples (v, u, t, s[, channels]).
+        size: rows and columns of pixels of a part.
+    """
+
+    def __init__(self, weights: tuple[int, int, int], values: NDArray[Any], size: tuple[int, int]) -> None:
+        given, _ = _kinds(values.dtype)
+        self.channels = values.shape[4] if values.ndim == 5 else 1
+        self._views = np.ascontiguousarray(values, dtype=given).reshape(*values.shape[:3], -1)
+        self._factors, self._whole = _factors(weights, values.dtype)
+        self.kind, self.size = _kept_in_parts(values.dtype), size
+
+    def room(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Where parts are put, flat and `AT_ONCE` numbers longer than they are, and where rows are filtered."""
+        length = self.size[1] * self.channels
+        count = int(np.prod(self._views.shape[:2])) * self.size[0] * length
+        return np.zeros(count + AT_ONCE, dtype=self.kind), _line(self._factors, length, self.channels)
+
+    def fill(
+        self,
+        rows: NDArray[np.int64],
+        columns: NDArray[np.int64],
+        parts: NDArray[Any],
+        line: NDArray[Any],
+    ) -> None:
+        """Filter the parts that begin at some row in each row of views, and at some column in each column of them.
+
+        Args:
+            rows: (v,).
+            columns: (u,).
+            parts: room for them.
+            line: likewise.
+        """
+        views, filtering = self._views, (self.channels, self._factors, self._whole)
+        sharpen(views, views.reshape(-1), (rows, columns), self.size, parts, *filtering, line)
+
+
+def _kinds(kind: np.dtype[Any]) -> tuple[np.dtype[Any], np.dtype[Any]]:
+    """In what types samples of a type are filtered, and are kept then."""
+    if kind == np.uint8:
+        return kind, np.dtype(np.int16)
+    wide = np.dtype(np.float64 if kind == np.float64 else np.float32)
+    return (np.dtype(np.float32) if kind == np.float16 else kind), wide
+
+
+def _kept_in_parts(kind: np.dtype[Any]) -> np.dtype[Any]:
+    """In what type parts of samples of a type are kept, which rays look up at once."""
+    return np.dtype(np.int16 if kind == np.uint8 else np.float32)
+
+
+def _factors(weights: tuple[int, int, int], kind: np.dtype[Any]) -> tuple[NDArray[Any], bool | None]:
+    """Weights as `sharpen` takes them, and whether they are whole numbers."""
+    if kind == np.uint8:
+        return np.array(weights, dtype=np.int32), True
+    return (np.array(weights) * 2.0**-DIGITS).astype(_kinds(kind)[1]), None
+
+
+def _line(factors: NDArray[Any], length: int, channels: int) -> NDArray[Any]:
+    """Room for a row of sums, longer by what is looked at on each side, and by what loops take at once."""
+    return np.zeros(length + 2 * REACH * channels + AT_ONCE, dtype=factors.dtype)
 
 
 def given_back(
@@ -64,61 +162,72 @@ def given_back(
 
 
 @_compiled
-def sharpen_across(row, plain, line, channels, weights):  # type: ignore[no-untyped-def]
-    """A row of pixels filtered along itself; ``plain`` is room for the row in the type of the sums."""
-    length = len(row)
-    middle, near, far = weights[0], weights[1], weights[2]
-    for q in range(length):
-        plain[q] = row[q]
-    # Slices, as numbers that are subtracted might be negative for all that the compiler knows.
-    inner = length - 2 * REACH * channels
-    left2, left, here = plain, plain[channels:], plain[2 * channels :]
-    right, right2, found = plain[3 * channels :], plain[4 * channels :], line[2 * channels :]
-    for q in range(inner):
-        found[q] = middle * here[q] + near * (left[q] + right[q]) + far * (left2[q] + right2[q])
-    pixels = length // channels
-    for pixel in range(pixels):
-        if REACH <= pixel < pixels - REACH:
-            continue
-        for channel in range(channels):
-            last = length - channels + channel
-            q = pixel * channels + channel
-            line[q] = (
-                middle * plain[q]
-                + near * (plain[max(q - channels, channel)] + plain[min(q + channels, last)])
-                + far * (plain[max(q - 2 * channels, channel)] + plain[min(q + 2 * channels, last)])
-            )
-
-
-@_compiled
-def sharpen(view, kept, channels, weights, whole, lines):  # type: ignore[no-untyped-def]
-    """A view (rows, samples in a row) filtered along both axes.
+def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  # type: ignore[no-untyped-def]
+    """A part of each view filtered along both axes.
 
     Args:
-        view: (rows, samples in a row).
-        kept: where to write, likewise.
+        views: (v, u, rows, samples in a row).
+        others: the same, flat, where parts are taken: up to `AT_ONCE` numbers may then be written after the last,
+            as loops of short rows that have a rest take longer. None for whole views.
+        begin: (v,), the first row of the parts of a row of views; (u,), the first pixel of a row of the parts of a
+            column of views.
+        size: rows, and pixels in a row, of a part.
+        kept: where to write, flat, in the order (v, u, row, sample).
         channels: numbers a pixel.
         weights: (3,) of the type of the sums: of 8-bit samples int32 in 2⁻¹⁰, for which
             |Σ| ≤ 255·(1398 + 2·207 + 2·20)² < 2³⁰ for means; else real numbers.
         whole: True for 8-bit samples, whose sums are rounded to `KEPT_DIGITS` digits after the point; else None.
-        lines: room for six rows of sums.
+        line: room for a row of sums, longer by `REACH` pixels on each side and by `AT_ONCE` numbers.
     """
-    rows, half = len(view), 1 << (SHIFT - 1)
-    for r in range(-REACH, rows):
-        ahead = r + REACH
-        if ahead < rows:
-            sharpen_across(view[ahead], lines[5], lines[ahead % 5], channels, weights)
-        if r < 0:
-            continue
-        above2, above, here = lines[max(r - 2, 0) % 5], lines[max(r - 1, 0) % 5], lines[r % 5]
-        below, below2 = lines[min(r + 1, rows - 1) % 5], lines[min(r + 2, rows - 1) % 5]
-        middle, near, far = weights[0], weights[1], weights[2]
-        for q in range(view.shape[1]):
-            total = middle * here[q] + near * (above[q] + below[q]) + far * (above2[q] + below2[q])
-            if whole is None:  # told apart when compiled
-                kept[r, q] = total
-            else:
-                kept[r, q] = np.int32(total + half) >> SHIFT
+    _, nu, rows, row = views.shape
+    pixels, half, kind = row // channels, 1 << (SHIFT - 1), weights.dtype.type
+    middle, near, far = weights[0], weights[1], weights[2]
+    first_rows, first_columns = begin
+    length, per_line = size[1] * channels, LINE // views.itemsize
+    end, across = length + 2 * REACH * channels, length
+    if others is not None:
+        across = (length + AT_ONCE - 1) // AT_ONCE * AT_ONCE
+    # Slices, as numbers that are subtracted might be negative for all that the compiler knows.
+    left2, left1, here = line, line[channels:], line[2 * channels :]
+    right1, right2 = line[3 * channels :], line[4 * channels :]
+    for part in range(views.shape[0] * nu):
+        j, i = part // nu, part % nu
+        view, first, left = views[j, i], first_rows[j], first_columns[i]
+        low, high = max(left - REACH, 0), min(left + size[1] + REACH, pixels)
+        before, inner = (low - left + REACH) * channels, (high - low) * channels
+        sums, down = line[before:], inner
+        if others is not None:
+            down = (inner + AT_ONCE - 1) // AT_ONCE * AT_ONCE
+        for r in range(first, first + size[0]):
+            if others is not None and i + 1 < nu:  # the same row of the next part, which lies elsewhere
+                place = ((part + 1) * rows + r) * row + max(first_columns[i + 1] - REACH, 0) * channels
+                for q in range(place, place + inner + per_line, per_line):
+                    prefetch(others, q)
+            # Beyond a border its last samples go on.
+            lowest = min(r + 2, rows - 1)
+            above2, above, level = view[max(r - 2, 0)], view[max(r - 1, 0)], view[r]
+            below, below2 = view[min(r + 1, rows - 1)], view[lowest]
+            above2, above, level = above2[low * channels :], above[low * channels :], level[low * channels :]
+            below, below2 = below[low * channels :], below2[low * channels :]
+            if down > (rows - lowest) * row - low * channels:  # no more can be read
+                down = inner
+            for q in range(down):
+                sums[q] = (
+                    middle * kind(level[q])
+                    + near * (kind(above[q]) + kind(below[q]))
+                    + far * (kind(above2[q]) + kind(below2[q]))
+                )
+            for q in range(before):
+                line[q] = line[before + q % channels]
+            for q in range(before + inner, end):
+                line[q] = line[before + inner - channels + q % channels]
+            to = kept[(part * size[0] + r - first) * length :]
+            for q in range(across):
+                total = middle * here[q] + near * (left1[q] + right1[q]) + far * (left2[q] + right2[q])
+                if whole is None:  # told apart when compiled
+                    to[q] = total
+                else:
+                    to[q] = np.int32(total + half) >> SHIFT
 
 
 @_compiled

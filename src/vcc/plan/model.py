@@ -115,6 +115,11 @@ class Plan(Value, Shown):
             block = operator.block(block)
         return block
 
+    def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        """Which views of a light field of samples of a shape are looked at, (v, u); all where none is."""
+        used = self._of_views(self.core.used_views(self.shape(shape)))
+        return used if used.any() else np.ones(shape[:2], dtype=bool)
+
     def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
         """Which pixels of each view of a light field may be looked at.
 
@@ -124,10 +129,15 @@ class Plan(Value, Shown):
         Returns:
             The first, and the one after the last, of rows and of columns: (v, u, 2, 2).
         """
-        found = self.core.used_pixels(self.shape(shape))
+        found = self._of_views(self.core.used_pixels(self.shape(shape)))
         for operator in reversed(self.before):
             found = operator.made_of(found)
-        return np.clip(found, 0, np.array(shape[2:4])[:, None])
+        return np.asarray(np.clip(found, 0, np.array(shape[2:4])[:, None]))
+
+    def _of_views(self, found: Any) -> Any:
+        """What is found of views, (v, u, …), without the dark ones that are put beside them."""
+        (top, bottom), (left, right), *_ = self.beside
+        return found[top : found.shape[0] - bottom, left : found.shape[1] - right]
 
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
         """The type that samples of a NumPy type have in memory, and what a number of theirs stands for."""

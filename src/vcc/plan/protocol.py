@@ -185,6 +185,19 @@ class Engine(Protocol):
         """
         ...
 
+    def to_prepare(self, core: Any, before: Sequence[Any], values: Any) -> Any | None:
+        """What `rays` takes in place of samples that are prepared, and prepares itself where rays look at it.
+
+        Args:
+            core: what is traced.
+            before: operators before the core.
+            values: samples (v, u, t, s[, channels]), all of them.
+
+        Returns:
+            None where samples are to be prepared as a whole.
+        """
+        ...
+
     def prepared(self, before: Sequence[Any], values: Any, threads: int) -> Any:
         """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it."""
         ...

@@ -199,8 +199,8 @@ class Backwards:
         need, each = drive.need, self._kind.itemsize / drive.kind.itemsize
         times = (need.times if self._reads else 0.0) + each * (3 if self.plan.before else 1)
         fixed = need.fixed + 8 * math.prod(self.plan.core.raster_shape) * drive.channels
-        used = self.opened.core.used_views(drive.samples.grid.shape)
-        return cut_evenly(used, drive.samples.grid, replace(need, fixed=fixed, times=times), drive.limit)
+        used = self.opened.used_views(drive.samples.grid.shape)
+        return cut_evenly(used, drive.samples.grid, replace(need, fixed=fixed, times=times, bands=1), drive.limit)
 
     def _room(self) -> NDArray[Any] | None:
         """Where the derivative to samples is gathered; None where it comes as a whole."""

@@ -71,6 +71,8 @@ class Blocks:
     def words(self) -> str:
         """How many blocks there are of what."""
         count = sum(1 for _ in self)
+        if self.pixel_rows_each < self.pixel_rows and (self.rows_each, self.columns_each) != (1, 1):
+            return f"{count} blocks of up to {self.pixel_rows_each} rows of pixels of all views"
         if self.pixel_rows_each < self.pixel_rows:
             return f"{count} blocks of {self.pixel_rows_each} rows of pixels of a view"
         views = f"{self.rows_each}×{self.columns_each} views"
@@ -96,6 +98,7 @@ class Need:
         raster: bytes of a block's raster, in double precision.
         by_rays: whether all rays are traced for each block.
         readers: how many views are read at a time.
+        bands: into how many bands of rows of pixels the views may be cut so that most rays are traced for one.
     """
 
     fixed: int
@@ -105,6 +108,7 @@ class Need:
     raster: int
     by_rays: bool
     readers: int = 1
+    bands: int = 1
 
     @classmethod
     def of(cls, plan: Plan, grid: Grid, engine_memory: int, copies: bool) -> Need:
@@ -185,7 +189,8 @@ def cut_evenly(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) ->
     """Blocks to work on: those of `cut`, or by footprints smaller ones, so that many may have work at once.
 
     How many work does not count: the same blocks are the same picture, byte for byte. By rays blocks are as large
-    as may be, since all rays are traced for each.
+    as may be, since all rays are traced for each; or they are bands of rows of pixels of all views, where it is
+    known which rays look at them.
 
     Args:
         used: as for `cut`.
@@ -197,11 +202,25 @@ def cut_evenly(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) ->
         InputError: as `cut`.
     """
     if need.by_rays:
-        return cut(used, grid, need, limit)
+        return _in_bands(used, grid, need, limit) or cut(used, grid, need, limit)
     views = int(used.sum())
     # What comes of a block, its raster, is to be little beside it.
     each = max(views * need.view / SHARES, WORTH, 8.0 * need.raster, need.view)
     return cut(used, grid, need, min(limit, need.fixed + need.reading + need.times * each))
+
+
+def _in_bands(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks | None:
+    """Bands of rows of pixels of all views, as large as fit; None where all fit, or where too many are needed."""
+    _, _, nt, ns = grid.shape[:4]
+    rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
+    high, wide = rows[1] - rows[0], columns[1] - columns[0]
+    total, spare = high * wide * need.view, (limit - need.fixed - need.reading) / need.times
+    if spare <= 0:
+        return None
+    each = int(spare / total * nt)
+    if not 1 <= each < nt or math.ceil(nt / each) > need.bands:
+        return None
+    return Blocks(rows, columns, nt, ns, high, wide, each)
 
 
 def _span(used: Any) -> tuple[int, int]:

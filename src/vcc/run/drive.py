@@ -34,6 +34,7 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial, Room
+from vcc.plan.rays.model import Rays
 from vcc.run.blocks import SUMS, Blocks, Need, cut_evenly
 from vcc.run.executors import Tree, Work, crew, memory_of_task
 from vcc.run.needed import needed, needed_by_all
@@ -385,6 +386,8 @@ class Drive:
         need = Need.of(self.plan, self.samples.grid, taken, self.engine.copies)
         if self.plan.views_between is None:  # views made in between keep what they are made of
             need = need.with_readers(threads, self.limit)
+        if isinstance(self.plan.core, Rays) and self.name == "numba" and not any(map(any, self.plan.beside)):
+            need = replace(need, bands=self.plan.core.bands)
         return need if self.crew is None else need.with_sums()
 
     @cached_property
@@ -492,13 +495,23 @@ class Drive:
         core, run = self._core_and_run(beside)
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
-            return run(core, self.prepared, progress=progress)
+            return run(core, self.taken, progress=progress)
         return self._over_blocks(listed, beside, progress)
 
     def _core_and_run(self, beside: int) -> tuple[Core, Callable[..., Partial]]:
         """The core with so many rays beside those taken, and what runs it."""
         core = self.core.more(beside) if beside else self.core
         return core, partial(self.runner, beside=int(beside > 0), threads=self.threads)
+
+    @cached_property
+    def taken(self) -> Any:
+        """What the core is run on where all samples are in memory: `prepared`, which others may have made already,
+        or what rays prepare where they look at it."""
+        if self.plan.by_rays and "prepared" not in vars(self):
+            found = self.engine.to_prepare(self.core, self.plan.before, self.samples.whole())
+            if found is not None:
+                return found
+        return self.prepared
 
     @cached_property
     def prepared(self) -> Any:
@@ -508,14 +521,15 @@ class Drive:
     @cached_property
     def used(self) -> NDArray[np.bool_]:
         """Which views are looked at, (v, u)."""
-        return self.plan.core.used_views(self.samples.grid.shape)
+        return self.plan.used_views(self.samples.grid.shape)
 
     def takes(self) -> Any:
         """Which samples are read, and what is done with their blocks before they are looked at; None where that is
         another thing for each plan, or a matter of several rounds."""
         if self.in_memory or self.crew is not None or self.how.tolerance is not None or self.plan.views_between:
             return None
-        return self.samples, self.plan.before, self.plan.core.border, self.plan.by_rays, self.kind, self.limit
+        by_rays = self.need.bands if self.plan.by_rays else 0
+        return self.samples, self.plan.before, self.plan.core.border, by_rays, self.kind, self.limit
 
     @property
     def most_at_once(self) -> int:
@@ -535,7 +549,7 @@ class Drive:
     def looking_as(self, plan: Plan) -> Drive:
         """The same with all views read that another plan looks at."""
         made = copy(self)
-        made.used = plan.core.used_views(self.samples.grid.shape)
+        made.used = plan.used_views(self.samples.grid.shape)
         return made
 
     def used_in(self, block: Block) -> int:

@@ -65,7 +65,8 @@ def needed(plan: Plan, samples: Samples) -> tuple[Plan, Samples]:
     """A plan and samples, cut to the pixels that its picture needs: the picture stays as it is.
 
     Args:
-        plan: of pictures. By rays, which may look anywhere, and where views in between are made, it stays.
+        plan: of pictures. Where views in between are made, for a piece among dark samples, and by rays that may
+            look anywhere, it stays.
         samples: for which it is made. Those in memory stay.
     """
     (cut,), part = needed_by_all([plan], samples)
@@ -79,7 +80,7 @@ def needed_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan], 
         plans: as for `needed`; where one of them stays, all do.
         samples: likewise.
     """
-    if samples.whole() is not None or any(plan.by_rays or plan.views_between is not None for plan in plans):
+    if samples.whole() is not None or any(map(_stays, plans)):
         return list(plans), samples
     grid = samples.grid
     pixels = _of_any([plan.used_pixels(grid.shape) for plan in plans], grid.shape)
@@ -95,6 +96,11 @@ def needed_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan], 
     piece, _ = replace(grid, disparities=Disparities()).piece(block.slices)
     cut = [replace(plan, core=plan.core.part(plan.block(block)), grid_shape=piece.shape[:4]) for plan in plans]
     return cut, Needed(samples, block, pixels, piece)
+
+
+def _stays(plan: Plan) -> bool:
+    """Whether a plan is for the light field as it is, as what is done to it before depends on where it ends."""
+    return plan.views_between is not None or any(map(any, plan.beside))
 
 
 def _of_any(several: Sequence[NDArray[np.intp]], shape: tuple[int, ...]) -> NDArray[np.intp]:

@@ -24,11 +24,16 @@ from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.plan.protocol import BackRunner, Engine, Runner
 from vcc.plan.rays.points import DIGITS, TABLE, hashed
+from vcc.plan.rays.reach import Reach, index_from_sensor
 from vcc.plan.rays.steps import Bundle, Move, Packer, Step
-from vcc.plan.rays.windows import Aim, CellWindows
+from vcc.plan.rays.windows import Aim, CellWindows, Window
 
 Array = NDArray[np.float64]
 Cell = tuple[NDArray[np.int64], NDArray[np.int64]]
+
+
+LEAST_ROWS = 8
+"""Rows of pixels that a band of the views has at least: at its borders rays are traced for two bands."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,13 +107,52 @@ class Rays(Value):
         """With so many rays a pixel, to be taken beside as many that there are."""
         return replace(self, samples=samples)
 
+    @property
+    def reach(self) -> Reach | None:
+        """How far rays reach, where all that they meet is affine and x and y do not mix; else None."""
+        matrix = index_from_sensor(self.aim, self.steps, self.index_from_ray, self.motion)
+        if matrix is None:
+            return None
+        assert isinstance(self.aim, Window)
+        pixels = self.first_pixel, self.pitch, self.sensitive, self.raster_shape
+        return Reach(matrix, self.aim, self.motion, *pixels)
+
     def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """All views may be looked at."""
-        return np.ones(shape[:2], dtype=bool)
+        """Those between which rays pass, where that is known; all, too, where none is."""
+        used = np.ones(shape[:2], dtype=bool)
+        if (reach := self.reach) is not None:
+            (left, right), (top, bottom) = reach.views(0), reach.views(1)
+            row, column = np.arange(shape[0])[:, None], np.arange(shape[1])
+            used = (row > top - 1) & (row < bottom + 1) & (column > left - 1) & (column < right + 1)
+        return used if used.any() else np.ones(shape[:2], dtype=bool)
 
     def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
-        """All pixels may be looked at."""
-        return np.broadcast_to(np.array([[0, shape[2]], [0, shape[3]]]), (*shape[:2], 2, 2))
+        """Those between which rays look views up, where that is known, or else all."""
+        pixels = np.zeros((*shape[:2], 2, 2), dtype=np.intp)
+        pixels[..., 1] = shape[2:4]
+        if (reach := self.reach) is not None:
+            for n, axis in enumerate((1, 0)):  # rows, columns
+                one, other = np.array([0]), np.array([self.raster_shape[1 - axis] - 1])
+                found = reach.samples(axis, one, other, shape[n])
+                if found is not None:
+                    ends = np.clip(np.floor(np.concatenate(found)), -1, shape[2 + n]).astype(np.intp)
+                    ends = np.stack([ends[0], ends[1] + 2], axis=-1)
+                    pixels[:, :, n] = ends[:, None] if axis == 1 else ends
+            pixels[~self.used_views(shape)] = 0
+        return pixels
+
+    @property
+    def bands(self) -> int:
+        """Into how many bands of rows of pixels the views may be cut, each of which a part of the rays looks at; 1
+        where that is not known."""
+        if (reach := self.reach) is None:
+            return 1
+        row = np.array([0, self.raster_shape[0] - 1])
+        found = reach.samples(1, row, row, self.views[0])
+        if found is None:
+            return 1
+        spread = float((found[1].max(axis=1) - found[0].min(axis=1)).max())
+        return max(int(self.views[2] / max(2 * spread, LEAST_ROWS)), 1)
 
     @property
     def rays(self) -> int:

@@ -18,6 +18,14 @@ SCRAMBLES = 16
 """Parts of the table that are scrambled each by itself, so that a picture's pixels sample many scramblings."""
 FIRST_COLUMNS = 4
 """Columns of the table that every plan has: place in the pixel (x, y), place in the aim (x, y)."""
+BITS = TABLE.bit_length() - 1
+"""Binary digits by which the points of the table differ before they are scrambled."""
+DIRECTIONS = (
+    (0, 1), (1, 1, 3), (1, 1, 3, 1), (2, 1, 1, 1), (1, 1, 1, 3, 3), (4, 1, 3, 5, 13), (2, 1, 1, 5, 5, 17),
+    (4, 1, 1, 5, 5, 5), (7, 1, 1, 7, 11, 19),
+)  # fmt: skip
+"""Of each dimension after the first: the inner coefficients of its primitive polynomial, and its first direction
+numbers, by Joe and Kuo (new-joe-kuo-6.21201)."""
 DIGITS = 24
 """Binary digits of a point: as many as float32 holds of numbers below 1."""
 
@@ -76,11 +84,9 @@ def _sobol(dimensions: int, seed: int) -> Array:
     one draw of them all pixels' halves differ by more or less than their means err. A picture's estimate of its
     error was then off by a factor of 1.7 now and then. Each of `SCRAMBLES` parts has a scrambling of its own.
     """
-    from scipy.stats import qmc
-
     each = TABLE // SCRAMBLES
     depth = each.bit_length() - 1  # digits in which the points of a part differ
-    plain = (qmc.Sobol(dimensions, scramble=False).random(TABLE) * each).astype(np.int64)
+    plain = _plain(dimensions) >> (BITS - depth)
     generator = np.random.default_rng(seed)
     points = np.empty((TABLE, dimensions))
     rest = DIGITS - depth  # no two points of a part share all digits so far
@@ -94,6 +100,32 @@ def _sobol(dimensions: int, seed: int) -> Array:
             later = generator.integers(0, 2**rest, each)
             points[part, column] = (scrambled[plain[part, column]] * 2**rest + later) * 2.0**-DIGITS
     points.flags.writeable = False
+    return points
+
+
+def _plain(dimensions: int) -> NDArray[np.int64]:
+    """`TABLE` points of the unscrambled sequence in the order of Gray's code, (`TABLE`, dimensions), in 2⁻¹⁶.
+
+    By the direction numbers of Joe and Kuo (2008), as SciPy has them, which takes longer to load than to compute
+    with: it is asked only for more dimensions than stand here.
+    """
+    if dimensions > 1 + len(DIRECTIONS):
+        from scipy.stats import qmc
+
+        return np.asarray(qmc.Sobol(dimensions, scramble=False).random(TABLE) * TABLE).astype(np.int64)
+    number = np.arange(TABLE)
+    gray = number ^ (number >> 1)
+    points = np.zeros((TABLE, dimensions), dtype=np.int64)
+    for column, (polynomial, *odd) in enumerate([(0,), *DIRECTIONS][:dimensions]):
+        degree = len(odd)
+        found = odd + [1] * (BITS if degree == 0 else 0)
+        while len(found) < BITS:
+            following = found[-degree] << degree ^ found[-degree]
+            for n in range(1, degree):
+                following ^= (polynomial >> (degree - 1 - n) & 1) * (found[-n] << n)
+            found.append(following)
+        for bit in range(BITS):
+            points[:, column] ^= (gray >> bit & 1) * (found[bit] << (BITS - 1 - bit))
     return points
 
 
