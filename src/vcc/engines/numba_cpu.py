@@ -35,6 +35,8 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.protocol import Gradient, Partial
 from vcc.plan.rays.model import Rays
 
+LONG = 256
+"""Weights of a filter along the axes from which on Fourier transforms are faster than the compiled pass."""
 SMALL = 2**17
 """Numbers of a picture below which filtering it takes less time than starting threads for it."""
 
@@ -192,7 +194,7 @@ def finished(after: Sequence[operators.After], raster: NDArray[Any], threads: in
         case []:
             return np.asarray(raster, dtype=np.float32)
         case [operators.AlongAxes() as along, operators.OnSensor() as on] if (
-            on.detail is None and max(len(along.down), len(along.across)) < operators.LONG
+            on.detail is None and max(len(along.down), len(along.across)) < LONG
         ):
             return _in_one_pass(along, on, np.asarray(raster, dtype=np.float32), threads)
         case merged:

@@ -67,8 +67,8 @@ class Geometry(Brief):
         sensor: (rows, columns) of pixels.
         margin: pixels around the sensor from which light is brought in.
         parts: of samples, along each axis, that their shape on the sensor asks for, see `parts_of_sheared`.
-        beyond: (before, after) along rows and columns of samples: how many more the light field has there that this
-            is a piece of. All its pieces are divided as the whole is.
+        beyond: (before, after) along rows and columns of samples: how many more the light field has there
+            that this is a piece of. All its pieces are divided as the whole is.
     """
 
     views: tuple[int, int]
