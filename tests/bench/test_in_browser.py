@@ -72,6 +72,28 @@ def test_of_a_hundred_moves_at_once_one_is_sent_and_after_its_picture_the_last(p
     assert page.page.evaluate("document.querySelector('vcc-bench').bench.turn") == sent[1] + 1
 
 
+def test_what_is_too_large_to_be_sent_is_named_and_the_bench_goes_on(page):
+    words = page.page.evaluate(
+        """() => {
+            const { bench } = document.querySelector("vcc-bench");
+            const where = ["elements", 0, "pattern"];
+            bench.act({ do: "upload", where, name: "leaf.png" }, [new ArrayBuffer(1.5 * 2 ** 20)]);
+            const upload = bench.refused.words;
+            bench.act({ do: "hello", document: { camera: "x".repeat(2 ** 20) } });
+            return [upload, bench.refused.words];
+        }"""
+    )
+    assert "leaf.png has 1.5 MiB, and a bench takes up to 1 MiB" in words[0]
+    assert "camera file has 1.0 MiB" in words[1]
+    page.settle()
+    assert page.page.locator(".toast.error").count() == 1
+    # The connection stands: the server answers what follows, and has the camera of before.
+    assert page.page.evaluate("document.querySelector('vcc-bench').bench.open")
+    page.page.evaluate("document.querySelector('vcc-bench').bench.set(['sensor', 'z'], '51 mm')")
+    page.wait_for_place("sensor", "51 mm")
+    page.settle()
+
+
 def test_drag_is_pulled_to_where_the_scene_is_sharp(page):
     x, y = page.middle("sensor")
     page.page.mouse.move(x, y)

@@ -1,5 +1,7 @@
 """Shares of samples on pixels: they integrate the footprint, and they sum to one both ways."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -72,3 +74,17 @@ def test_dividing_samples_only_spreads_their_light(interpolation, refine):
     assert np.allclose(matrix.sum(axis=0), 1, atol=1e-12)
     place = division.start + np.arange(len(matrix)) / refine
     assert np.allclose(matrix.T @ place, np.arange(9), atol=1e-12)  # around where it was
+
+
+def test_a_side_of_many_pixels_takes_little_more_than_its_table():
+    pixels = 200_000
+    tracemalloc.start()
+    found = taps("spline", np.arange(5.0), 5.26, 64, pixels)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    kept = found.first.nbytes + found.weights.nbytes
+    assert peak < 3 * kept  # the table, and two whole numbers a pixel; as one piece it took eight times the table
+    some = slice(0, 2**14 + 7)
+    few = taps("spline", np.arange(5.0), 5.26, 64, some.stop)
+    np.testing.assert_array_equal(few.first, found.first[:, some])
+    np.testing.assert_array_equal(few.weights, found.weights[:, some, : few.weights.shape[-1]])

@@ -1,6 +1,6 @@
 /** What carries messages: a WebSocket of the server, or the model of a notebook's widget. */
 
-import type { FromHost } from "./protocol";
+import type { FromHost, Where } from "./protocol";
 
 /** A message goes as JSON, its arrays of bytes beside it. */
 export interface Host {
@@ -43,8 +43,13 @@ export function unpacked(frame: ArrayBuffer): { message: FromHost; buffers: Data
   return { message, buffers };
 }
 
+/** What the server takes of one message, bytes: `LARGEST_MESSAGE` of vcc/bench/server.py, which closes at more. */
+const LARGEST_MESSAGE = 2 ** 20;
 const FIRST_WAIT = 300;
 const LONGEST_WAIT = 3000;
+
+/** What is read of a message that is not sent. */
+type Sent = { do: string; turn?: number; where?: Where | null; name?: string };
 
 /** Connects to the server, and again whenever it was lost, a little later each time. */
 export class SocketHost implements Host {
@@ -86,7 +91,20 @@ export class SocketHost implements Host {
   }
 
   send(message: object, buffers: ArrayBuffer[] = []): void {
-    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(packed(message, buffers));
+    if (this.socket?.readyState !== WebSocket.OPEN) return;
+    const frame = packed(message, buffers);
+    if (frame.byteLength <= LARGEST_MESSAGE) this.socket.send(frame);
+    else this.refuse(message as Sent, frame.byteLength);
+  }
+
+  /** Say what is too large; a greeting goes without its document, so that the bench goes on with what the server has. */
+  private refuse(message: Sent, bytes: number): void {
+    const greets = message.do === "hello";
+    const what = greets ? "the camera file" : message.do === "upload" ? `the file ${message.name ?? ""}`.trim() : "what was to be sent";
+    const end = greets ? "the bench shows the server's" : "nothing was changed: make it smaller, or name the file in the camera file that the bench is started with";
+    const words = `${what} has ${(bytes / 2 ** 20).toFixed(1)} MiB, and a bench takes up to ${LARGEST_MESSAGE / 2 ** 20} MiB at once; ${end}`;
+    this.onmessage({ is: "refused", words, where: message.where ?? null, do: message.do, turn: message.turn }, []);
+    if (greets) this.send({ ...message, document: undefined });
   }
 
   close(): void {

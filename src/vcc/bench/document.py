@@ -22,6 +22,8 @@ Step = str | int
 
 MOST_PIXELS = 2**22
 """Of a sensor on a bench: more would keep its memory and its user waiting."""
+MOST_ALONG_A_SIDE = 2**14
+"""Pixels; tables of one side take some kilobytes a pixel."""
 MOST_CELLS = 2**20
 """Of a mask that is asked for by name and size."""
 MOST_QUANTITIES = 120
@@ -274,6 +276,11 @@ def _check_sizes(tree: Any, place: str) -> None:
             _check_sizes(each, f"{place}: {key}")
         shape = tree.get("shape")
         counts = shape if isinstance(shape, list) and all(type(each) is int and each > 0 for each in shape) else []
+        if max(counts, default=0) > MOST_ALONG_A_SIDE:
+            raise InputError(
+                f"{place}: shape is {shown(shape)}, and a side on a bench has up to {MOST_ALONG_A_SIDE} pixels: take "
+                "fewer; a picture of more is what vcc capture makes"
+            )
         if math.prod(counts) > MOST_PIXELS:
             raise InputError(
                 f"{place}: shape is {shown(shape)}, and a bench shows up to {MOST_PIXELS} pixels: take fewer and "

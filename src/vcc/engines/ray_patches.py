@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.reach import Reach
 
@@ -24,8 +25,8 @@ MOST = 3
 """How many times each sample is filtered, at most, where tiles look at the same ones."""
 
 
-@dataclass(frozen=True, eq=False)
-class Patches:
+@dataclass(frozen=True, eq=False, repr=False)
+class Patches(Brief):
     """What tiles of pixels look at.
 
     Args:

@@ -189,6 +189,10 @@ class Taps(Brief):
         return Taps(np.minimum(first, pixels - 1).reshape(shape), weights.reshape(*shape, -1))
 
 
+PIXELS_AT_ONCE = 2**14
+"""Whose shares are worked out together."""
+
+
 def taps(
     interpolation: str,
     origin: Array,
@@ -211,19 +215,23 @@ def taps(
     """
     size = abs(step)
     reach = reach_in_pixels(interpolation, size)
-    pixel = np.arange(pixels, dtype=np.float64)
-    middle = (pixel - np.asarray(origin, dtype=np.float64)[..., None]) / step
-    low = np.clip(np.ceil(middle - reach / size), 0, samples)
-    high = np.clip(np.floor(middle + reach / size), -1, samples - 1)
-    first = low.astype(np.int64)
-    count = np.maximum(high.astype(np.int64) - first + 1, 0)
+    origin = np.asarray(origin, dtype=np.float64)
+    # Piece by piece: a side of many pixels takes no more memory on the way than its table does.
+    pieces = [slice(start, min(start + PIXELS_AT_ONCE, pixels)) for start in range(0, pixels, PIXELS_AT_ONCE)]
+    first, count = (np.empty((*origin.shape, pixels), dtype=np.int64) for _ in range(2))
+    for piece in pieces:
+        middle = (np.arange(piece.start, piece.stop, dtype=np.float64) - origin[..., None]) / step
+        first[..., piece] = np.clip(np.ceil(middle - reach / size), 0, samples)
+        high = np.clip(np.floor(middle + reach / size), -1, samples - 1)
+        count[..., piece] = np.maximum(high.astype(np.int64) - first[..., piece] + 1, 0)
     width = max(int(count.max(initial=0)), 1)
-    index = first[..., None] + np.arange(width)
-    position = np.asarray(origin)[..., None, None] + step * index
-    table = shares(interpolation, pixel[:, None], position, step, opening)
-    table = np.where(np.arange(width) < count[..., None], table, 0.0)
-    first = np.minimum(first, samples - 1)
-    return Taps(first, np.ascontiguousarray(table, dtype=kind))
+    table = np.empty((*origin.shape, pixels, width), dtype=kind)
+    for piece in pieces:
+        pixel = np.arange(piece.start, piece.stop, dtype=np.float64)
+        position = origin[..., None, None] + step * (first[..., piece, None] + np.arange(width))
+        found = shares(interpolation, pixel[:, None], position, step, opening)
+        table[..., piece, :] = np.where(np.arange(width) < count[..., piece, None], found, 0.0)
+    return Taps(np.minimum(first, samples - 1), table)
 
 
 @dataclass(frozen=True, repr=False)
