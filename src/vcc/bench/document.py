@@ -278,8 +278,8 @@ def _check_sizes(tree: Any, place: str) -> None:
         counts = shape if isinstance(shape, list) and all(type(each) is int and each > 0 for each in shape) else []
         if max(counts, default=0) > MOST_ALONG_A_SIDE:
             raise InputError(
-                f"{place}: shape is {shown(shape)}, and a side on a bench has up to {MOST_ALONG_A_SIDE} pixels: take "
-                "fewer; a picture of more is what vcc capture makes"
+                f"{place}: shape is {shown(shape)}, and a side on a bench has up to {MOST_ALONG_A_SIDE} pixels: "
+                "take fewer; a picture of more is what vcc capture makes"
             )
         if math.prod(counts) > MOST_PIXELS:
             raise InputError(
