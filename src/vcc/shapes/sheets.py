@@ -140,7 +140,7 @@ class Tiles(Brief, Pattern):
         else:
             at = partial(bilinear, self._integral)
             content = at(bottom, right) - at(bottom, left) - at(top, right) + at(top, left)
-        return np.clip(content / (width * height), 0.0, None)
+        return np.asarray(np.clip(content / (width * height), 0.0, None))
 
     @cached_property
     def _integral(self) -> Array:
