@@ -14,12 +14,17 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import short
+from vcc.shapes.patterns import is_grid
 from vcc.shapes.surface import Array, Surface, places
 
 ROWS_AT_ONCE = 16
 """Of a grid of places: what is computed of some hundred columns stays in the cache."""
 PLACES_AT_ONCE = 4096
 """Likewise."""
+LARGE_GRID = 4
+"""Times as many places as fix a polynomial: on larger grids it is interpolated."""
+ROUNDING = 1e-8
+"""Of slopes in the disc, that interpolation may round."""
 
 Waves = NDArray[np.complex128]
 
@@ -94,7 +99,10 @@ class Zernike(Surface):
         return self._in_pieces(path, 1, x, y)[0]
 
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """The sum of the terms' gradients, in closed form."""
+        """The sum of the terms' gradients, in closed form; on large grids by interpolation that is as exact."""
+        across, down = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        if is_grid(across, down) and self._interpolates(across, down):
+            return self._interpolated(across, down)
         sums = self._by_frequency
 
         def slopes(w: Waves, argument: Array) -> tuple[Array, Array]:
@@ -111,6 +119,38 @@ class Zernike(Surface):
 
         s, t = self._in_pieces(slopes, 2, x, y)
         return s / (self.diameter / 2), t / (self.diameter / 2)
+
+    @property
+    def _order(self) -> int:
+        """The degree of the polynomials in x and y."""
+        return max((noll(j)[0] for j, _ in self._terms), default=0)
+
+    def _interpolates(self, x: Array, y: Array) -> bool:
+        """Whether a polynomial through few places gives all of a grid, to `ROUNDING` of what it is in the disc.
+
+        Beyond the disc terms of order n grow as (ρ + √(ρ² − 1))ⁿ, and what is rounded there is rounded everywhere.
+        """
+        if x.size * y.size < LARGE_GRID * (self._order + 1) ** 2:
+            return False
+        farthest = max(float(np.hypot(np.abs(x).max(), np.abs(y).max())) / (self.diameter / 2), 1.0)
+        growth = self._order * math.log(farthest + math.sqrt(farthest**2 - 1))
+        return growth < math.log(ROUNDING / np.finfo(np.float64).eps)
+
+    def _interpolated(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """The slopes on a grid, by Chebyshev polynomials through as many places as fix them."""
+        from numpy.polynomial.chebyshev import chebvander
+
+        degree = max(self._order - 1, 0)
+        nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
+        fixed = np.linalg.inv(chebvander(nodes, degree))
+        places_at, weights = [], []
+        for each in (x.reshape(-1), y.reshape(-1)):
+            middle, half = (each.max() + each.min()) / 2, max((each.max() - each.min()) / 2, np.finfo(float).tiny)
+            places_at.append(middle + half * nodes)
+            weights.append(chebvander((each - middle) / half, degree) @ fixed)
+        at_nodes = self.slopes(*np.meshgrid(*places_at))
+        across, down = weights
+        return down @ at_nodes[0] @ across.T, down @ at_nodes[1] @ across.T
 
     @property
     def _by_frequency(self) -> list[NDArray[np.complex128]]:
