@@ -1,4 +1,4 @@
-"""Zernike surfaces on large grids: few places fix the polynomials, and those evaluated one by one are the oracle."""
+"""Zernike surfaces on large grids: few places fix the polynomials; those evaluated one by one are the oracle."""
 
 import numpy as np
 import pytest
