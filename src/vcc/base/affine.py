@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base import checks
 from vcc.base.errors import InputError
 
+MANY = 2**14
+"""Numbers of points from which on they are mapped without threads."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Affine:
@@ -208,7 +211,13 @@ class Affine:
 
     def __call__(self, points: ArrayLike | Sequence[float]) -> NDArray[np.float64]:
         """Rays or points as rows of an array (…, n), mapped."""
-        return np.asarray(points, dtype=np.float64) @ self.linear.T + self.offset
+        given = np.asarray(points, dtype=np.float64)
+        if given.size < MANY:
+            return np.asarray(given @ self.linear.T + self.offset)
+        # Threads of BLAS cost more than such narrow products take, and wait for one another on a busy machine.
+        mapped = np.einsum("...j,ij->...i", given, self.linear)
+        mapped += self.offset
+        return np.asarray(mapped)
 
     def isclose(self, other: Affine, tolerance: float = 1e-9) -> bool:
         """Whether every entry agrees within ``tolerance``, relative to the larger entry or 1."""
