@@ -102,7 +102,7 @@ class Decoding:
     """What a session has decoded last."""
 
     def __init__(self) -> None:
-        self._calibrated: tuple[Hashable, Image] | None = None
+        self._calibrated: tuple[Hashable, Image, tuple[str, ...]] | None = None
         self._decoded: Decoded | None = None
 
     def answer(self, message: Json, asked: Asked) -> Answer:
@@ -143,11 +143,14 @@ class Decoding:
         with asked.turn() as progress:
             if self._calibrated is None or self._calibrated[0] != asked.of:
                 self._calibrated = None  # not two of them at once
-                self._calibrated = asked.of, decoder.calibration(asked.light_field, progress)
+                with warnings.catch_warnings(record=True) as of_white:
+                    warnings.simplefilter("always")
+                    found = decoder.calibration(asked.light_field, progress)
+                self._calibrated = asked.of, found, tuple(f"calibration: {each.message}" for each in of_white)
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
                 views = decoder.decoded(recording, self._calibrated[1], progress)
-        remarks = tuple(dict.fromkeys(str(each.message) for each in caught))
+        remarks = tuple(dict.fromkeys((*self._calibrated[2], *(str(each.message) for each in caught))))
         white = white_of(np.asarray(views.values).reshape(-1, *views.shape[3:]))
         return Decoded((asked.of, asked.noise), decoder, views, white, remarks)
 
