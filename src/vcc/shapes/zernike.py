@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
@@ -138,8 +139,6 @@ class Zernike(Surface):
 
     def _interpolated(self, x: Array, y: Array) -> tuple[Array, Array]:
         """The slopes on a grid, by Chebyshev polynomials through as many places as fix them."""
-        from numpy.polynomial.chebyshev import chebvander
-
         degree = max(self._order - 1, 0)
         nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
         fixed = np.linalg.inv(chebvander(nodes, degree))

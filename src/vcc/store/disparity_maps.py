@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from vcc.base.errors import InputError
+from vcc.base.reading import MOST_UNPACKED, check_file
 from vcc.base.workers import uninterrupted
 from vcc.fields.disparity import DisparityMaps
 from vcc.files.parts import clear_leftovers, part_of
+from vcc.store.zarr_chunks import check_size, read_array
 
 FOLDER = "disparity"
 """The name of the array in the group."""
@@ -34,14 +36,20 @@ def read_maps(store: Path, shape: tuple[int, ...]) -> DisparityMaps | None:
     import zarr
 
     try:
+        check_file(folder / "zarr.json")
+        check_size(folder / "zarr.json", MOST_UNPACKED)
         array = zarr.open_array(store=zarr.storage.LocalStore(folder, read_only=True), mode="r")
-        values = np.asarray(array[:], dtype=np.float32)
+        (rows, columns), views_of_all = shape[2:4], shape[0] * shape[1]
+        if tuple(array.shape[1:]) != (rows, columns) or not 0 < array.shape[0] <= views_of_all:
+            raise ValueError(f"maps of shape {tuple(array.shape)} for {views_of_all} views of {rows}×{columns}")
+        if tuple(array.chunks) != (1, rows, columns) or array.dtype != np.float32:
+            raise ValueError(f"chunks of {tuple(array.chunks)} {array.dtype}, where each map is one of float32")
+        places = [(number,) for number in range(array.shape[0])]
+        values = np.asarray(read_array(folder, array, slice(None), places, "disparity maps"))
         stated: Any = array.attrs["views"]
         views = tuple((float(row), float(column)) for row, column in stated)
         unmatched: Any = array.attrs.get("unmatched", 0.0)  # stores of before have none
         maps = DisparityMaps(values, views, str(array.attrs["source"]), unmatched=float(unmatched))
-        if values.shape[1:] != tuple(shape[2:4]):
-            raise ValueError(f"maps of {values.shape[1:]} pixels for views of {tuple(shape[2:4])}")
     except Exception as error:
         raise InputError(
             f"the disparities in {folder} cannot be used: {error}. Delete this folder, and they are found again"

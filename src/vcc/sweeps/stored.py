@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +12,9 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.reading import MOST_UNPACKED, check_file, reading
+from vcc.store.zarr_chunks import check_size, chunk_file, read_array
 
-HEADS = 2**12
-"""Bytes by which a chunk that cannot be packed may exceed its samples, beside one in 128: heads and checksums."""
+SWEEP = "an array of a sweep"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +72,7 @@ class StoredPictures:
                 raise InputError(f"the picture at {places[0]} is missing: there is no file {file}")
         else:
             places = list(np.ndindex(*self.shape[: self.axes]))
-        return read_array(self.folder, self.array, index, places)
-
-
-def chunk_file(folder: Path, array: Any, place: tuple[int, ...]) -> Path:
-    """The file of a chunk, given by its place along the first axes; along the others there is one chunk."""
-    rest = (0,) * (len(array.shape) - len(place))
-    return folder / str(array.metadata.encode_chunk_key((*place, *rest)))
+        return read_array(self.folder, self.array, index, places, SWEEP)
 
 
 def member(folder: Path, group: Any, name: str) -> Any:
@@ -90,8 +83,8 @@ def member(folder: Path, group: Any, name: str) -> Any:
     """
     where = folder / name / "zarr.json"
     check_file(where)
-    _check_size(where, MOST_UNPACKED)
-    with reading(where, "an array of a sweep"):
+    check_size(where, MOST_UNPACKED)
+    with reading(where, SWEEP):
         return group[name]
 
 
@@ -108,34 +101,10 @@ def small(folder: Path, group: Any, name: str, *shapes: tuple[int, ...]) -> NDAr
         InputError: as `member`; another shape; a file that is damaged or larger than the array can be.
     """
     array = member(folder, group, name)
-    with reading(folder / name, "an array of a sweep"):
+    with reading(folder / name, SWEEP):
         if tuple(array.shape) not in shapes or tuple(array.chunks) != tuple(array.shape):
             raise InputError(
                 f"{folder / name} has the shape {tuple(array.shape)} in chunks of {tuple(array.chunks)}, and the "
                 f"sweep's parameters ask for {' or '.join(map(str, shapes))} in one chunk"
             )
-    return read_array(folder / name, array, ..., [()])
-
-
-def read_array(folder: Path, array: Any, index: Any, places: list[tuple[int, ...]]) -> NDArray[Any]:
-    """A part of a Zarr array, whose chunks are looked at before they are read.
-
-    Raises:
-        InputError: a chunk that is no regular file, larger than it can be, or damaged.
-    """
-    with reading(folder, "an array of a sweep"):
-        kind = np.dtype(array.dtype)
-        size = math.prod(array.chunks) * kind.itemsize
-        most = size + size // 128 + HEADS if kind.kind in "bfiu" else MOST_UNPACKED
-        for place in places:
-            file = chunk_file(folder, array, place)
-            if file.exists():
-                check_file(file)
-                _check_size(file, most)
-        return np.asarray(array[index])
-
-
-def _check_size(file: Path, most: int) -> None:
-    size = file.stat().st_size
-    if size > most:
-        raise InputError(f"{file} has {size:,} bytes, and at most {most:,} can be right: it is damaged")
+    return read_array(folder / name, array, ..., [()], SWEEP)
