@@ -67,3 +67,17 @@ def test_a_smooth_mask_behind_a_rim_anywhere_meets_its_integral(views, z):
     error = np.sqrt(np.mean((image - expected) ** 2)) / expected.max()
     assert -20 * math.log10(error) >= 60
     assert image.mean() == pytest.approx(expected.mean(), rel=1e-3)
+
+
+def test_samples_that_lie_turned_are_divided_whatever_more_is_asked_for():
+    frame = np.eye(5)
+    turn = np.array([[math.cos(0.6), -math.sin(0.6)], [math.sin(0.6), math.cos(0.6)]])
+    frame[:2, :2], frame[2:4, 2:4] = turn * mm, turn * 2e-3
+    frame[:4, 4] = -frame[:4, :4] @ np.array([2, 2, 19.5, 19.5])
+    values = np.random.default_rng(3).random((5, 5, 40, 40), np.float32)
+    field = vcc.LightField(values, vcc.Affine(frame), disparity_range=(-0.5, 0.5))
+    camera = vcc.Camera([vcc.Lens(FOCAL_LENGTH, diameter=4 * mm)], vcc.Sensor(51 * mm, (24, 24), 0.1 * mm))
+    assert "samples divided 2×2: they lie turned on the sensor" in camera.explain(field)
+    image = camera.capture(field)
+    np.testing.assert_array_equal(image.values, camera.capture(field, refine=8).values)
+    assert "samples divided" not in camera.explain(field, refine=1)

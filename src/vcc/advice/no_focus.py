@@ -14,8 +14,9 @@ from vcc.advice.view_gaps import ROUNDING
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.fields.grid import Grid
+from vcc.optics.faces import Faces
 from vcc.optics.focusing import bends
-from vcc.optics.train import Stage, Train
+from vcc.optics.train import Train
 
 AS_A_PINHOLE = 0.1
 """Of the sensor's shorter side: a point whose light covers less of it shows as the image of a pinhole."""
@@ -32,11 +33,12 @@ def no_image(train: Train, grid: Grid) -> str:
         grid: of the light field, which bounds the light where no stop does.
     """
     bending = [element for element in train.elements if bends(element)]
-    if not bending or any(_codes(stage) for stage in train.stages):
+    faces = [stage.faces for stage in train.stages]
+    if not bending or any(each.bending is not None or each.spread is not None for each in faces):
         return ""
     behind = max(element.z + element.length for element in train.elements if element.length or element in bending)
     rays = train.rays_at(behind).linear
-    if _focuses(rays):
+    if _focuses(rays) or any(map(_has_detail, faces)):  # detail is looked for cell by cell: last
         return ""
     optics, power = Folded(train, grid, None), -float(rays[2, 0])
     covered = (
@@ -45,8 +47,10 @@ def no_image(train: Train, grid: Grid) -> str:
     height, width = train.sensor.size
     if covered is not None and covered < AS_A_PINHOLE * min(height, width):
         return ""
-    size = "" if covered is None else f": that of a distant point over {short(covered, digits=2)} of the sensor's "
-    size += "" if covered is None else f"{short(width, digits=3)} × {short(height, digits=3)}"
+    size = ""
+    if covered is not None:
+        sensor = f"{short(width, digits=3)} × {short(height, digits=3)}"
+        size = f": that of a distant point over {short(covered, digits=2)} of the sensor's {sensor}"
     which = f"{bending[0].label} diverges" if len(bending) == 1 else "its lenses together diverge"
     focal = f"a focal length of {short(1 / power)}" if power else "no power"
     way_out = f" (was {short(-1 / power)} meant?)" if power and len(bending) == 1 else ""
@@ -78,11 +82,8 @@ def why_unfocused(optics: Folded) -> str:
     )
 
 
-def _codes(stage: Stage) -> bool:
-    """Whether a stage does more than lenses, prisms and plain openings do."""
-    faces = stage.faces
-    if faces.bending is not None or faces.spread is not None:
-        return True
+def _has_detail(faces: Faces) -> bool:
+    """Whether what stands there absorbs otherwise than plain openings do."""
     try:
         return faces.pattern is not None and finest_detail(faces.pattern) is not None
     except InputError:

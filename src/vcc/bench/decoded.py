@@ -20,7 +20,7 @@ import warnings
 from collections.abc import Callable, Hashable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from vcc.recover import Decoder, refocused
 
 Json = dict[str, Any]
 Answer = tuple[Json, list[bytes]]
+Result = TypeVar("Result")
 
 QUESTIONS = ("decoded", "refocused")
 MOST_ACROSS = 11
@@ -143,16 +144,20 @@ class Decoding:
         with asked.turn() as progress:
             if self._calibrated is None or self._calibrated[0] != asked.of:
                 self._calibrated = None  # not two of them at once
-                with warnings.catch_warnings(record=True) as of_white:
-                    warnings.simplefilter("always")
-                    found = decoder.calibration(asked.light_field, progress)
-                self._calibrated = asked.of, found, tuple(f"calibration: {each.message}" for each in of_white)
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
-                views = decoder.decoded(recording, self._calibrated[1], progress)
-        remarks = tuple(dict.fromkeys((*self._calibrated[2], *(str(each.message) for each in caught))))
+                found, warned = _with_warnings(decoder.calibration, asked.light_field, progress)
+                self._calibrated = asked.of, found, tuple(f"calibration: {words}" for words in warned)
+            _, calibration, of_white = self._calibrated
+            views, warned = _with_warnings(decoder.decoded, recording, calibration, progress)
+        remarks = tuple(dict.fromkeys((*of_white, *warned)))
         white = white_of(np.asarray(views.values).reshape(-1, *views.shape[3:]))
         return Decoded((asked.of, asked.noise), decoder, views, white, remarks)
+
+
+def _with_warnings(work: Callable[..., Result], *given: Any) -> tuple[Result, list[str]]:
+    """What some work returns, and the messages of its warnings."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        return work(*given), [str(each.message) for each in caught]
 
 
 def _told(decoded: Decoded, distance: float, asked: Asked) -> Json:

@@ -106,7 +106,8 @@ def _add_difference(view, alike, whole, weights, across, total):  # type: ignore
             if across:
                 first = min(max(1 - whole, 0), columns)
                 last = max(min(columns - whole - 2, columns), first)
-                for x in range(first):
+                for n in range(columns - (last - first)):  # beyond the view's borders, these go on
+                    x = n if n < first else n + last - first
                     p = x + whole
                     value = w0 * view[c, y, min(max(p - 1, 0), columns - 1)]
                     value += w1 * view[c, y, min(max(p, 0), columns - 1)]
@@ -117,13 +118,6 @@ def _add_difference(view, alike, whole, weights, across, total):  # type: ignore
                     x, p = first + n, first + whole - 1 + n
                     value = w0 * view[c, y, p] + w1 * view[c, y, p + 1]
                     value += w2 * view[c, y, p + 2] + w3 * view[c, y, p + 3]
-                    total[y, x] += min(abs(value - alike[c, y, x]), most)
-                for x in range(last, columns):
-                    p = x + whole
-                    value = w0 * view[c, y, min(max(p - 1, 0), columns - 1)]
-                    value += w1 * view[c, y, min(max(p, 0), columns - 1)]
-                    value += w2 * view[c, y, min(max(p + 1, 0), columns - 1)]
-                    value += w3 * view[c, y, min(max(p + 2, 0), columns - 1)]
                     total[y, x] += min(abs(value - alike[c, y, x]), most)
             else:
                 p = y + whole

@@ -104,11 +104,11 @@ def plane_sweep(
     softened = [(arm, _as_if_moved(arm.views[arm.middle], arm.axis)) for arm in cross]
     along = [np.array([grid.disparities_along(arm.along, one) for one in tried], float) for arm in cross]
     guide = cross[0].views[cross[0].middle].mean(axis=0)
-    costs = late.module("vcc.engines.sweep_kernels").costs(softened, along, guide, window, progress)
+    kernels = late.module("vcc.engines.sweep_kernels")
+    costs = kernels.costs(softened, along, guide, window, progress)
     best = _best(costs)
     offset, lowest = _parabola(costs, best)
     found = tried[best] + offset * (tried[1] - tried[0])
-    kernels = late.module("vcc.engines.sweep_kernels")
     clarity = _clarity(costs, best, lowest, float(tried[1] - tried[0]))
     most = np.float32(kernels.TRUNCATION * len(cross))
     return Swept(found.astype(np.float32), clarity, np.clip(lowest / most, 0, 1))

@@ -448,20 +448,12 @@ class Cells(Value, Pattern):
 
     def _overlaps(self, centres: Array, length: float, axis: int) -> Any:
         """Share of each interval that each cell along an axis fills: a sparse matrix (intervals, cells)."""
-        from scipy.sparse import csr_array
-
         assert self.height is not None
         cells = self.values.shape[axis]
         pitch = (self.height, self.width)[axis] / cells
         start = (centres - self.middle[1 - axis]) / pitch + cells / 2 - length / pitch / 2
         reach = length / pitch
-        first = np.floor(start).astype(np.int64)
-        span = math.ceil(reach) + 1
-        index = first[:, None] + np.arange(span)
-        share = np.minimum(index + 1, start[:, None] + reach) - np.maximum(index, start[:, None])
-        keep = (share > 0) & (index >= 0) & (index < cells)
-        row = np.broadcast_to(np.arange(len(centres))[:, None], index.shape)
-        return csr_array((share[keep] / reach, (row[keep], index[keep])), shape=(len(centres), cells))
+        return overlaps(start, start + reach, cells) / reach
 
     def _integral(self, x: Array, y: Array) -> Array:
         rows, columns = self.values.shape
@@ -680,6 +672,24 @@ def mura(prime: int) -> NDArray[np.float64]:
     cells[0, :] = 0.0
     cells[1:, 0] = 1.0
     return np.asarray(cells)
+
+
+def overlaps(first: Array, last: Array, count: int) -> Any:
+    """How much of each of so many cells each interval covers, a sparse matrix (intervals, cells).
+
+    Args:
+        first: where intervals begin, in cells from the border of the first, (intervals,).
+        last: where they end.
+        count: of the cells.
+    """
+    from scipy.sparse import csr_array
+
+    low = np.floor(first).astype(np.int64)
+    index = low[:, None] + np.arange(int((np.ceil(last) - low).max(initial=0)))
+    share = np.minimum(index + 1, last[:, None]) - np.maximum(index, first[:, None])
+    keep = (share > 0) & (index >= 0) & (index < count)
+    interval = np.broadcast_to(np.arange(len(first))[:, None], index.shape)
+    return csr_array((share[keep], (interval[keep], index[keep])), shape=(len(first), count))
 
 
 def is_grid(x: Array, y: Array) -> bool:

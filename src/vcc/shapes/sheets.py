@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property, partial, reduce
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +30,7 @@ from vcc.shapes.patterns import (
     Polygon,
     is_grid,
     mean_by_raster,
+    overlaps,
 )
 
 Array = NDArray[np.float64]
@@ -132,8 +132,9 @@ class Tiles(Brief, Pattern):
         left, right = (self._place(self.columns, x + side * width / 2) for side in (-1, 1))
         top, bottom = (self._place(self.rows, y + side * height / 2) for side in (-1, 1))
         if is_grid(x, y) and not self._worth_an_integral(top, bottom):
-            lengths = _lengths(self.rows, top, bottom) @ self.values
-            content = (_lengths(self.columns, left, right) @ lengths.T).T
+            down = overlaps(top.reshape(-1), bottom.reshape(-1), len(self.rows) - 1) * np.diff(self.rows)
+            across = overlaps(left.reshape(-1), right.reshape(-1), len(self.columns) - 1) * np.diff(self.columns)
+            content = (across @ (down @ self.values).T).T
         elif is_grid(x, y):  # along one axis after the other
             across = _between(self._integral, right, axis=1) - _between(self._integral, left, axis=1)
             content = _between(across, bottom, axis=0) - _between(across, top, axis=0)
@@ -153,34 +154,12 @@ class Tiles(Brief, Pattern):
 
     def _worth_an_integral(self, first: Array, last: Array) -> bool:
         """Whether rectangles, from and to places in numbers of rows, overlap so that sums are taken many times."""
-        if "_integral" in self.__dict__:
-            return True
         return float(np.sum(last - first + 1)) > OVERLAPPING * len(self.rows)
 
     @staticmethod
     def _place(borders: Array, at: Array) -> Array:
         """Places as numbers of borders, fractions between them."""
         return np.asarray(np.interp(at, borders, np.arange(len(borders), dtype=np.float64)))
-
-
-def _lengths(borders: Array, first: Array, last: Array) -> Any:
-    """How much of each interval lies between each two neighbouring borders, metres: sparse (intervals, gaps).
-
-    Args:
-        borders: rising, metres.
-        first: where intervals begin, in numbers of borders.
-        last: where they end.
-    """
-    from scipy.sparse import csr_array
-
-    first, last = first.reshape(-1), last.reshape(-1)
-    low = np.floor(first).astype(np.int64)
-    index = low[:, None] + np.arange(int((np.ceil(last) - low).max(initial=0)))
-    share = np.minimum(index + 1, last[:, None]) - np.maximum(index, first[:, None])
-    keep = (share > 0) & (index < len(borders) - 1)
-    interval = np.broadcast_to(np.arange(len(first))[:, None], index.shape)
-    length = share[keep] * np.diff(borders)[index[keep]]
-    return csr_array((length, (interval[keep], index[keep])), shape=(len(first), len(borders) - 1))
 
 
 def _between(table: Array, place: Array, axis: int) -> Array:

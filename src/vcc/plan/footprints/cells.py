@@ -288,10 +288,9 @@ def divide_samples(
             return SampleDivision(parts, SPILT * math.sqrt(lost) * size / parts, True)
         return SampleDivision(parts, SMOOTH * lost**2.5, False)
 
-    least = geometry.parts if refine == "auto" else 1
     if refine == 1 or not planes:
-        return SampleDivision(least, 0.0, False)
-    fine, most = (least, LARGEST_REFINEMENT) if refine == "auto" else (int(refine), int(refine))
+        return SampleDivision(geometry.parts, 0.0, False)
+    fine, most = (geometry.parts, LARGEST_REFINEMENT) if refine == "auto" else (int(refine), int(refine))
     if refine == "auto" and views.finer >= LARGEST_CHOSEN_DIVISION:  # parts of cells times parts of samples cost
         most = LARGEST_CHOSEN_DIVISION
     for plane in planes:

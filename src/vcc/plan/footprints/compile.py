@@ -164,6 +164,7 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
     path_planes = [plane for plane, so in zip(planes, at_views, strict=True) if not so]
 
     views = (grid.shape[0], grid.shape[1])
+    turned = parts_of_sheared(step) if sharp and how.refine != 1 else 1
     geometry = Geometry(
         views,
         grid.extent,
@@ -172,7 +173,7 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         origin,
         sensor.shape,
         MARGIN + max(between.gap_filled),
-        parts_of_sheared(step) if sharp else 1,
+        turned,
         (grid.beyond[3], grid.beyond[2]) if swapped else (grid.beyond[2], grid.beyond[3]),
     )
     division = decisions.keep(
@@ -241,7 +242,7 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         after.append(OnSensor(guard, transmission, detail))
     decisions.note(by_view_planes(aperture, keep, path_planes))
     decisions.note(by_masks_against_sensor(sensor, against_sensor, len(after) - 1, detail is not None, decisions))
-    notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, finer, swapped)
+    notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, finer, turned, swapped)
     ghosts = 0.0 if how.between_views == "none" else between.gap_left
     cautions = cautions_of(division, finer, ghosts, max(1.0, abs(core.row_step)))
     plan = Plan(

@@ -30,9 +30,13 @@ def notes_of(
     between: BetweenViews,
     division: CellDivision,
     samples: SampleDivision,
+    turned: int,
     swapped: bool,
 ) -> tuple[str, ...]:
-    """What was folded, pulled to the samples and to the sensor, and how finely cells are divided."""
+    """What was folded, pulled to the samples and to the sensor, and how finely cells are divided.
+
+    ``turned``: parts of samples that their shape on the sensor asks for, whatever the masks are.
+    """
     linear = [
         element.label
         for element in train.elements
@@ -70,7 +74,9 @@ def notes_of(
         )
     fine, spilt, _ = samples
     if fine > 1:
-        notes.append(f"samples divided {fine}×{fine}: a mask near the sensor is finer than a sample")
+        of_masks = "a mask near the sensor is finer than a sample"
+        why = "they lie turned on the sensor" if fine == turned else of_masks
+        notes.append(f"samples divided {fine}×{fine}: {why}")
     if spilt > ERROR:
         notes.append(
             f"masks near the sensor are finer than these samples: an error of about {spilt:.1%} of the light "

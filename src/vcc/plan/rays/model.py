@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -107,7 +108,7 @@ class Rays(Value):
         """With so many rays a pixel, to be taken beside as many that there are."""
         return replace(self, samples=samples)
 
-    @property
+    @cached_property
     def reach(self) -> Reach | None:
         """How far rays reach, where all that they meet is affine and x and y do not mix; else None."""
         matrix = index_from_sensor(self.aim, self.steps, self.index_from_ray, self.motion)

@@ -82,8 +82,9 @@ class Reach(Brief):
 
     def views(self, axis: int) -> tuple[float, float]:
         """Between which indices i (or j) all rays pass the views."""
-        ends = np.array([0]), np.array([self.raster_shape[1] - 1]), np.array([self.raster_shape[0] - 1])
-        across, down = self.places(0, ends[0], ends[1])[0], self.places(1, ends[0], ends[2])[0]
+        across, down = (
+            self.places(each, np.array([0]), np.array([self.raster_shape[1 - each] - 1]))[0] for each in (0, 1)
+        )
         from_point = self.window.slope_from_point[axis]
         half = float(np.hypot(*from_point) if self.window.disc else np.abs(from_point).sum())
         corners = np.array([(x, y) for x in across for y in down])
