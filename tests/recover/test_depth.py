@@ -215,22 +215,21 @@ def test_where_the_search_ended_there_is_no_distance(method) -> None:
 
 @both
 @pytest.mark.filterwarnings("ignore:the search ended:vcc.ResultWarning")
-@pytest.mark.filterwarnings("ignore:.* of the pixels lie beyond infinity:vcc.ResultWarning")
 def test_nothing_is_farther_than_infinity(method) -> None:
-    """Without texture any disparity fits; those beyond infinity's, −2.67, were distances of −76 m and the like."""
+    """What moves as nothing can, −5 for infinity's −2.67, was given distances of −1.1 m and the like."""
     field = field_of([TexturedPlane(waves(1.1, 7), 1.1)])
-    flat = field.values.copy()
-    flat[..., :36, :] = 0.5 + 1e-3 * np.random.default_rng(1).random(flat[..., :36, :].shape)
-    found = method(field.replaced(flat), (-6, 3))
+    values = field.values.copy()
+    texture = values[0, 0, :20]
+    for j, i in np.ndindex(values.shape[:2]):
+        values[j, i, :20] = np.roll(texture, (5 * j, 5 * i), axis=(0, 1))
+    with pytest.warns(
+        vcc.ResultWarning, match=r"[23]\d\.\d% of the pixels lie beyond infinity, and their distance is"
+    ):
+        found = method(field.replaced(values), (-6, 3))
     beyond = found.disparity < disparity(math.inf)
-    assert beyond.mean() > 0.04
+    assert beyond.mean() > 0.2
     assert not (found.distance <= 0).any()
     assert (np.isinf(found.distance) | np.isnan(found.distance))[beyond].all()
-    if method is depth_by_plane_sweep:
-        with pytest.warns(
-            vcc.ResultWarning, match="4.2% of the pixels lie beyond infinity, and their distance is"
-        ):
-            method(field.replaced(flat), (-6, 3))
 
 
 def turned() -> vcc.Affine:

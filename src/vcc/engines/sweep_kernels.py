@@ -18,11 +18,24 @@ from vcc.engines.compiled import compiled
 from vcc.fields.cross import Arm, Array, cubic_weights
 from vcc.plan.how import cores
 
-_compiled = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
+FASTMATH = {"contract", "nsz", "reassoc"}
+_compiled, _with_memory = compiled(borrowing=True, fastmath=FASTMATH), compiled(fastmath=FASTMATH)
 TRUNCATION = 0.02
 """Of full scale, on the square-root scale: a difference that is no match, whatever its size."""
 CONTRAST = 0.02
 """Of full scale, likewise: contrast from which on the guide shows a border."""
+RISE = 0.033
+"""Cost, for each row or column of views, of a disparity that changes by a pixel per view from pixel to pixel."""
+JUMP = 0.04
+"""Likewise, at most: of a border. It is less where the guide shows one."""
+ALIKE = 1e-6
+"""Costs without texture differ by rounding alone, of full scale."""
+ON_SURFACE, SAME_SURFACE = 3, 0.15
+"""Over so many pixels on each side disparities are averaged that differ by less, pixels per view."""
+BAND = 32
+"""Rows or columns of pixels that one thread walks along at once."""
+STEP_AT_BORDER = 0.1
+"""Of full scale, on the square-root scale: from pixel to pixel of the guide, where a border costs half as much."""
 AROUND = 3
 """Pixels a side over which differences are averaged before the better half of the views is chosen."""
 
@@ -69,6 +82,41 @@ def costs(
     with Workers(cores()) as pool:
         for done, _ in enumerate(pool.map(plane, range(len(found))), start=1):
             tell(progress, done, len(found))
+    return found
+
+
+def smoothest(costs: Array, guide: Array, step: float, arms: int) -> NDArray[np.int32]:
+    """Which plane each pixel is in if surfaces are smooth, (t, s); the middle one where all are alike.
+
+    From four sides, along rows and columns, the least cost of a path of disparities that ends in each plane is
+    summed (Hirschmüller 2008): a pixel whose own cost says little takes the surface around it.
+
+    Args:
+        costs: (planes, t, s).
+        guide: (t, s), see `costs`.
+        step: between neighbouring planes, pixels per view.
+        arms: rows and columns of views of which costs are sums.
+    """
+    planes, rows, columns = costs.shape
+    rise, jump = np.float32(RISE * step * arms), np.float32(JUMP * arms)
+    sums = np.empty((rows, columns, planes), np.float32)
+    best = np.empty((rows, columns), np.int32)
+    with Workers(cores()) as pool:
+        bands = range(0, rows, BAND)
+        list(pool.map(lambda y: _along_rows(costs, guide, rise, jump, sums, y, min(y + BAND, rows)), bands))
+        bands = range(0, columns, BAND)
+        down = (costs, guide, rise, jump, sums)
+        list(pool.map(lambda x: _along_columns(*down, x, min(x + BAND, columns), best), bands))
+    return best
+
+
+def means_of_surfaces(disparity: Array, weights: Array) -> Array:
+    """Disparities averaged over the same surface around, by weights; all (t, s). Of weight 0 they stay."""
+    found = np.empty_like(disparity)
+    with Workers(cores()) as pool:
+        rows = len(disparity)
+        bands = range(0, rows, BAND)
+        list(pool.map(lambda y: _mean_of_surface(disparity, weights, found, y, min(y + BAND, rows)), bands))
     return found
 
 
@@ -155,3 +203,96 @@ def _box(values, window, out, sums):  # type: ignore[no-untyped-def]
             to, gone = min(y + half + 1, rows - 1), max(y - half, 0)
             for x in range(columns):
                 sums[x] += np.float64(values[to, x]) - values[gone, x]
+
+
+@_with_memory
+def _walk(before, cost, border, rise, jump, after):  # type: ignore[no-untyped-def]
+    """Costs of paths one pixel further on, above the least of those that lead there; all (planes,)."""
+    planes = len(cost)
+    least = before[0]
+    for n in range(1, planes):
+        least = min(least, before[n])
+    most = least + max(jump / (np.float32(1) + border / np.float32(STEP_AT_BORDER)), np.float32(2) * rise)
+    path = before[0]
+    for n in range(planes):
+        path = min(path + rise, before[n])
+        after[n] = min(path, most)
+    path = after[planes - 1]
+    for n in range(planes - 1, -1, -1):
+        path = min(path + rise, after[n])
+        after[n] = path
+    for n in range(planes):
+        after[n] += cost[n] - least
+
+
+@_with_memory
+def _along_rows(costs, guide, rise, jump, sums, first, last):  # type: ignore[no-untyped-def]
+    """Fill rows of the sums with the costs of paths from the left and from the right."""
+    planes, _, columns = costs.shape
+    cost = np.empty((columns, planes), np.float32)
+    before, after = np.empty((2, planes), np.float32)
+    for y in range(first, last):
+        for n in range(planes):
+            for x in range(columns):
+                cost[x, n] = costs[n, y, x]
+        before[:] = cost[0]
+        sums[y, 0] = cost[0]
+        for x in range(1, columns):
+            _walk(before, cost[x], abs(guide[y, x] - guide[y, x - 1]), rise, jump, after)
+            for n in range(planes):
+                sums[y, x, n] = after[n]
+                before[n] = after[n]
+        before[:] = cost[columns - 1]
+        sums[y, columns - 1] += cost[columns - 1]
+        for x in range(columns - 2, -1, -1):
+            _walk(before, cost[x], abs(guide[y, x] - guide[y, x + 1]), rise, jump, after)
+            for n in range(planes):
+                sums[y, x, n] += after[n]
+                before[n] = after[n]
+
+
+@_with_memory
+def _along_columns(costs, guide, rise, jump, sums, first, last, best):  # type: ignore[no-untyped-def]
+    """Add the costs of paths from above and from below to columns of the sums, and find the least."""
+    planes, rows, _ = costs.shape
+    width = last - first
+    cost, before = np.empty((width, planes), np.float32), np.empty((width, planes), np.float32)
+    after = np.empty(planes, np.float32)
+    for turn in range(2):
+        for step in range(rows):
+            y = step if turn == 0 else rows - 1 - step
+            for n in range(planes):
+                for x in range(width):
+                    cost[x, n] = costs[n, y, first + x]
+            for x in range(width):
+                if step == 0:
+                    after[:] = cost[x]
+                else:
+                    border = abs(guide[y, first + x] - guide[y - 1 if turn == 0 else y + 1, first + x])
+                    _walk(before[x], cost[x], border, rise, jump, after)
+                total = sums[y, first + x]
+                for n in range(planes):
+                    total[n] += after[n]
+                    before[x, n] = after[n]
+                if turn == 1:
+                    n, highest = 0, total[0]
+                    for m in range(1, planes):
+                        highest = max(highest, total[m])
+                        n = m if total[m] < total[n] else n
+                    alike = highest - total[n] < ALIKE
+                    best[y, first + x] = planes // 2 if alike else n  # the middle one is at no end
+
+
+@_compiled
+def _mean_of_surface(disparity, weights, found, first, last):  # type: ignore[no-untyped-def]
+    """Fill rows of `means_of_surfaces`."""
+    rows, columns = disparity.shape
+    for y in range(first, last):
+        for x in range(columns):
+            here, total, weight = disparity[y, x], np.float32(0), np.float32(0)
+            for r in range(max(y - ON_SURFACE, 0), min(y + ON_SURFACE + 1, rows)):
+                for c in range(max(x - ON_SURFACE, 0), min(x + ON_SURFACE + 1, columns)):
+                    if abs(disparity[r, c] - here) < SAME_SURFACE:
+                        total += weights[r, c] * (disparity[r, c] - here)
+                        weight += weights[r, c]
+            found[y, x] = here + total / weight if weights[y, x] > 0 else here

@@ -3,9 +3,10 @@
 Disparities are tried one after the other, and each pixel takes the one at which the views of the middle row and
 column agree best with the middle one. What a nearer thing hides from views on one side is seen from the other, so
 that of the views to the left and to the right, and of those above and below, the half that agrees better counts
-(Kang, Szeliski and Chai 2001). Costs are gathered over a window that follows the borders in the middle view, a
-guided filter (Hosni et al. 2013), and a parabola through the lowest one and its neighbours gives the disparity
-between steps.
+(Kang, Szeliski and Chai 2001). Costs are gathered over a small window that follows the borders in the middle view,
+a guided filter (Hosni et al. 2013), and then along paths on which a disparity that jumps costs more than one that
+stays: semi-global matching (Hirschmüller 2008). A parabola through the lowest cost and its neighbours gives the
+disparity between steps, and a mean over the same surface around evens it out.
 """
 
 from __future__ import annotations
@@ -35,8 +36,10 @@ FINEST_STEP = 0.06
 """Of a sweep, pixels per view."""
 MOST_STEPS = 240
 """Of a sweep for what lies between views."""
-WINDOW = 11
+WINDOW = 3
 """Pixels a side, over which costs are gathered."""
+SURROUNDINGS = 11
+"""Pixels a side, over which it is judged how well views agree."""
 UNMATCHED = 0.8
 """Disagreement from which on views show different things: unrelated textures reach 0.9, borders at their true
 disparity 0.7."""
@@ -47,7 +50,6 @@ _COARSE_SIDE, _COARSEST = 48, 4
 """Pixels a side of the views that the first look over a wide range is taken at, and how many are one at most."""
 _OUTERMOST = 0.005
 """Of the confidence: what the first look finds outside of the rest is left out at either end."""
-_ALIKE = 1e-6  # of full scale: costs without texture differ by rounding alone
 _SOFTNESSES = 9  # fractions of a pixel in sixteenths, up to a half
 
 
@@ -98,7 +100,7 @@ def plane_sweep(
     tried = np.linspace(low, high, max(3, math.ceil((high - low) / step) + 1))
     cross = arms(light_field)
     rows, columns = grid.shape[2:4]
-    needed = 4 * (rows * columns * (len(tried) + 24) + 3 * sum(arm.views.size for arm in cross))
+    needed = 4 * (rows * columns * (2 * len(tried) + 24) + 3 * sum(arm.views.size for arm in cross))
     what = f"a sweep of {len(tried)} disparities over {rows}×{columns} pixels"
     check_memory(needed, memory_limit, what, "give a part of the light field")
     softened = [(arm, _as_if_moved(arm.views[arm.middle], arm.axis)) for arm in cross]
@@ -106,12 +108,13 @@ def plane_sweep(
     guide = cross[0].views[cross[0].middle].mean(axis=0)
     kernels = late.module("vcc.engines.sweep_kernels")
     costs = kernels.costs(softened, along, guide, window, progress)
-    best = _best(costs)
-    offset, lowest = _parabola(costs, best)
-    found = tried[best] + offset * (tried[1] - tried[0])
-    clarity = _clarity(costs, best, lowest, float(tried[1] - tried[0]))
+    step = float(tried[1] - tried[0])
+    best = kernels.smoothest(costs, guide, step, len(cross))
+    offset, bend, lowest = _parabola(costs, best)
+    found = kernels.means_of_surfaces((tried[best] + step * offset).astype(np.float32), bend)
+    clarity = _clarity(costs, best, lowest, step)
     most = np.float32(kernels.TRUNCATION * len(cross))
-    return Swept(found.astype(np.float32), clarity, np.clip(lowest / most, 0, 1))
+    return Swept(found, clarity, np.clip(_around(lowest) / most, 0, 1))
 
 
 def range_of_sweep(
@@ -250,39 +253,32 @@ def _as_if_moved(view: Array, axis: int) -> Array:
     return np.array(softened, np.float32)
 
 
-def _best(costs: Array) -> NDArray[np.intp]:
-    """The first of the lowest costs of each pixel; the middle one where all are alike, which is at no end.
+def _parabola(costs: Array, best: NDArray[np.int32]) -> tuple[Array, Array, Array]:
+    """Where, in steps from ``best``, a parabola through it and its neighbours is lowest; its bend; the best cost.
 
-    `numpy.argmin` along the first axis takes ten times as long.
+    At the ends of the range there is one neighbour only: the disparity stays where it is, with a bend of 0.
     """
-    best, lowest, highest = np.zeros(costs.shape[1:], np.intp), costs[0].copy(), costs[0].copy()
-    for n, cost in enumerate(costs):
-        np.copyto(best, n, where=cost < lowest)
-        np.minimum(lowest, cost, out=lowest)
-        np.maximum(highest, cost, out=highest)
-    best[highest - lowest < _ALIKE] = len(costs) // 2
-    return best
-
-
-def _parabola(costs: Array, best: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Where, in steps from ``best``, the parabola through it and its neighbours is lowest, and that cost."""
     inner = np.clip(best, 1, len(costs) - 2)
     before, here, after = (np.take_along_axis(costs, (inner + n)[None], axis=0)[0] for n in (-1, 0, 1))
-    bend = before - 2 * here + after
+    bend = np.where(inner == best, np.maximum(before - 2 * here + after, 0), 0).astype(np.float32)
     with np.errstate(divide="ignore", invalid="ignore"):
-        offset = np.where(bend > 0, (before - after) / (2 * bend), 0)
-    # At the ends of the range there is one neighbour only: the disparity stays where it is.
-    offset = np.where(inner == best, np.clip(offset, -0.5, 0.5), 0).astype(np.float32)
-    return offset, np.take_along_axis(costs, best[None], axis=0)[0]
+        offset = np.where(bend > 0, np.clip((before - after) / (2 * bend), -0.5, 0.5), 0).astype(np.float32)
+    return offset, bend, np.take_along_axis(costs, best[None], axis=0)[0]
 
 
-def _clarity(costs: Array, best: NDArray[np.intp], lowest: Array, step: float) -> Array:
+def _clarity(costs: Array, best: NDArray[np.int32], lowest: Array, step: float) -> Array:
     """How much better the best disparity is than any that is not its neighbour, 0 to 1."""
     apart = max(2, math.ceil(0.3 / step)) if step > 0 else 2
     rival = np.full(lowest.shape, np.inf, np.float32)
     for n, cost in enumerate(costs):
         np.minimum(rival, cost, out=rival, where=np.abs(best - n) >= apart)
-    noise = np.float32(NOISE)
-    clarity = 1 - (np.maximum(lowest, 0) + noise) / (np.maximum(rival, 0) + noise)
-    # Nothing else was tried: nothing is known of how clear it is.
-    return np.where(np.isfinite(rival), np.clip(clarity, 0, 1), 0).astype(np.float32)
+    # Where nothing else was tried, nothing is known of how clear it is.
+    rival, noise = np.where(np.isfinite(rival), rival, lowest), np.float32(NOISE)
+    return np.asarray(np.clip(1 - (_around(lowest) + noise) / (_around(rival) + noise), 0, 1), np.float32)
+
+
+def _around(costs: Array) -> Array:
+    """The mean over a pixel's surroundings."""
+    from scipy.ndimage import uniform_filter
+
+    return np.asarray(uniform_filter(np.maximum(costs, 0), SURROUNDINGS, mode="nearest"))
