@@ -149,7 +149,7 @@ def field(channels=3, **given) -> vcc.LightField:
 
 @pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")  # the sensor sees beyond the views' pictures
 @pytest.mark.parametrize("engine", ["numba", "reference", "array_api"])
-def test_the_picture_is_that_of_the_denser_light_field(engine):
+def test_the_picture_is_that_of_the_denser_light_field_and_in_focus_of_views_as_they_are(engine):
     lf = field()
     plan = FAR_OUT_OF_FOCUS.compile(lf, between_views="depth")
     assert plan.views_between is not None
@@ -157,6 +157,10 @@ def test_the_picture_is_that_of_the_denser_light_field(engine):
     pictures, _ = made(lf.values, plan.views_between)
     denser = vcc.LightField.from_views(pictures, (SPACING / times[0], SPACING / times[1]), SLOPE, FOCUS)
     expected = FAR_OUT_OF_FOCUS.capture(denser, between_views="none").values
+    assert plan.in_focus is not None
+    share = plan.in_focus.share[..., None]
+    assert share.max() == 1
+    expected += share * (FAR_OUT_OF_FOCUS.capture(lf, between_views="none").values - expected)
     image = FAR_OUT_OF_FOCUS.capture(lf, between_views="depth", engine=engine).values
     np.testing.assert_allclose(image, expected, atol=1e-5 * expected.max())
 

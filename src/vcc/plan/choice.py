@@ -16,7 +16,8 @@ from vcc.plan.footprints.compile import blurs_or_why_not, compile_footprints
 from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.footprints.mixtures import Mixture
 from vcc.plan.how import How
-from vcc.plan.model import MadeFor, Plan
+from vcc.plan.in_focus import share_in_focus
+from vcc.plan.model import InFocus, MadeFor, Plan
 from vcc.plan.rays.compile import compile_rays
 
 
@@ -120,8 +121,15 @@ def _compiled(train: Train, grid: Grid, how: How, decisions: Decisions) -> Plan:
             lambda one, other: one[0].shape == other[0].shape,
         )
         plan = _compiled(train, made, replace(how, between_views="auto"), decisions.of("views in between"))
-        cautions = plan.cautions if between is None else (*plan.cautions, *between.cautions())
-        return replace(plan, views_between=between, notes=(*plan.notes, why), cautions=cautions)
+        if between is None:
+            return replace(plan, notes=(*plan.notes, why))
+        plain = _compiled(train, grid, replace(how, between_views="none"), decisions.of("views as they are"))
+        share = share_in_focus(train, grid, between, plain.used_views(grid.shape))
+        focused = None if share is None else InFocus(plain, share)
+        if share is not None:
+            why += f"; {share.mean():.0%} of the picture is in focus, and made of the views as they are"
+        cautions = (*plan.cautions, *between.cautions())
+        return replace(plan, views_between=between, in_focus=focused, notes=(*plan.notes, why), cautions=cautions)
     if not isinstance(by_footprints, str):
         for name, given in (("samples", how.samples), ("tolerance", how.tolerance)):
             if given is not None:

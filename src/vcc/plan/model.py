@@ -42,6 +42,19 @@ class MadeFor:
     frame: Affine
 
 
+@dataclass(frozen=True, eq=False)
+class InFocus(Value):
+    """What is in focus where views are made in between: it is shown better by the views as they are.
+
+    Args:
+        plan: of the picture that these make.
+        share: of each pixel of the sensor that is taken from it, (rows, columns), 0 to 1.
+    """
+
+    plan: Plan
+    share: NDArray[np.float32]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(Value, Shown):
     """How to make the picture of a light field.
@@ -56,6 +69,7 @@ class Plan(Value, Shown):
         before: what is done to samples before that, in order.
         after: what is done to the raster, in order.
         views_between: how views in between are made before all else, or None; the rest counts what is there then.
+        in_focus: what is taken from the views as they are where views are made in between, or None.
         missing_rays: share of the rays asked for that the light field lacks.
         missing_reason: in words.
         expected_ghosting: largest gap in pixels between neighbouring views' pictures of the same thing that is
@@ -71,6 +85,7 @@ class Plan(Value, Shown):
     before: tuple[Before, ...] = ()
     after: tuple[After, ...] = ()
     views_between: ViewsBetween | None = None
+    in_focus: InFocus | None = None
     missing_rays: float = 0.0
     missing_reason: str = ""
     expected_ghosting: float = 0.0

@@ -322,6 +322,7 @@ class Drive:
 
     def __init__(self, plan: Plan, samples: Samples, how: How, executor: Any = None) -> None:
         samples.check_complete()
+        self.executor = executor
         self.crew = None if executor is None else crew(executor)
         if self.crew is not None:
             samples = Carried.of(samples)
@@ -454,6 +455,11 @@ class Drive:
         picture = self.picture(found)
         if self.plan.views_between is not None:
             _warn_of_unseen(self.samples)
+        if self.plan.in_focus is not None:
+            share = self.plan.in_focus.share
+            share = share if picture.ndim == 2 else share[..., None]
+            as_they_are = Drive(*needed(self.plan.in_focus.plan, self.given), self.how, self.executor).recorded()
+            picture = picture + share * (as_they_are.values - picture)
         return Recorded(
             picture.astype(np.float32, copy=False) if isinstance(picture, np.ndarray) else picture,
             self.plan.missing_rays,
