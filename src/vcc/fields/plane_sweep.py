@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ MOST_STEPS = 240
 """Of a sweep for what lies between views."""
 WINDOW = 3
 """Pixels a side, over which costs are gathered."""
-SURROUNDINGS = 11
+SURROUNDINGS = 9
 """Pixels a side, over which it is judged how well views agree."""
 UNMATCHED = 0.8
 """Disagreement from which on views show different things: unrelated textures reach 0.9, borders at their true
@@ -48,6 +49,8 @@ MANY_UNMATCHED = 0.02
 _FEWER = 0.75  # so many of the lost pixels are left at most if it is worth searching farther
 _COARSE_SIDE, _COARSEST = 48, 4
 """Pixels a side of the views that the first look over a wide range is taken at, and how many are one at most."""
+_UNSURE = 0.2
+"""Confidence up to which the first look says nothing of the range: dark walls have 0.1 anywhere."""
 _OUTERMOST = 0.005
 """Of the confidence: what the first look finds outside of the rest is left out at either end."""
 _SOFTNESSES = 9  # fractions of a pixel in sixteenths, up to a half
@@ -112,9 +115,10 @@ def plane_sweep(
     best = kernels.smoothest(costs, guide, step, len(cross))
     offset, bend, lowest = _parabola(costs, best)
     found = kernels.means_of_surfaces((tried[best] + step * offset).astype(np.float32), bend)
+    lowest = np.maximum(lowest, 0)  # a guided filter goes below 0
     clarity = _clarity(costs, best, lowest, step)
     most = np.float32(kernels.TRUNCATION * len(cross))
-    return Swept(found, clarity, np.clip(_around(lowest) / most, 0, 1))
+    return Swept(found, clarity, np.clip(around(lowest) / most, 0, 1))
 
 
 def range_of_sweep(
@@ -177,7 +181,8 @@ def _first_look(
     at_an_end = ((found.disparity <= coarse[0]) | (found.disparity >= coarse[1])) & (found.confidence > 0)
     lost = float(((found.disagreement > UNMATCHED) | at_an_end).mean())
     order = np.argsort(found.disparity, axis=None)
-    share = np.cumsum(found.confidence.ravel()[order], dtype=np.float64)
+    sure = np.maximum(found.confidence - _UNSURE, 0)
+    share = np.cumsum((sure if sure.any() else found.confidence).ravel()[order], dtype=np.float64)
     if share[-1] == 0:
         return (math.inf, -math.inf), lost
     places = np.searchsorted(share, share[-1] * np.array([_OUTERMOST, 1 - _OUTERMOST]))
@@ -271,14 +276,14 @@ def _clarity(costs: Array, best: NDArray[np.int32], lowest: Array, step: float) 
     apart = max(2, math.ceil(0.3 / step)) if step > 0 else 2
     rival = np.full(lowest.shape, np.inf, np.float32)
     for n, cost in enumerate(costs):
-        np.minimum(rival, cost, out=rival, where=np.abs(best - n) >= apart)
+        np.minimum(rival, np.maximum(cost, 0), out=rival, where=np.abs(best - n) >= apart)
     # Where nothing else was tried, nothing is known of how clear it is.
     rival, noise = np.where(np.isfinite(rival), rival, lowest), np.float32(NOISE)
-    return np.asarray(np.clip(1 - (_around(lowest) + noise) / (_around(rival) + noise), 0, 1), np.float32)
+    return np.asarray(np.clip(1 - (around(lowest) + noise) / (around(rival) + noise), 0, 1), np.float32)
 
 
-def _around(costs: Array) -> Array:
+def around(values: NDArray[Any]) -> NDArray[Any]:
     """The mean over a pixel's surroundings."""
     from scipy.ndimage import uniform_filter
 
-    return np.asarray(uniform_filter(np.maximum(costs, 0), SURROUNDINGS, mode="nearest"))
+    return np.asarray(uniform_filter(values, SURROUNDINGS, mode="nearest"))

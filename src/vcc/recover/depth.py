@@ -29,7 +29,7 @@ from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.fields.cross import Arm, arms, check_axes, moved
 from vcc.fields.grid import Grid
-from vcc.fields.plane_sweep import FINEST_STEP, NOISE, WINDOW, disparity_maps, plane_sweep, range_of_sweep
+from vcc.fields.plane_sweep import FINEST_STEP, NOISE, WINDOW, around, disparity_maps, plane_sweep, range_of_sweep
 from vcc.light_field import LightField
 from vcc.store import StoredLightField
 
@@ -46,6 +46,8 @@ Array = NDArray[np.float32]
 
 MANY_ENDED = 0.01
 """The share of the pixels from which on it is said that the search ended, or that they lie beyond infinity."""
+_SPREAD = 0.3
+"""Standard deviation of disparities around a pixel, pixels per view, that leaves 1/e of its confidence."""
 _AT_AN_END = 0.01
 """Pixels per view: what is no farther from the end of a search is at it. Between steps nothing comes as near."""
 _BEYOND = 0.1
@@ -203,8 +205,9 @@ def depth_by_plane_sweep(
     with the middle view. What a nearer thing hides from views on one side is seen from the other, so that of the
     views to the left and to the right, and of those above and below, the half that agrees better counts (Kang,
     Szeliski and Chai 2001). Costs are gathered over a window that follows the borders in the middle view, a guided
-    filter (Hosni et al. 2013), and a parabola through the lowest one and its neighbours gives the disparity
-    between steps.
+    filter (Hosni et al. 2013), and along paths on which a disparity that jumps costs more than one that stays
+    (semi-global matching, Hirschmüller 2008). A parabola through the lowest one and its neighbours gives the
+    disparity between steps, and a mean over the same surface around evens it out.
 
     Args:
         light_field: two views at least, its views' axes along those of its pixels.
@@ -233,7 +236,10 @@ def depth_by_plane_sweep(
     check_axes(light_field.grid, fewest=2)
     ends = range_of_sweep(light_field, disparity_range, memory_limit)
     found = plane_sweep(light_field, ends, step=step, window=window, memory_limit=memory_limit, progress=progress)
-    return _depth(light_field.grid, found.disparity, found.confidence, ends)
+    # Beside borders, and where each pixel finds another one, disparities are less sure than costs say.
+    disparity = found.disparity.astype(np.float64)
+    spread = np.sqrt(np.maximum(around(disparity**2) - around(disparity) ** 2, 0))
+    return _depth(light_field.grid, found.disparity, found.confidence * np.exp(-spread / _SPREAD), ends)
 
 
 # --- where the search ended ---
