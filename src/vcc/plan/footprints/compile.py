@@ -242,7 +242,11 @@ def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisi
         after.append(OnSensor(guard, transmission, detail))
     decisions.note(by_view_planes(aperture, keep, path_planes))
     decisions.note(by_masks_against_sensor(sensor, against_sensor, len(after) - 1, detail is not None, decisions))
-    notes = notes_of(train, view_planes, path_planes, against_sensor, between, division, finer, turned, swapped)
+    of_masks = "as asked" if how.refine != "auto" else "a mask near the sensor is finer than a sample"
+    why_divided = "they lie turned on the sensor" if finer.parts == turned else of_masks
+    notes = notes_of(
+        train, view_planes, path_planes, against_sensor, between, division, finer, why_divided, swapped
+    )
     ghosts = 0.0 if how.between_views == "none" else between.gap_left
     cautions = cautions_of(division, finer, ghosts, max(1.0, abs(core.row_step)))
     plan = Plan(

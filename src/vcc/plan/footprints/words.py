@@ -30,12 +30,12 @@ def notes_of(
     between: BetweenViews,
     division: CellDivision,
     samples: SampleDivision,
-    turned: int,
+    why_divided: str,
     swapped: bool,
 ) -> tuple[str, ...]:
     """What was folded, pulled to the samples and to the sensor, and how finely cells are divided.
 
-    ``turned``: parts of samples that their shape on the sensor asks for, whatever the masks are.
+    ``why_divided``: what asks for parts of samples, in words.
     """
     linear = [
         element.label
@@ -74,9 +74,7 @@ def notes_of(
         )
     fine, spilt, _ = samples
     if fine > 1:
-        of_masks = "a mask near the sensor is finer than a sample"
-        why = "they lie turned on the sensor" if fine == turned else of_masks
-        notes.append(f"samples divided {fine}×{fine}: {why}")
+        notes.append(f"samples divided {fine}×{fine}: {why_divided}")
     if spilt > ERROR:
         notes.append(
             f"masks near the sensor are finer than these samples: an error of about {spilt:.1%} of the light "
