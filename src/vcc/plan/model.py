@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.base.values import Value
@@ -42,8 +43,8 @@ class MadeFor:
     frame: Affine
 
 
-@dataclass(frozen=True, eq=False)
-class InFocus(Value):
+@dataclass(frozen=True, eq=False, repr=False)
+class InFocus(Value, Brief):
     """What is in focus where views are made in between: it is shown better by the views as they are.
 
     Args:
