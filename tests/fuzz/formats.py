@@ -76,6 +76,7 @@ FORMATS = {
     "eslf jpg": Format(seeds.eslf("a.jpg"), "a.jpg", options=BLOCKS),
     "mosaic png": Format(seeds.mosaic, "a.png", options=TILES, checked=True),
     "lytro": Format(seeds.lytro, "a.lfr", readers.lytro, checked=True),
+    "lytro first": Format(seeds.lytro_first, "a.lfp", readers.lytro, checked=True),
     "lytro resigned": Format(seeds.lytro, "a.lfr", readers.lytro),  # mutations.RESIGNED
     "mp4": Format(seeds.video("a.mp4"), "a.mp4"),
     "mkv": Format(seeds.video("a.mkv"), "a.mkv"),
@@ -84,6 +85,7 @@ FORMATS = {
     "zarr float": Format(seeds.store(kind=np.float32), "s.zarr", readers.store, checked=True),
     "zarr jpegxl": Format(seeds.store("jpegxl"), "s.zarr", readers.store, checked=True),
     "zarr avif": Format(seeds.store("avif"), "s.zarr", readers.store, checked=True),
+    "zarr disparity": Format(seeds.store_with_depth, "s.zarr", readers.store_with_depth, checked=True),
     "zarr video": Format(seeds.light_field_video, "v.zarr", readers.light_field_video, checked=True),
     "sweep": Format(seeds.sweep, "s.zarr", readers.sweep),
     "camera npy": Format(seeds.camera(".npy"), "camera.toml", readers.camera),

@@ -38,6 +38,13 @@ def store(path: Path) -> Read:
     return _read(values, sane=_is_light(values))
 
 
+def store_with_depth(path: Path) -> Read:
+    stored = open_store(path)
+    stored.check_complete()
+    maps = stored.disparity.maps()
+    return _read(np.asarray(stored.read().values), maps.values, maps.views, maps.unmatched)
+
+
 def light_field_video(path: Path) -> Read:
     frames = open_video(path)
     values = [np.asarray(frame.read().values) for frame in frames]

@@ -213,6 +213,20 @@ def lytro(folder: Path) -> None:
     (folder / "a.lfr").write_bytes(lytro_bytes(*lytro_parts()))
 
 
+def lytro_first(folder: Path) -> None:
+    """As the first camera wrote it: 12 bits, the higher ones first, and frames of a picture."""
+    mosaic = bytes(n * 37 % 256 for n in range(16 * 8 * 12 // 8))
+    meta = json.loads(json.dumps(LYTRO_META))
+    meta["image"] |= {"pixelPacking": {"bitsPerPixel": 12, "endianness": "big"}}
+    meta["image"] = {"width": 16, "height": 8, "orientation": 1, "rawDetails": meta["image"]}
+    meta["camera"] = {"make": "Lytro, Inc.", "model": "F01"}
+    blobs = [mosaic, json.dumps(meta).encode(), LYTRO_PRIVATE]
+    names = ["sha1-" + hashlib.sha1(blob).hexdigest() for blob in blobs]
+    frame = dict(zip(("imageRef", "metadataRef", "privateMetadataRef"), names, strict=True))
+    contents = json.dumps({"picture": {"frameArray": [{"frame": frame}]}}).encode()
+    (folder / "a.lfp").write_bytes(lytro_bytes(contents, blobs))
+
+
 def eslf(name: str) -> Maker:
     def make(folder: Path) -> None:
         views = scene()
@@ -248,6 +262,13 @@ def store(lossy: str | None = None, kind: Any = np.uint8) -> Maker:
         save_store(light_field(kind=kind), folder / "s.zarr", **how)
 
     return make
+
+
+def store_with_depth(folder: Path) -> None:
+    """A store with maps of disparities."""
+    whole = light_field()
+    maps = np.linspace(-1, 1, 24 * 32, dtype=np.float32).reshape(24, 32)
+    save_store(vcc.LightField(whole.values, whole.frame, disparity=maps), folder / "s.zarr")
 
 
 def light_field_video(folder: Path) -> None:

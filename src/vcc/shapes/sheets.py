@@ -321,6 +321,25 @@ def dark_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:
     return np.asarray(((low >= half) | (high <= -half)).any(axis=-1))
 
 
+def not_clear_beside_others(patterns: list[tuple[Pattern, tuple[float, float]]]) -> tuple[int, ...]:
+    """Which patterns of one plane cut light off: round holes do not that are clear all over another of them.
+
+    Args:
+        patterns: each with the place (x, y) of its middle, metres.
+    """
+    kept = list(range(len(patterns)))
+    for n, (hole, middle) in enumerate(patterns):
+        if not isinstance(hole, Circle):
+            continue
+        for other in kept:
+            pattern, centre = patterns[other]
+            from_middle, half = np.subtract(centre, middle), np.array(pattern.size) / 2
+            if other != n and clear_over(hole, from_middle - half, from_middle + half):
+                kept.remove(n)
+                break
+    return tuple(kept)
+
+
 def in_one_plane(patterns: list[tuple[Pattern, tuple[float, float]]]) -> Pattern:
     """Patterns with their middles in one plane, multiplied: a pattern about the plane's own origin.
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vcc.base.errors import InputError
-from vcc.base.reading import MOST_UNPACKED, check_file
+from vcc.base.reading import MOST_UNPACKED, check_file, shown
 from vcc.base.workers import uninterrupted
 from vcc.fields.disparity import DisparityMaps
 from vcc.files.parts import clear_leftovers, part_of
@@ -52,7 +52,8 @@ def read_maps(store: Path, shape: tuple[int, ...]) -> DisparityMaps | None:
         maps = DisparityMaps(values, views, str(array.attrs["source"]), unmatched=float(unmatched))
     except Exception as error:
         raise InputError(
-            f"the disparities in {folder} cannot be used: {error}. Delete this folder, and they are found again"
+            f"the disparities in {folder} cannot be used: {shown(str(error), 300)}. Delete this folder, and "
+            "they are found again"
         ) from None
     return maps
 
@@ -68,6 +69,7 @@ def keep_maps(store: Path, maps: DisparityMaps) -> None:
         OSError: the disk refuses.
     """
     import zarr
+    from zarr.codecs import Crc32cCodec, ZstdCodec
 
     folder = store / FOLDER
     part = part_of(folder)
@@ -75,7 +77,7 @@ def keep_maps(store: Path, maps: DisparityMaps) -> None:
     def make() -> None:
         array = zarr.create_array(
             store=zarr.storage.LocalStore(part), shape=maps.values.shape, chunks=(1, *maps.values.shape[1:]),
-            dtype="float32", fill_value=float("nan"),
+            dtype="float32", fill_value=float("nan"), compressors=[ZstdCodec(), Crc32cCodec()],
         )  # fmt: skip
         array[:] = maps.values
         stated = {"views": maps.views, "source": maps.source, "unmatched": maps.unmatched}

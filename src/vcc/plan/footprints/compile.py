@@ -430,6 +430,7 @@ def _absorbing_planes(
             groups[-1][1].append(stage)
         else:
             groups.append((place, [stage]))
+    decisions.hold("which masks stand in one plane", tuple(len(stages) for _, stages in groups))
     in_path: list[Plane] = []
     against_sensor: list[Plane] = []
     for place, stages in groups:
@@ -443,7 +444,6 @@ def _absorbing_planes(
             decisions.of(f"plane {len(in_path) + len(against_sensor) + 1} of masks"),
         )
         (against_sensor if _same_place(place, sensor_place) else in_path).append(plane)
-    decisions.hold("which masks stand in one plane", tuple(len(stages) for _, stages in groups))
     decisions.hold(
         "which masks stand against the sensor", tuple(_same_place(place, sensor_place) for place, _ in groups)
     )

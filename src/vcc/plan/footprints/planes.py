@@ -12,7 +12,7 @@ from vcc.base.describe import Brief
 from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.footprints.means import Boxes
 from vcc.shapes.patterns import Pattern
-from vcc.shapes.sheets import in_one_plane
+from vcc.shapes.sheets import in_one_plane, not_clear_beside_others
 from vcc.shapes.tilings import Tile, tiles_of
 
 Array = NDArray[np.float64]
@@ -50,6 +50,8 @@ class Plane(Brief):
             label: what they are called.
             decisions: by which the place is chosen from which all is counted.
         """
+        cutting = decisions.keep("what cuts light off", lambda: not_clear_beside_others(patterns))
+        patterns = [patterns[n] for n in cutting]
         # About their common middle where they have one, as each of them would be by itself.
         common = decisions.keep("one middle", lambda: len({middle for _, middle in patterns}) == 1)
         decentre = patterns[0][1] if common else (0.0, 0.0)
