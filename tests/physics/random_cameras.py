@@ -117,6 +117,13 @@ class Case:
         )
 
 
+def disparity_along(frame: Array, vergence: float, axis: int) -> float:
+    """Disparity along u (0) or v (1) of points of one vergence, pixels a view."""
+    # A point is seen along one place: what a step of a view moves it by, steps of pixels move it back by.
+    moved = frame[2:4, :4] - vergence * frame[:2, :4]
+    return float(np.linalg.solve(moved[:, 2:], moved[:, :2])[axis, axis])
+
+
 def drawn(kind: str, seed: int, pixels: int = 32, views: int = 17) -> Case:
     """A random camera of a kind before a random scene.
 
@@ -163,7 +170,7 @@ class _Drawing:
         self.rng.shuffle(elements)  # type: ignore[arg-type]
         camera = vcc.Camera(elements, self.sensor)
         frame, shape = self._cover(camera)
-        disparities = sorted((w - self.vergence) * self.spacing[0] / self.slopes[0] for w in self.depths)
+        disparities = sorted(disparity_along(frame, w / (1 + w * self.flown), 0) for w in self.depths)
         return Case(
             kind=self.kind,
             seed=self.seed,

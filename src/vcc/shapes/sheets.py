@@ -216,6 +216,8 @@ class Product(Pattern):
         across a rectangle (4 at least): each point holds the product of the patterns' means around it.
         """
         factors = self.factors
+        placed = [(f.pattern, f.middle) if isinstance(f, Shifted) else (f, (0.0, 0.0)) for f in factors]
+        factors = tuple(factors[n] for n in not_clear_beside_others(placed, (Circle, Tiles)))
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if not factors:
             return np.ones(np.broadcast_shapes(x.shape, y.shape))
@@ -321,15 +323,18 @@ def dark_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:
     return np.asarray(((low >= half) | (high <= -half)).any(axis=-1))
 
 
-def not_clear_beside_others(patterns: list[tuple[Pattern, tuple[float, float]]]) -> tuple[int, ...]:
-    """Which patterns of one plane cut light off: round holes do not that are clear all over another of them.
+def not_clear_beside_others(
+    patterns: list[tuple[Pattern, tuple[float, float]]], kinds: tuple[type[Pattern], ...] = (Circle,)
+) -> tuple[int, ...]:
+    """Which patterns of one plane cut light off: what is clear all over another of them does not.
 
     Args:
         patterns: each with the place (x, y) of its middle, metres.
+        kinds: what may be left out. Round holes by default: what cells let pass may be learned.
     """
     kept = list(range(len(patterns)))
     for n, (hole, middle) in enumerate(patterns):
-        if not isinstance(hole, Circle):
+        if not isinstance(hole, kinds):
             continue
         for other in kept:
             pattern, centre = patterns[other]

@@ -52,9 +52,11 @@ class Plane(Brief):
         """
         cutting = decisions.keep("what cuts light off", lambda: not_clear_beside_others(patterns))
         patterns = [patterns[n] for n in cutting]
-        # About their common middle where they have one, as each of them would be by itself.
-        common = decisions.keep("one middle", lambda: len({middle for _, middle in patterns}) == 1)
-        decentre = patterns[0][1] if common else (0.0, 0.0)
+        # About the middle of the smallest, as it would be by itself.
+        smallest = decisions.keep(
+            "about which middle", lambda: int(np.argmin([np.prod(pattern.size) for pattern, _ in patterns]))
+        )
+        decentre = patterns[smallest][1]
         pattern = in_one_plane([(one, (x - decentre[0], y - decentre[1])) for one, (x, y) in patterns])
         return cls(pattern, label, decentre, place[:, :4], place[:, 4] - np.array(decentre))
 
