@@ -127,3 +127,16 @@ def test_a_bend_may_err_by_a_thousandth_of_a_sample():
         off = np.sqrt(np.mean((bend.texture(x, y) - truth) ** 2, axis=0))
         # At the light field's plane a slope moves k by 1/slope_per_pixel samples.
         assert (off / 6e-3 < 1e-3).all()
+
+
+def test_cells_that_are_no_squares_are_those_of_footprints():
+    cells = Cells(np.random.default_rng(4).random((3, 5)), 3 * mm, 5 * mm)
+    optics = vcc.Camera(
+        [LENS, vcc.Mask(cells, z=D / 2, decentre=(0.4 * mm, -0.3 * mm))], vcc.Sensor(D, (16, 16), D * 9e-3)
+    )
+    lf = field(9)
+    rays, footprints = optics.capture(lf, method="rays", samples=2048), optics.capture(lf, method="footprints")
+    assert footprints.values.std() > 0.1 * footprints.values.max()
+    error = np.sqrt(np.mean((rays.values - footprints.values) ** 2))
+    # 45 dB is what a mask of cells reaches that nine views a side are coarse for, beside what rays state.
+    assert error < np.hypot(footprints.values.max() * 10 ** (-45 / 20), 2 * rays.sampling_error)

@@ -405,3 +405,20 @@ def test_one_filter_for_several_psfs_is_the_closed_form_of_least_squares():
     np.testing.assert_allclose(found, expected, atol=1e-13)
     one = wiener(picture, psfs[0], noise).picture
     np.testing.assert_allclose(wiener(picture, psfs[[0, 0]], noise).picture, one, atol=1e-13)
+
+
+def test_edges_blend_into_the_opposite_ones_evenly():
+    """Beyond its last row a picture goes on to its first in even steps, around the domain."""
+    blur = Blur.of(np.full((3, 5), 1 / 15), None, (6, 7), "unknown")
+    picture = np.add.outer(np.arange(6) * 1.0, np.arange(7) * 10.0)
+    whole = blur.extended(picture, "wrap")
+    assert whole.shape == blur.domain
+    np.testing.assert_array_equal(blur.seen(whole), picture)
+    for axis, (count, step) in enumerate(((6, 1.0), (7, 10.0))):
+        lines = np.moveaxis(whole, axis, 0)
+        around = np.diff(np.concatenate([lines, lines[:1]]), axis=0)
+        gap = blur.domain[axis] - count
+        assert gap > 0
+        # count − 1 steps up, and gap + 1 equal ones down again
+        np.testing.assert_allclose(np.sort(around, axis=0)[: gap + 1], -step * (count - 1) / (gap + 1), rtol=1e-12)
+        np.testing.assert_allclose(np.sort(around, axis=0)[gap + 1 :], step, rtol=1e-12)

@@ -191,3 +191,23 @@ def test_views_through_a_mask_are_those_of_the_scene():
     error = rms(np.asarray(found.values) - truth)
     print(f"rms {error:.4f}, leak {leak:.4f}")
     assert error < leak
+
+
+def test_pixels_that_are_no_squares_have_other_views_along_rows():
+    """Micro-images 5 pixels high and 7 wide: each view in its place."""
+    square, distance = plenoptic(5, lenslets=24), 0.9
+    micro_image = 5 * square.sensor.pitches[0]
+    sensor = vcc.Sensor(square.sensor.z, (24 * 5, 24 * 7), (micro_image / 5, micro_image / 7))
+    found = decoded(vcc.Camera(square.elements, sensor), scene_at(distance))
+    assert found.shape[:2] == (5, 7)
+    truth = light_of(found.frame, found.shape, distance, (0.3 * mm / (1 + 0.3 * mm / STOP), STOP / 6))
+    every = list(np.ndindex(5, 7))
+    for view in every:
+        assert view == min(every, key=lambda other: rms(np.asarray(found.values)[view] - truth[other]))
+
+
+@pytest.mark.parametrize("views", [(3,), (3, 3, 3), (0, 3), 2.5])
+def test_views_are_one_number_or_two(views):
+    camera = plenoptic(5)
+    with pytest.raises(InputError, match="one whole number or"):
+        vcc.recover.decode_plenoptic(np.ones(camera.sensor.shape), camera=camera, views=views)

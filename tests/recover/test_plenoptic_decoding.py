@@ -373,3 +373,11 @@ def test_a_microscope_shows_true_parallax():
     print(f"across {across:.2f}, half way {half:.2f}, down {down:.2f}")
     assert across == pytest.approx(down, abs=0.3)
     assert across < -0.2  # nearer than what is in focus: to the left in the view from the right
+
+
+def test_pitches_of_pixels_that_are_not_square():
+    """Hexagonal micro-images 9 columns apart, turned, on pixels 1.3 times as high as wide."""
+    turned = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    steps = np.diag([1, 1 / 1.3]) @ turned @ np.array([[1, 0.5], [0, np.sqrt(3) / 2]]) * 9
+    grid = LensletGrid("hexagonal", (0.0, 0.0), tuple(map(tuple, steps.T)))
+    np.testing.assert_allclose(grid.pitches, (9, 9 / 1.3), rtol=1e-12)

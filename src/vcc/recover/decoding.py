@@ -170,9 +170,9 @@ def _views_of_lenslets(camera: Camera, grid: Grid | None) -> tuple[int, int]:
     optics = LensletOptics.of(camera)
     _check_affine(camera, optics.array)
     _check_sharp(optics)
-    apart = LensletGrid.of_camera(camera).pitch
+    pitches = LensletGrid.of_camera(camera).pitches
     counts = []
-    for axis, pixel in enumerate(camera.sensor.pitches[::-1]):
+    for axis, (apart, pixel) in enumerate(zip(pitches, camera.sensor.pitches[::-1], strict=True)):
         width = min(_widths(camera, optics, grid, axis), default=math.inf) / pixel
         # A pixel at δ from the middle counts where half of it is lit or more, and a neighbour's light ends before.
         lit, free = width / 2, apart - width / 2 - 0.5 + MOST_OF_NEIGHBOURS

@@ -71,6 +71,15 @@ class LensletGrid:
         return math.sqrt(abs(self.pixel_from_steps.determinant) / ROW_HEIGHT[self.layout])
 
     @property
+    def pitches(self) -> tuple[float, float]:
+        """The same in columns and in rows of pixels, (x, y): they differ where pixels are not square."""
+        even = np.array([[1.0, 0.5], [0.0, ROW_HEIGHT[self.layout]]])
+        if self.layout == "square":
+            even[0, 1] = 0.0
+        across, down = np.linalg.norm(self.pixel_from_steps.linear @ np.linalg.inv(even), axis=1)
+        return float(across), float(down)
+
+    @property
     def rotation(self) -> float:
         """Of the rows of micro-images against the rows of pixels, radians, from x towards y."""
         return math.atan2(self.steps[0][1], self.steps[0][0])

@@ -224,22 +224,25 @@ def _chosen_grid(
 
 def _view_counts(views: Any, grid: LensletGrid, view_step: float) -> tuple[int, int]:
     above_zero("view_step", view_step, unit="pixels")
-    most = 1 + 2 * math.floor((grid.pitch / 2 - 0.5) / view_step + 1e-9)
+    pitches = grid.pitches[::-1]  # (rows, columns)
+    most = tuple(1 + 2 * math.floor((pitch / 2 - 0.5) / view_step + 1e-9) for pitch in pitches)
     if views is None:
-        if most < 3:
+        if min(most) < 3:
             raise InputError(
-                f"micro-images of {grid.pitch:.2f} pixels hold no 3 views {view_step} pixels apart: "
+                f"micro-images of {min(pitches):.2f} pixels hold no 3 views {view_step} pixels apart: "
                 "take a smaller view_step, or views=1"
             )
-        return most, most
+        return most[0], most[1]
     counts = tuple(views) if isinstance(views, tuple | list) else (views, views)
-    for count in counts:
+    if len(counts) != 2:
+        raise InputError(f"views is {views!r}: give how many, one whole number or (rows, columns)")
+    for count, pitch, fitting in zip(counts, pitches, most, strict=True):
         if (whole_number(count) or 0) < 1:
             raise InputError(f"views is {views!r}: give how many, one whole number or (rows, columns)")
-        if (count - 1) / 2 * view_step > grid.pitch / 2:
+        if (count - 1) / 2 * view_step > pitch / 2:
             raise InputError(
-                f"{count} views {view_step} pixels apart do not fit into micro-images of {grid.pitch:.2f} pixels: "
-                f"take {most} at most"
+                f"{count} views {view_step} pixels apart do not fit into micro-images of {pitch:.2f} pixels: "
+                f"take {fitting} at most"
             )
     return int(counts[0]), int(counts[1])
 
