@@ -232,6 +232,16 @@ def test_nothing_is_farther_than_infinity(method) -> None:
     assert (np.isinf(found.distance) | np.isnan(found.distance))[beyond].all()
 
 
+@both
+def test_infinity_is_a_distance_where_the_search_ends_there(method) -> None:
+    field = field_of([TexturedPlane(waves(1e7, 7), 1e7)])
+    found = method(field, (float(disparity(math.inf)), 1.0))
+    inner = (slice(8, -8), slice(8, -8))
+    # Noise of disparities around −8/3 leaves half of the pixels a little before infinity: 100 m is 0.04 pixels.
+    assert (found.distance[inner] > 100).mean() > 0.9
+    assert np.isinf(found.distance[inner]).mean() > 0.3
+
+
 def turned() -> vcc.Affine:
     """Views and pixels by 30°, but pixels the other way."""
     c, s = math.cos(0.5), math.sin(0.5)

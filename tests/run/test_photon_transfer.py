@@ -88,6 +88,10 @@ def test_the_library_s_own_curve_finds_the_same():
         # It ends beyond saturation, where noise is cut off, and fits below 70 % of it.
         assert got.mean[-1] == pytest.approx(64 + 0.4 * 10_000, rel=2e-3)
         assert got.variance[-1] < 0.1 * got.variance.max()
+        # Levels are even, up to 1.1 of the full well of 10 000.
+        unsaturated = got.mean - 64 < 0.4 * 9_000
+        steps = 0.4 * 11_000 / len(got.mean) * np.arange(1, len(got.mean) + 1)
+        np.testing.assert_allclose((got.mean - got.dark_mean)[unsaturated], steps[unsaturated], rtol=5e-3)
         assert got.mean[got.fitted].max() <= 64 + 0.7 * 4000 + 1
         assert 9 <= got.fitted.sum() < len(got.mean)
 
