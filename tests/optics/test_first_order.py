@@ -258,3 +258,15 @@ def test_places_that_differ_by_rounding_are_one_place(method):
         picture(0.1, 0.2, 0.3 - 1e-6, (0.1, 0.1))
     with pytest.raises(InputError, match="stands inside"):
         picture(0.1, 0.2, 0.3, (0.1, 0.3 - 1e-6))
+
+
+def test_a_stop_behind_a_lens_is_seen_magnified():
+    """A stop 20 mm behind a lens of f = 50 mm: its image stands at d·f/(f − d) = 33.3 mm, f/(f − d) = 5/3 as wide.
+
+    From the sensor nothing is between: the exit pupil is the stop itself, 30 mm before the exit plane.
+    """
+    to_stop = np.array([[1, 20 * mm], [0, 1]]) @ np.array([[1, 0], [-1 / (50 * mm), 1]])
+    whole = np.array([[1, 30 * mm], [0, 1]]) @ to_stop
+    lens = FirstOrder(whole, length=50 * mm, stop_from_entrance=to_stop, stop_diameter=6 * mm)
+    pupils = [(pupil.distance, pupil.diameter) for pupil in (lens.entrance_pupil, lens.exit_pupil)]
+    np.testing.assert_allclose(pupils, [(100 / 3 * mm, 10 * mm), (-30 * mm, 6 * mm)], rtol=1e-9)

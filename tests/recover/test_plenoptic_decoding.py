@@ -381,3 +381,14 @@ def test_pitches_of_pixels_that_are_not_square():
     steps = np.diag([1, 1 / 1.3]) @ turned @ np.array([[1, 0.5], [0, np.sqrt(3) / 2]]) * 9
     grid = LensletGrid("hexagonal", (0.0, 0.0), tuple(map(tuple, steps.T)))
     np.testing.assert_allclose(grid.pitches, (9, 9 / 1.3), rtol=1e-12)
+
+
+def test_a_grey_white_image_serves_recordings_in_colour():
+    camera, image = plenoptic()
+    y, x = np.mgrid[: image.shape[0], : image.shape[1]]
+    shade = 1 - 0.6 * ((x - 70) ** 2 + (y - 80) ** 2) / 110**2
+    colours = np.array([1.0, 0.5, 0.25])
+    plain = decode_plenoptic(image, camera=camera, views=5)
+    raw = (image.values * shade)[..., None] * colours
+    decoded = decode_plenoptic(raw, LensletGrid.of_camera(camera), camera=camera, white=shade, views=5)
+    np.testing.assert_allclose(decoded.values, plain.values[..., None] * colours, atol=1e-6)

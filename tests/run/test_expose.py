@@ -569,3 +569,9 @@ def test_expose_refuses_before_it_works(monkeypatch):
     grey = vcc.LightField(np.asarray(light_field.values)[..., 0], light_field.frame)
     with pytest.raises(vcc.InputError, match="light field is grey"):
         camera.expose(grey, 1e-3)
+
+
+def test_a_sensor_of_one_tile_is_demosaiced():
+    on = sensor(dataclasses.replace(QUIET, color_filter="RGGB"), shape=(2, 2))
+    got = vcc.expose_image(picture((0.2, 0.6, 0.4), on), on, "auto").demosaiced("bilinear").values
+    np.testing.assert_allclose(got / got[..., 1:2], np.broadcast_to([1 / 3, 1, 2 / 3], got.shape), rtol=0.1)
