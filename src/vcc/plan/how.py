@@ -63,9 +63,9 @@ class How(Value, Shown):
         scene_distance: the distance in metres of the scene before the entrance plane, by which that
             interpolation goes; None takes the range of distances that the light field states or shows.
         refine: footprints: ``"auto"`` divides cells and samples where a mask is finer than they are, at a cost
-            that `vcc.Camera.explain` states; a number from 2 to 8 divides the same, samples up to so many parts each
-            way and cells of views up to as many, but at least as far as "auto" does; 1 divides nothing, and nothing
-            is then said of what that costs.
+            that `vcc.Camera.explain` states; a number from 2 to 8 divides the same, samples up to so many parts
+            each way and cells of views up to as many, but at least as far as "auto" does; 1 divides nothing, and
+            nothing is then said of what that costs.
         samples: rays a pixel, rounded up to a power of two (behind a main lens and lenslets: for each lenslet that
             the pixel sees); None takes 64, whose error is warned of where it exceeds 1 % of the brightest pixel.
         tolerance: double the samples until the estimated sampling error of the picture, root mean square, is at

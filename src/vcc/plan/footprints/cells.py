@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -174,8 +175,7 @@ def divide_views(
             parts *= 2
     spread = parts > 1
     groups = [view_planes] * bool(view_planes) + [[plane] for plane in path_planes]
-    where = _together(groups, geometry)
-    apart = Apart(_no_error, 0.0)
+    apart = Apart(_no_error, 0.0, (False,) * len(groups))
     if len(groups) > 1:  # even where no view of this piece needs it: all pieces of a light field are divided alike
         apart = detail.together(
             Looks.of(
@@ -187,22 +187,29 @@ def divide_views(
                 geometry.extent,
             )
         )
-    misplaced = max((_misplaced(plane, between, geometry, detail) for plane in path_planes), default=0.0)
+    where = _together([group for group, even in zip(groups, apart.even, strict=True) if not even], geometry)
+    cut = [(plane, _misplaced(plane, between, geometry, detail)) for plane in path_planes]
+    misplaced = max((error for _, error in cut), default=0.0)
+
+    def chosen(share: float, left: Callable[[int], float]) -> tuple[int, float]:
+        """The parts of divided cells, which hold a share of the rays, and the error that they leave."""
+        # Where few cells are to be divided, they may be divided further for as many taps.
+        most = 2 * LARGEST_CHOSEN_DIVISION if 0 < 4 * share <= 1 and not spread else LARGEST_CHOSEN_DIVISION
+        most = most if refine == "auto" else max(most, int(refine))
+        finer = parts
+        while finer < most and left(finer) > ERROR:
+            finer *= 2
+        return finer, left(finer)
+
+    finer, error = chosen(apart.share, lambda parts: max(apart.error(parts), misplaced))
     if misplaced > ERROR:
-        where, apart = where | geometry.varying(path_planes), apart._replace(share=1.0)
-    # Where few cells are to be divided, they may be divided further for as many taps.
-    most = 2 * LARGEST_CHOSEN_DIVISION if 0 < 4 * apart.share <= 1 and not spread else LARGEST_CHOSEN_DIVISION
-    most = most if refine == "auto" else max(most, int(refine))
-
-    def left(finer: int) -> float:
-        return float(max(apart.error(finer), misplaced / finer**1.5))
-
-    finer = parts
-    while finer < most and left(finer) > ERROR:
-        finer *= 2
+        all_cut = chosen(1.0, lambda parts: max(apart.error(parts), misplaced / parts**1.5))
+        if all_cut[1] <= error:  # else few cells divided further leave less
+            finer, error = all_cut
+            where = where | geometry.varying([plane for plane, error in cut if error > ERROR])
     if spread:  # a tent reaches over cells that are divided and cells that are not
-        return CellDivision(finer, True, error=left(finer))
-    return CellDivision(parts, False, finer, where, left(finer))
+        return CellDivision(finer, True, error=error)
+    return CellDivision(parts, False, finer, where, error)
 
 
 def _together(groups: list[list[Plane]], geometry: Geometry) -> NDArray[np.bool_]:

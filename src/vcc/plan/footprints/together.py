@@ -42,10 +42,12 @@ class Apart(NamedTuple):
     Args:
         error: by which a picture errs where cells are divided into so many parts each way, a share of its light.
         share: of the rays, of those in whose cells several elements vary.
+        even: which groups let the same light pass wherever they are looked at.
     """
 
     error: Callable[[int], float]
     share: float
+    even: tuple[bool, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,7 +135,8 @@ class Looks(Brief):
         ratio = float(np.clip(half / whole, *HALVED)) if whole > 0 else HALVED[0]
         varying = sum(np.asarray(np.ptp(each, axis=(-2, -1)) > 0, dtype=int) for each in values)
         share = float(np.mean(np.asarray(varying) > 1))
-        return Apart(lambda parts: whole if parts == 1 else half * ratio ** math.log2(parts / 2), share)
+        even = tuple(bool(np.ptp(each) == 0) for each in values)
+        return Apart(lambda parts: whole if parts == 1 else half * ratio ** math.log2(parts / 2), share, even)
 
     def _error(self, values: list[Array], parts: int) -> float:
         each = POINTS // parts
