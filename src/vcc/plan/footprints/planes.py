@@ -52,10 +52,9 @@ class Plane(Brief):
         """
         cutting = decisions.keep("what cuts light off", lambda: not_clear_beside_others(patterns))
         patterns = [patterns[n] for n in cutting]
-        # About the middle of the smallest, as it would be by itself.
-        smallest = decisions.keep(
-            "about which middle", lambda: int(np.argmin([np.prod(pattern.size) for pattern, _ in patterns]))
-        )
+        # About the middle of the smallest, as it would be by itself, whatever the order in which they are given.
+        sizes = [(float(np.prod(pattern.size)), *middle) for pattern, middle in patterns]
+        smallest = decisions.keep("about which middle", lambda: sizes.index(min(sizes)))
         decentre = patterns[smallest][1]
         pattern = in_one_plane([(one, (x - decentre[0], y - decentre[1])) for one, (x, y) in patterns])
         return cls(pattern, label, decentre, place[:, :4], place[:, 4] - np.array(decentre))
