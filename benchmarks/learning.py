@@ -152,8 +152,8 @@ def at_once(kind: str, shape: tuple[int, ...], place: str) -> Case:
     return Case(
         f"{times} times rasters of {MASKS} masks {place}, {kind}, {'×'.join(map(str, shape))}",
         {
-            "one": several(lambda: numba_cpu.footprints(cores[0], values, threads=THREADS)),
-            f"{MASKS} in one pass": several(lambda: numba_cpu.together(cores, values, threads=THREADS)),
+            "one": several(lambda: numba_cpu.run(cores[0], values, threads=THREADS)),
+            f"{MASKS} in one pass": several(lambda: numba_cpu.batch(cores, values, threads=THREADS)),
         },
         "one",
     )

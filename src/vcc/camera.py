@@ -15,7 +15,6 @@ from vcc.advice.noise import why_noisy
 from vcc.base import checks, late
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
-from vcc.engines import chosen as chosen_engine
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
 from vcc.files.camera_writing import write_train
 from vcc.image import Image
@@ -31,7 +30,8 @@ from vcc.plan.model import Plan
 from vcc.plan.protocol import Room
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
-from vcc.run.drive import Recorded, drive, each_recorded, recorded_mixed
+from vcc.run.batches import may_be_mixed, recorded_each, recorded_mixed
+from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
 from vcc.run.operator import Operator
 from vcc.run.operators import carried_to
@@ -421,7 +421,7 @@ def each_captured(
 
     Cameras that differ in the cells of one mask alone, and are many, are made of a few pictures
     (`vcc.plan.footprints.mixtures`). Others are planned each by itself, and share what
-    `vcc.run.drive.each_recorded` says.
+    `vcc.run.batches.recorded_each` says.
 
     Args:
         cameras: in memory for some hundred bytes each; their pictures are made as they are asked for.
@@ -444,8 +444,7 @@ def each_captured(
     if how.between_views == "depth":
         yield from enumerate(camera.capture(light_field, how) for camera in cameras)
         return
-    by_numba = chosen_engine(how.engine, light_field.whole()) == "numba"
-    mixture = mixture_of(cameras, light_field.grid, how) if by_numba else None
+    mixture = mixture_of(cameras, light_field.grid, how) if may_be_mixed(light_field, how) else None
     if mixture is not None:
         absurd = metres_meant(cameras[0], light_field.grid)  # of all of them: they differ in cells alone
         found = zip(mixture.members, recorded_mixed(mixture, light_field, how, room), strict=True)
@@ -463,8 +462,7 @@ def each_captured(
         None if seeds is None else [seeds[number] for number in left],
     )
     room_of = room and (lambda places: room([left[place] for place in places]))
-    recorded_each = each_recorded(plans, light_field, how, room_of)
-    for number, (plan, one) in zip(left, recorded_each, strict=True):
+    for number, (plan, one) in zip(left, recorded_each(plans, light_field, how, room_of), strict=True):
         for caution in plan.cautions:
             warn_of_result(caution)
         camera = cameras[number]

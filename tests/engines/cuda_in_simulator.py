@@ -203,12 +203,12 @@ def test_backwards_as_the_reference(name, monkeypatch):
     channels = values.shape[4:] or (1,)
     weights = np.random.default_rng(1).random((*core.raster_shape, *channels))
     wanted = ["weights", "scale", *(f"masks[{n}].texture" for n in range(len(core.masks)))]
-    expected = reference.footprints_back(core, values, weights, wanted=wanted, threads=1)
+    expected = reference.back(core, values, weights, wanted=wanted, threads=1)
     in_pieces = name in ("two masks", "sheared", "divided")  # column by column of views, too
     for at_once in (cuda_footprints.ROOM, 1)[: 1 + in_pieces]:
         monkeypatch.setattr(cuda_footprints, "ROOM", at_once)
         monkeypatch.setattr(cuda_back, "ROOM", at_once)
-        found = engine.footprints_back(core, values, weights, wanted=wanted, threads=1)
+        found = engine.back(core, values, weights, wanted=wanted, threads=1)
         assert_close(found.samples, expected.samples)
         for number in wanted:
             assert_close(found.numbers[number], expected.numbers[number])
@@ -275,7 +275,7 @@ def test_arrays_that_are_on_the_gpu_are_taken_and_given_as_they_are():
     lf.values[:] *= 2  # what was taken is no copy, which would show the light as it was
     np.testing.assert_allclose(camera.capture(there, **options).values.array, 2 * picture.array, rtol=1e-6)
     core, values = CORES["two masks"]
-    found = engine.footprints_back(core, Elsewhere(values), np.ones((*core.raster_shape, 3)), threads=1)
+    found = engine.back(core, Elsewhere(values), np.ones((*core.raster_shape, 3)), threads=1)
     assert isinstance(found.samples, Elsewhere)
 
 
@@ -361,7 +361,8 @@ def test_the_benchmark_runs(monkeypatch, capsys):
 def test_what_is_not_done_is_refused_by_name():
     core, values = CORES["two masks"]
     weights = np.zeros((*core.raster_shape, 3))
+    rays = small(elements_before("cubic plate")).compile(field_of_rays(samples((2, 2, 4, 5))), method="rays").core
     with pytest.raises(vcc.InputError, match=r"none to 'masks\[0\].column'.*engine='numba'"):
-        engine.footprints_back(core, values, weights, wanted=["masks[0].column"], threads=1)
+        engine.back(core, values, weights, wanted=["masks[0].column"], threads=1)
     with pytest.raises(vcc.InputError, match=r"does not go backwards through rays.*engine='numba'"):
-        engine.rays_back(None, None, None)
+        engine.back(rays, None, None, threads=1)

@@ -89,12 +89,12 @@ def main() -> None:
         (vcc.Camera([LENS, mask], sensor), turned(lf, 0.3), {"interpolation": "linear", "refine": 1}),
     ):
         core = camera.compile(light_field, **options).core
-        engine.footprints(core, values, threads=1)
+        engine.run(core, values, threads=1)
         wanted = ["weights", *(f"masks[{n}].texture" for n in range(len(core.masks)))]
-        engine.footprints_back(core, values, np.zeros((*core.raster_shape, 3)), wanted=wanted, threads=1)
+        engine.back(core, values, np.zeros((*core.raster_shape, 3)), wanted=wanted, threads=1)
     for elements in ([LENS, mask], [LENS, lenslets]):
         core = vcc.Camera(elements, sensor).compile(lf, method="rays", samples=4).core
-        engine.rays(core, values, threads=1)
+        engine.run(core, values, threads=1)
     for plain in (values, values[..., 0].copy(), values[:, ::2]):
         compiled(cuda_arrays._arrange, None, 0, plain, True, values)
     compiled(cuda_arrays._set_to_zero, None, 0, np.zeros(1, np.float32))

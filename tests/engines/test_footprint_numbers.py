@@ -102,7 +102,7 @@ def wanted_of(core: Footprints) -> list[str]:
 
 def assert_as_the_reference(core: Footprints, values: np.ndarray, wanted: list[str]) -> None:
     weights = weights_for(core, values)
-    expected = reference.footprints_back(core, values, weights, samples=False, wanted=wanted, threads=1).numbers
+    expected = reference.back(core, values, weights, samples=False, wanted=wanted, threads=1).numbers
     found = numbers_back(core, values, weights, wanted, 2)
     assert list(found) == wanted
     for name in wanted:
@@ -196,6 +196,6 @@ def test_progress_of_samples_and_numbers_is_told_up_to_the_end(shear):
         said.append((done, total))
 
     options = {"wanted": ["weights"], "threads": 1, "progress": told}
-    numba_cpu.footprints_back(core, values, weights_for(core, values), **options)
+    numba_cpu.back(core, values, weights_for(core, values), **options)
     assert said == sorted(said)
     assert said[-1] == (2 * core.taps_used, 2 * core.taps_used)

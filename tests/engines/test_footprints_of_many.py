@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from tests.engines.test_footprint_numbers import Drawn
-from vcc.engines import array_api, numba_cpu, reference
-from vcc.engines.footprints_of_many import rasters_by_turns
+from vcc.engines import numba_cpu
+from vcc.engines.footprints_of_many import rasters, rasters_by_turns
 from vcc.engines.many_kernels import SPAN
 from vcc.plan.footprints.model import Footprints
 
@@ -45,13 +45,12 @@ def with_other_textures(core: Footprints, n: int) -> list[Footprints]:
 
 
 def assert_each_as_alone(cores: list[Footprints], values: np.ndarray) -> None:
-    found = numba_cpu.together(cores, values, threads=1)
-    again = numba_cpu.together(cores, values, threads=3)
-    assert found is not None
-    assert again is not None
+    assert rasters(cores, values, 1) is not None  # in one pass
+    found = numba_cpu.batch(cores, values, threads=1)
+    again = numba_cpu.batch(cores, values, threads=3)
     largest = 0.0
     for core, one, other in zip(cores, found, again, strict=True):
-        alone = numba_cpu.footprints(core, values, threads=2).values
+        alone = numba_cpu.run(core, values, threads=2).values
         assert one.values.shape == alone.shape
         assert one.values.tobytes() == other.values.tobytes()
         assert np.abs(one.values - alone).max() <= AGREEMENT * np.abs(alone).max()
@@ -86,22 +85,27 @@ def test_places_by_turns_are_the_same_to_the_bit(name: str) -> None:
     found = rasters_by_turns([core, moved, larger], values)
     assert found is not None
     for one, raster in zip((core, moved, larger), found, strict=True):
-        assert raster.tobytes() == numba_cpu.footprints(one, values, threads=1).values.tobytes()
+        assert raster.tobytes() == numba_cpu.run(one, values, threads=1).values.tobytes()
     assert rasters_by_turns([core, replace(core, view_rows=core.view_rows[::-1])], values) is None
     assert rasters_by_turns([Drawn(refine=3).core()], Drawn(refine=3).values()) is None
 
 
-def test_what_differs_in_more_runs_one_after_the_other() -> None:
+def test_what_differs_in_more_is_made_one_by_one() -> None:
     drawn = Drawn(masks=2)
     core, values = drawn.core(), drawn.values()
     textures = with_other_textures(core, 0)
-    assert numba_cpu.together([core], values, threads=1) is None
-    both = [*textures, *with_other_textures(core, 1)]
-    assert numba_cpu.together(both, values, threads=1) is None
-    assert numba_cpu.together([core, replace(core, scale=2.0)], values, threads=1) is None
-    assert numba_cpu.together([*textures, with_other_weights(core)[0]], values, threads=1) is None
-    for other in (Drawn(refine=3), Drawn(shear=0.1)):
-        apart = with_other_weights(other.core())
-        assert numba_cpu.together(apart, other.values(), threads=1) is None
-    for engine in (reference, array_api):
-        assert engine.together(textures, values, threads=1) is None
+    divided, sheared = Drawn(refine=3), Drawn(shear=0.1)
+    for cores, light in (
+        ([core], values),
+        ([*textures, *with_other_textures(core, 1)], values),
+        ([core, replace(core, scale=2.0)], values),
+        ([*textures, with_other_weights(core)[0]], values),
+        (with_other_weights(divided.core()), divided.values()),
+        (with_other_weights(sheared.core()), sheared.values()),
+    ):
+        assert rasters(cores, light, 1) is None
+        for threads in (1, 3):
+            found = numba_cpu.batch(cores, light, threads=threads)
+            for one, each in zip(cores, found, strict=True):
+                alone = numba_cpu.run(one, light, threads=1).values
+                np.testing.assert_allclose(each.values, alone, rtol=0, atol=AGREEMENT * np.abs(alone).max())

@@ -140,7 +140,7 @@ def test_the_reference_agrees_with_difference_quotients(name):
     names, random = wanted(core), np.random.default_rng(11)
     told = ray_numbers_back(core, values, raster, names)
     assert list(told) == names
-    picture = reference.rays(core, values, threads=1).values
+    picture = reference.run(core, values, threads=1).values
     size = float(np.abs(picture * raster).sum())
     for each in names:
         value, gradient = numbers(core)[each], told[each]
@@ -151,7 +151,7 @@ def test_the_reference_agrees_with_difference_quotients(name):
         step = STEP * (size / both if both > 0 else float(np.abs(value[np.isfinite(value)]).max(initial=1e-6)))
         changed = [with_numbers(core, {each: value + sign * step * way}) for sign in (1, -1)]
         ahead, behind = (
-            float((reference.rays(other, values, threads=1).values * raster).sum()) for other in changed
+            float((reference.run(other, values, threads=1).values * raster).sum()) for other in changed
         )
         assert abs(ahead - behind - 2 * step * slope) <= TOLERANCE * 2 * step * both + 1e-14 * size * (
             both == 0
@@ -166,7 +166,7 @@ def test_compiled_rays_agree_with_the_reference(name):
     """
     core, values, raster = case(name)
     values = values.astype(np.float32)
-    names, size = wanted(core), np.abs(reference.rays(core, values, threads=1).values * raster).sum()
+    names, size = wanted(core), np.abs(reference.run(core, values, threads=1).values * raster).sum()
     right = ray_numbers_back(core, values, raster, names, beside=1)
     told = ray_numbers.ray_numbers_back(core, values, raster, names, beside=1, threads=2)
     assert list(told) == names

@@ -77,4 +77,4 @@ def test_what_bends_or_scatters_looks_up_whole_views():
     ):
         lf = field()
         plan = vcc.Camera([LENS, element], sensor()).compile(lf, method="rays", samples=16)
-        assert numba_cpu.to_prepare(plan.core, plan.before, lf.values) is None
+        assert isinstance(numba_cpu.prepared(plan.before, lf.values, 1, plan.core), np.ndarray)

@@ -56,8 +56,8 @@ def error(engine, core: Rays, channels: tuple[int, ...], beside: int = 0) -> flo
     kind = np.float64 if engine is reference else np.float32
     samples, weights = drawn(core, channels)
     samples = samples.astype(kind)
-    raster = engine.rays(core, samples, beside=beside, threads=2).values
-    back = engine.rays_back(core, samples, weights, beside=beside, threads=2)
+    raster = engine.run(core, samples, beside=beside, threads=2).values
+    back = engine.back(core, samples, weights, beside=beside, threads=2)
     assert back.samples.shape == samples.shape
     assert back.samples.dtype == kind
     assert back.numbers == {}
@@ -71,8 +71,8 @@ def assert_transposed(core: Rays, channels: tuple[int, ...], beside: int = 0) ->
     assert error(numba_cpu, core, channels, beside) < 1e-6
     _, weights = drawn(core, channels, seed=1)
     values = np.broadcast_to(np.float32(0), (*core.views, *channels))  # of which only the shape is looked at
-    plain = reference.rays_back(core, values, weights, beside=beside, threads=1).samples
-    fast = numba_cpu.rays_back(core, values, weights, beside=beside, threads=2).samples
+    plain = reference.back(core, values, weights, beside=beside, threads=1).samples
+    fast = numba_cpu.back(core, values, weights, beside=beside, threads=2).samples
     np.testing.assert_allclose(fast, plain, rtol=0, atol=1e-6 * plain.max())
 
 
@@ -107,17 +107,17 @@ def test_the_same_bytes_for_any_number_of_threads(many, monkeypatch):
     core = made(vcc.Camera([LENS, PRISMS], TILES), field_of((5, 4, 9, 11, 3)))
     samples, weights = drawn(core, (3,))
     assert error(numba_cpu, core, (3,)) < 1e-6
-    first = numba_cpu.rays_back(core, samples, weights, threads=1).samples
+    first = numba_cpu.back(core, samples, weights, threads=1).samples
     for threads in (1, 2, 3):
-        np.testing.assert_array_equal(numba_cpu.rays_back(core, samples, weights, threads=threads).samples, first)
+        np.testing.assert_array_equal(numba_cpu.back(core, samples, weights, threads=threads).samples, first)
 
 
 def test_rounds_of_rays_that_are_kept_do_not_show(monkeypatch):
     core = made(vcc.Camera([LENS, PRISMS], TILES), field_of((5, 4, 9, 11)))
     samples, weights = drawn(core, ())
-    whole = numba_cpu.rays_back(core, samples, weights, threads=2).samples
+    whole = numba_cpu.back(core, samples, weights, threads=2).samples
     monkeypatch.setattr(ray_transpose, "KEPT", 2**12)
-    parts = numba_cpu.rays_back(core, samples, weights, threads=2).samples
+    parts = numba_cpu.back(core, samples, weights, threads=2).samples
     np.testing.assert_allclose(parts, whole, rtol=1e-6)
 
 
@@ -127,12 +127,12 @@ def test_blocks_with_borders_give_what_the_whole_gives(engine, between):
     """Of each block that runs with its neighbours' views around it, those within count."""
     core = made(vcc.Camera([LENS, LENSLETS], SENSOR), field_of((5, 4, 9, 11)), between_views=between)
     samples, weights = drawn(core, ())
-    whole = engine.rays_back(core, samples, weights, threads=2).samples
+    whole = engine.back(core, samples, weights, threads=2).samples
     found = np.full(whole.shape, np.nan)
     for a, b, l, m in [(0, 2, 0, 9), (2, 5, 0, 4), (2, 5, 4, 9)]:
         top, end = max(a - core.border, 0), min(b + core.border, 5)
         block = Block((top, end), (0, 4), (l, m), (0, 11))
-        part = engine.rays_back(core.part(block), samples[block.slices], weights, threads=2).samples
+        part = engine.back(core.part(block), samples[block.slices], weights, threads=2).samples
         found[a:b, :, l:m] = part[a - top : b - top]
     np.testing.assert_allclose(found, whole, rtol=0, atol=1e-6 * whole.max())
 
@@ -143,7 +143,7 @@ def test_samples_and_numbers_count_to_one_total(engine):
     samples, weights = drawn(core, ())
     samples = samples.astype(np.float32)
     calls: list[tuple[int, int]] = []
-    back = engine.rays_back(
+    back = engine.back(
         core, samples, weights, wanted=["scale"], threads=1, progress=lambda *call: calls.append(call)
     )
     assert back.samples is not None
@@ -151,4 +151,4 @@ def test_samples_and_numbers_count_to_one_total(engine):
     done, totals = zip(*calls, strict=True)
     assert set(totals) == {done[-1]}
     assert list(done) == sorted(done)
-    assert engine.rays_back(core, samples, weights, samples=False, threads=1).samples is None
+    assert engine.back(core, samples, weights, samples=False, threads=1).samples is None

@@ -10,7 +10,7 @@ import pytest
 import vcc
 from tests.engines.test_agreement import CAMERAS, field, samples, turned
 from tests.physics.random_cameras import AFFINE, drawn
-from vcc.engines import array_api, reference
+from vcc.engines import reference
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import share_slopes, shares
 from vcc.plan.numbers import numbers, with_numbers
@@ -34,7 +34,7 @@ def light_of(core: Footprints, channels: int = 2) -> np.ndarray:
 
 
 def ahead(core: Footprints, values: np.ndarray) -> np.ndarray:
-    return reference.footprints(core, values, threads=1).values
+    return reference.run(core, values, threads=1).values
 
 
 def weights_of(core: Footprints, values: np.ndarray) -> np.ndarray:
@@ -44,7 +44,7 @@ def weights_of(core: Footprints, values: np.ndarray) -> np.ndarray:
 def assert_adjoint(core: Footprints) -> None:
     values = light_of(core)
     weights, picture = weights_of(core, values), ahead(core, values)
-    found = reference.footprints_back(core, np.broadcast_to(np.float32(0), values.shape), weights, threads=1)
+    found = reference.back(core, np.broadcast_to(np.float32(0), values.shape), weights, threads=1)
     assert found.samples.dtype == np.float64
     assert found.numbers == {}
     product = (found.samples * values).sum()
@@ -72,7 +72,7 @@ def assert_differences(core: Footprints, names=None, together: bool = False) -> 
     values, draw = light_of(core), np.random.default_rng(7)
     weights, every = weights_of(core, values), numbers(core)
     names = [name for name in names or every if name != "sharpen_samples"]
-    found = reference.footprints_back(core, values, weights, samples=False, wanted=names, threads=1)
+    found = reference.back(core, values, weights, samples=False, wanted=names, threads=1)
     assert found.samples is None
     assert {name: one.shape for name, one in found.numbers.items()} == {name: every[name].shape for name in names}
     # Steps count up to the last sample.
@@ -136,18 +136,16 @@ def test_places_have_no_derivative_on_the_nearest_pixel():
     values = light_of(core)
     for name in ("x", "y", "step", "opening"):
         with pytest.raises(vcc.InputError, match=f"'{name}' where each sample falls on the nearest pixel"):
-            reference.footprints_back(core, values, weights_of(core, values), wanted=[name], threads=1)
+            reference.back(core, values, weights_of(core, values), wanted=[name], threads=1)
     assert_differences(core, [name for name in numbers(core) if name not in ("x", "y", "step", "opening")])
 
 
 def test_what_there_is_no_derivative_to_is_refused_by_name():
     core = core_of(CAMERAS["three masks"], field(samples(SMALL)), refine=2)
     with pytest.raises(vcc.InputError, match="sharpen_samples"):
-        reference.footprints_back(core, light_of(core), None, wanted=["sharpen_samples"], threads=1)
+        reference.back(core, light_of(core), None, wanted=["sharpen_samples"], threads=1)
     with pytest.raises(vcc.InputError, match=r"no number 'masks\[9\].row'"):
-        reference.footprints_back(core, light_of(core), None, wanted=["masks[9].row"], threads=1)
-    with pytest.raises(vcc.InputError, match="engine='numba'"):
-        array_api.footprints_back(core, light_of(core), None, threads=1)
+        reference.back(core, light_of(core), None, wanted=["masks[9].row"], threads=1)
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic", "spline"])

@@ -80,7 +80,7 @@ def of_some_taps(core: Footprints) -> Footprints:
 
 def back(core: Footprints, shape: tuple[int, ...], raster: np.ndarray, threads: int = 2, **options) -> np.ndarray:
     without_content = np.broadcast_to(np.float32(0), shape)
-    gradient = NUMBA.footprints_back(core, without_content, raster, threads=threads, **options)
+    gradient = NUMBA.back(core, without_content, raster, threads=threads, **options)
     assert gradient.numbers == {}
     return gradient.samples
 
@@ -97,11 +97,11 @@ def assert_transposed(core: Footprints, *channels: int) -> None:
     assert gradient.shape == shape
     assert gradient.dtype == np.float32
     assert not gradient[-1].any()
-    plain = REFERENCE.footprints_back(core, x, y, threads=1).samples
+    plain = REFERENCE.back(core, x, y, threads=1).samples
     assert np.abs(gradient - plain).max() <= 2 * ROUNDING * np.abs(plain).max()
     right = np.vdot(x.astype(float), gradient)
     for each in (NUMBA, REFERENCE):
-        raster = each.footprints(core, x, threads=2).values.astype(float)
+        raster = each.run(core, x, threads=2).values.astype(float)
         size = np.linalg.norm(raster) * np.linalg.norm(y)
         assert size > 0
         assert abs(np.vdot(raster, y) - right) <= ROUNDING * size
@@ -137,7 +137,7 @@ def test_the_transpose_is_that_of_the_matrix(name, refine, roll):
     if name == "divided views":
         core = of_some_taps(core)
     count = math.prod(shape)
-    matrix = REFERENCE.footprints(core, np.eye(count).reshape(*shape, count), threads=1).values
+    matrix = REFERENCE.run(core, np.eye(count).reshape(*shape, count), threads=1).values
     for channels in ((), (1,), (3,), (4,)):
         y = weights_for(core, (*shape, *channels))
         expected, size = (

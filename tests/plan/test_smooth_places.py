@@ -48,7 +48,7 @@ def picture(changed: dict[str, float], shift: np.ndarray) -> np.ndarray:
     own = camera(changed).compile(FIELD, method="footprints", between_views="none", refine=1).core
     numbers = {"x": own.x, "y": own.y, "step": own.step, "masks[0].step": step}
     numbers |= {"masks[0].column": start[..., 0] + shift[0], "masks[0].row": start[..., 1] + shift[1]}
-    return reference.footprints(with_numbers(PLAN.core, numbers), FIELD.values, threads=1).values
+    return reference.run(with_numbers(PLAN.core, numbers), FIELD.values, threads=1).values
 
 
 @pytest.mark.parametrize("border", [0.0, 0.5])

@@ -60,11 +60,11 @@ def _pilot(run: Drive, core: Rays) -> _Pilot | None:
 
     def traced_in(patches: list[Rays]) -> tuple[list[Partial], float]:
         start = time.perf_counter()
-        found = [run.runner(patch, values, threads=run.threads) for patch in patches]
+        found = [run.engine.run(patch, values, threads=run.threads) for patch in patches]
         return found, (time.perf_counter() - start) / len(patches)
 
     rows, columns = core.raster_shape
-    patches = list(_patches(core, run.threads if run.name == "numba" else 1))
+    patches = list(_patches(core, run.threads if run.able.parallel else 1))
     pixel = replace(core, raster_shape=(1, 1))
     traced_in([pixel])  # the first run may compile
     _, fixed = traced_in([pixel])
@@ -124,10 +124,11 @@ def _cost(run: Drive, core: Rays, pilot: _Pilot | None) -> str:
 def _memory(run: Drive, core: Rays) -> int:
     """Bytes that a run takes beside the light field and the picture, estimated."""
     whole, copied = run.samples.whole(), 0
-    in_parts = whole is not None and run.engine.to_prepare(core, run.plan.before, whole) is not None
-    made_anew = not in_parts and bool(run.plan.before or run.kind != getattr(whole, "dtype", None))
-    if isinstance(whole, np.ndarray) and (made_anew or not whole.flags.c_contiguous):
-        copied = whole.size * run.kind.itemsize
+    if isinstance(whole, np.ndarray):
+        in_parts = not isinstance(run.taken, np.ndarray)
+        made_anew = not in_parts and bool(run.plan.before or run.kind != whole.dtype)
+        if made_anew or not whole.flags.c_contiguous:
+            copied = whole.size * run.kind.itemsize
     return run.engine.memory(core, run.channels, run.threads) + copied
 
 

@@ -15,15 +15,22 @@ import numpy as np
 from vcc.base import late
 from vcc.base.errors import InputError
 from vcc.plan.how import EngineName
-from vcc.plan.protocol import Engine
+from vcc.plan.protocol import Abilities, Engine
 
-ENGINES: dict[EngineName, str] = {
-    "reference": "vcc.engines.reference",
-    "array_api": "vcc.engines.array_api",
-    "numba": "vcc.engines.numba_cpu",
-    "cuda": "vcc.engines.cuda",
+BY_THEIR_LIBRARY = (
+    "engine 'array_api' goes backwards by the gradients of its arrays' own library: take those of camera.capture, "
+    "or pass NumPy arrays and engine='numba' or 'reference'"
+)
+ENGINES: dict[EngineName, tuple[str, Abilities]] = {
+    "reference": ("vcc.engines.reference", Abilities(double=True, copies=True)),
+    "array_api": (
+        "vcc.engines.array_api",
+        Abilities(copies=True, no_derivatives=BY_THEIR_LIBRARY, no_learning="carries gradients to samples only"),
+    ),
+    "numba": ("vcc.engines.numba_cpu", Abilities(parallel=True, bands=True)),
+    "cuda": ("vcc.engines.cuda", Abilities(no_learning="does not learn cameras")),
 }
-"""Where each engine is: loaded when it is first used, since what it needs is slow to load."""
+"""Where each engine is, loaded when it is first used since what it needs is slow to load, and what it can do."""
 
 
 def chosen(name: EngineName | None, values: Any) -> EngineName:
@@ -50,7 +57,12 @@ def chosen(name: EngineName | None, values: Any) -> EngineName:
 
 def engine(name: EngineName) -> Engine:
     """The engine of a name."""
-    return cast(Engine, late.module(ENGINES[name]))
+    return cast(Engine, late.module(ENGINES[name][0]))
+
+
+def abilities(name: EngineName) -> Abilities:
+    """What the engine of a name can do."""
+    return ENGINES[name][1]
 
 
 def on_gpu(values: Any) -> Any:
@@ -59,4 +71,4 @@ def on_gpu(values: Any) -> Any:
     Raises:
         InputError: numba-cuda is not installed, there is no GPU, or an array of another library in main memory.
     """
-    return late.module(ENGINES["cuda"]).resident(values)
+    return late.module(ENGINES["cuda"][0]).resident(values)

@@ -16,7 +16,6 @@ import numpy as np
 from array_api_compat import array_namespace, device, is_torch_array
 from numpy.typing import NDArray
 
-from vcc.base.errors import InputError
 from vcc.base.lookup import three_around
 from vcc.base.progress import Progress, tell
 from vcc.engines.bands import Bands
@@ -25,53 +24,24 @@ from vcc.fields.sampled import to_dtype
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints, MaskLookup
 from vcc.plan.footprints.shares import Division, Taps, reach_in_pixels, shares, taps
-from vcc.plan.protocol import Gradient, Partial
+from vcc.plan.protocol import Partial
 from vcc.plan.rays.model import Rays
 
 Array = NDArray[np.float64]
 
-copies = True
-"""Samples are converted as a whole; see `vcc.plan.protocol.Engine`."""
-double = False
-"""See there."""
 
-
-def footprints(
-    core: Footprints, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
+def run(
+    core: Footprints | Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
 ) -> Partial:
-    """The raster of samples (v, u, t, s[, channels]); see `vcc.plan.protocol.Runner`."""
+    """The raster of samples (v, u, t, s[, channels]); see `vcc.plan.protocol.Engine`."""
+    if isinstance(core, Rays):
+        return traced(core, values, False, beside, progress)
     return Partial(_Run(core, values).raster(progress))
 
 
-def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None) -> Partial:
-    """The raster of samples (v, u, t, s[, channels]) by the plan's own rays."""
-    return traced(core, values, False, beside, progress)
-
-
-def footprints_back(core: Footprints, values: Any, raster: Any, **options: Any) -> Gradient:
-    """Nothing: arrays' own libraries take derivatives of what this engine does.
-
-    Raises:
-        InputError: always.
-    """
-    raise InputError(
-        "engine 'array_api' leaves the way back to its arrays' library (autograd, grad): use engine='numba' or "
-        "engine='reference', with NumPy arrays"
-    )
-
-
-rays_back = footprints_back
-
-
-def together(cores: Any, values: Any, **options: Any) -> None:
-    """None: several cores run one after the other; see `vcc.plan.protocol.Engine`."""
-
-
-def to_prepare(core: Rays, before: Sequence[operators.Before], values: Any) -> None:
-    """Samples are prepared as a whole; see `vcc.plan.protocol.Engine`."""
-
-
-def prepared(before: Sequence[operators.Before], values: Any, threads: int) -> Any:
+def prepared(
+    before: Sequence[operators.Before], values: Any, threads: int, core: Footprints | Rays | None = None
+) -> Any:
     """Samples as a core takes them."""
     for operator in before:
         values = operator.apply(values)

@@ -28,11 +28,6 @@ from vcc.plan.rays.model import Rays
 
 cuda_arrays.check_gpu()
 
-copies = False
-"""Samples are sent piece by piece; see `vcc.plan.protocol.Engine`."""
-double = False
-"""See there."""
-
 
 def resident(values: Any) -> Any:
     """Samples on the GPU: NumPy's are copied there, those that are there stay as they are.
@@ -43,24 +38,17 @@ def resident(values: Any) -> Any:
     return cuda_arrays.resident(values)
 
 
-def footprints(
-    core: Footprints, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
+def run(
+    core: Footprints | Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
 ) -> Partial:
-    """The raster of samples (v, u, t, s[, channels]), float32; see `vcc.plan.protocol.Runner`."""
+    """The raster of samples (v, u, t, s[, channels]), float32; see `vcc.plan.protocol.Engine`."""
+    if isinstance(core, Rays):
+        return cuda_rays.traced(core, values, beside, progress)
     return Partial(cuda_footprints.raster_of(core, values, progress))
 
 
-def together(cores: Any, values: Any, **options: Any) -> None:
-    """None: several cores run one after the other; see `vcc.plan.protocol.Engine`."""
-
-
-def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None) -> Partial:
-    """The raster of samples (v, u, t, s[, channels]), float32, by the processor's rays."""
-    return cuda_rays.traced(core, values, beside, progress)
-
-
-def footprints_back(
-    core: Footprints,
+def back(
+    core: Footprints | Rays,
     values: Any,
     raster: NDArray[np.floating],
     *,
@@ -73,11 +61,13 @@ def footprints_back(
     """What a raster's weights say of samples, float32 in their library, and of textures of masks, weights and
     scale.
 
-    See `vcc.plan.protocol.BackRunner`.
+    See `vcc.plan.protocol.Engine`.
 
     Raises:
-        InputError: a number to which there is no derivative, or none by this engine.
+        InputError: rays; a number to which there is no derivative, or none by this engine.
     """
+    if isinstance(core, Rays):
+        raise InputError("engine 'cuda' does not go backwards through rays: use engine='numba', with NumPy arrays")
     cuda_back.check_known(core, wanted)
     return Gradient.of(
         partial(cuda_back.samples_back, core, values, raster) if samples else None,
@@ -86,20 +76,9 @@ def footprints_back(
     )
 
 
-def rays_back(core: Rays, values: Any, raster: Any, **options: Any) -> Gradient:
-    """Nothing: rays are not traced back to samples on the GPU.
-
-    Raises:
-        InputError: always.
-    """
-    raise InputError("engine 'cuda' does not go backwards through rays: use engine='numba', with NumPy arrays")
-
-
-def to_prepare(core: Rays, before: Sequence[operators.Before], values: Any) -> None:
-    """Samples are prepared as a whole; see `vcc.plan.protocol.Engine`."""
-
-
-def prepared(before: Sequence[operators.Before], values: Any, threads: int) -> Any:
+def prepared(
+    before: Sequence[operators.Before], values: Any, threads: int, core: Footprints | Rays | None = None
+) -> Any:
     """Samples as a core takes them: of NumPy as `vcc.engines.numba_cpu` has them, else by their own library.
 
     Raises:

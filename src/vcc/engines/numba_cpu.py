@@ -26,7 +26,7 @@ from vcc.engines.footprint_columns import ByColumns, band_height, bands
 from vcc.engines.footprint_numbers import numbers_back
 from vcc.engines.footprint_samples import FineGrid, on_raster, textures, view_of
 from vcc.engines.footprints_back import samples_back
-from vcc.engines.footprints_of_many import rasters
+from vcc.engines.footprints_of_many import rasters, rasters_by_turns
 from vcc.engines.ray_numbers import ray_numbers_back
 from vcc.engines.ray_patches import patches_of
 from vcc.engines.vector_sums import EIGHT
@@ -41,16 +41,24 @@ SMALL = 2**17
 """Numbers of a picture below which filtering it takes less time than starting threads for it."""
 
 
-copies = False
-"""Samples are read as they are; see `vcc.plan.protocol.Engine`."""
-double = False
-"""See there."""
+TURNS = 8
+"""Pictures that one thread makes by turns, at most: what they read is then in its cache."""
+TURNS_BYTES = 2**25
+"""Bytes of their rasters."""
 
 
-def footprints(
-    core: Footprints, values: NDArray[Any], *, beside: int = 0, threads: int, progress: Progress | None = None
+def run(
+    core: Footprints | Rays,
+    values: NDArray[Any] | sharpening_kernels.ToSharpen,
+    *,
+    beside: int = 0,
+    threads: int,
+    progress: Progress | None = None,
 ) -> Partial:
-    """The raster of samples (v, u, t, s[, channels]), float32; see `vcc.plan.protocol.Runner`."""
+    """The raster of samples (v, u, t, s[, channels]), float32; see `vcc.plan.protocol.Engine`."""
+    if isinstance(core, Rays):
+        return rays_compiled.traced(core, values, beside, threads, progress)
+    assert isinstance(values, np.ndarray)
     channels = values.shape[4] if values.ndim == 5 else 1
     with Workers(threads) as pool:
         if core.separable:
@@ -60,22 +68,42 @@ def footprints(
     return Partial(raster.reshape(*core.raster_shape, channels))
 
 
-def together(
-    cores: Sequence[Footprints | Rays], values: NDArray[Any], *, threads: int, progress: Progress | None = None
-) -> list[Partial] | None:
-    """The rasters of several cores in one pass over the samples; see `vcc.plan.protocol.Engine`.
+def batch(cores: Sequence[Footprints | Rays], values: NDArray[Any], *, threads: int) -> list[Partial]:
+    """The rasters of several cores; see `vcc.plan.protocol.Engine`.
 
-    Of footprints that differ only in the weights of views or in the texture of one mask, where rows and columns
-    part and samples are not divided.
+    Footprints that differ only in the weights of views or in the texture of one mask are made in one pass over the
+    samples. Others are made side by side, each by one thread: nothing waits for the slowest of several at the end
+    of each. The bytes are the same for any number of threads.
     """
+    if (found := _in_one_pass_over_samples(cores, values, threads)) is not None:
+        return found
+    raster = 4 * math.prod(cores[0].raster_shape) * (values.shape[4] if values.ndim == 5 else 1)
+    most = max(1, min(TURNS, TURNS_BYTES // max(raster, 1), -(-len(cores) // threads)))
+    most = most if all(isinstance(core, Footprints) for core in cores) else 1
+    groups = [cores[first : first + most] for first in range(0, len(cores), most)]
+    with Workers(threads) as pool:
+        return [one for group in pool.map(partial(_by_one_thread, values), groups) for one in group]
+
+
+def _by_one_thread(values: NDArray[Any], cores: Sequence[Footprints | Rays]) -> list[Partial]:
+    found = _in_one_pass_over_samples(cores, values, 1)
+    if found is None and len(cores) > 1 and all(isinstance(core, Footprints) for core in cores):
+        by_turns = rasters_by_turns(cores, values)  # type: ignore[arg-type]
+        found = None if by_turns is None else list(map(Partial, by_turns))
+    return [run(core, values, threads=1) for core in cores] if found is None else found
+
+
+def _in_one_pass_over_samples(
+    cores: Sequence[Footprints | Rays], values: NDArray[Any], threads: int
+) -> list[Partial] | None:
     if not all(isinstance(core, Footprints) for core in cores):
         return None
-    made = rasters(cores, values, threads, progress)  # type: ignore[arg-type]
-    return None if made is None else [Partial(raster) for raster in made]
+    made = rasters(cores, values, threads)  # type: ignore[arg-type]
+    return None if made is None else list(map(Partial, made))
 
 
-def footprints_back(
-    core: Footprints,
+def back(
+    core: Footprints | Rays,
     values: NDArray[Any],
     raster: NDArray[np.floating],
     *,
@@ -85,64 +113,32 @@ def footprints_back(
     threads: int,
     progress: Progress | None = None,
 ) -> Gradient:
-    """What a raster's weights say of samples, float32, and of numbers; see `vcc.plan.protocol.BackRunner`."""
-    core.check_wanted(wanted)
-    return Gradient.of(
-        partial(samples_back, core, values.shape, raster, threads) if samples else None,
-        partial(numbers_back, core, values, raster, wanted, threads) if wanted else None,
-        progress,
-    )
-
-
-def rays(
-    core: Rays,
-    values: NDArray[Any] | sharpening_kernels.ToSharpen,
-    *,
-    beside: int = 0,
-    threads: int,
-    progress: Progress | None = None,
-) -> Partial:
-    """The raster of samples (v, u, t, s[, channels]), float32, by compiled rays."""
-    return rays_compiled.traced(core, values, beside, threads, progress)
-
-
-def rays_back(
-    core: Rays,
-    values: NDArray[Any],
-    raster: NDArray[np.floating],
-    *,
-    samples: bool = True,
-    wanted: Collection[str] = (),
-    beside: int = 0,
-    threads: int,
-    progress: Progress | None = None,
-) -> Gradient:
-    """What a raster's weights say of samples, float32, and of numbers; see `vcc.plan.protocol.BackRunner`.
+    """What a raster's weights say of samples, float32, and of numbers; see `vcc.plan.protocol.Engine`.
 
     Of a part of a core that is run with a border of dark views (`vcc.run.drive`), the border's samples are given
     what rays carry to them, too: that belongs to the neighbours, and is left to them.
     """
-    return Gradient.of(
-        partial(ray_transpose.scattered, core, values.shape, raster, beside, threads) if samples else None,
-        partial(ray_numbers_back, core, values, raster, wanted, beside, threads) if wanted else None,
-        progress,
-    )
+    if isinstance(core, Rays):
+        to_samples = partial(ray_transpose.scattered, core, values.shape, raster, beside, threads)
+        to_numbers = partial(ray_numbers_back, core, values, raster, wanted, beside, threads)
+    else:
+        core.check_wanted(wanted)
+        to_samples = partial(samples_back, core, values.shape, raster, threads)
+        to_numbers = partial(numbers_back, core, values, raster, wanted, threads)
+    return Gradient.of(to_samples if samples else None, to_numbers if wanted else None, progress)
 
 
-def to_prepare(
-    core: Rays, before: Sequence[operators.Before], values: NDArray[Any]
-) -> sharpening_kernels.ToSharpen | None:
-    """Samples that rays sharpen where they look at them; see `vcc.plan.protocol.Engine`."""
-    match before:
-        case [operators.SharpenViews(weights)]:
-            found = sharpening_kernels.ToSharpen(weights, values)
-            return None if patches_of(core, found.bytes_kept) is None else found
-        case _:
-            return None
+def prepared(
+    before: Sequence[operators.Before], values: NDArray[Any], threads: int, core: Footprints | Rays | None = None
+) -> NDArray[Any] | sharpening_kernels.ToSharpen:
+    """Samples as a core takes them: what is sharpened is so by compiled loops, to the bit as plainly.
 
-
-def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:
-    """Samples as a core takes them: what is sharpened is so by compiled loops, to the bit as plainly."""
+    Rays of a plain lens sharpen what they look at.
+    """
+    if isinstance(core, Rays) and len(before) == 1 and isinstance(before[0], operators.SharpenViews):
+        found = sharpening_kernels.ToSharpen(before[0].weights, values)
+        if patches_of(core, found.bytes_kept) is not None:
+            return found
     for operator in before:
         if isinstance(operator, operators.SharpenViews):
             values = sharpening_kernels.filtered(operator.weights, values, threads)

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from vcc.base.progress import Progress, tell
 from vcc.engines.rays import memory_of_rays, scattered, traced
-from vcc.engines.reference_back import divided, indices
-from vcc.engines.reference_back import footprints_back as footprints_back  # of the engine
+from vcc.engines.reference_back import divided, footprints_back, indices
 from vcc.engines.reference_ray_numbers import ray_numbers_back
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
@@ -30,16 +29,47 @@ from vcc.plan.rays.model import Rays
 Array = NDArray[np.float64]
 
 
-copies = True
-"""Samples are converted as a whole; see `vcc.plan.protocol.Engine`."""
-double = True
-"""See there."""
-
-
-def footprints(
-    core: Footprints, values: NDArray[Any], *, beside: int = 0, threads: int, progress: Progress | None = None
+def run(
+    core: Footprints | Rays,
+    values: NDArray[Any],
+    *,
+    beside: int = 0,
+    threads: int,
+    progress: Progress | None = None,
 ) -> Partial:
-    """The raster of samples (v, u, t, s[, channels]), float64; see `vcc.plan.protocol.Runner`."""
+    """The raster of samples (v, u, t, s[, channels]), float64; see `vcc.plan.protocol.Engine`."""
+    if isinstance(core, Rays):
+        return traced(core, values, True, beside, progress)
+    return footprints(core, values, progress)
+
+
+def back(
+    core: Footprints | Rays,
+    values: NDArray[Any],
+    raster: NDArray[np.floating],
+    *,
+    samples: bool = True,
+    wanted: Collection[str] = (),
+    beside: int = 0,
+    threads: int,
+    progress: Progress | None = None,
+) -> Gradient:
+    """What a raster's weights say of samples and numbers, float64; see `vcc.plan.protocol.Engine`.
+
+    Of a part of a core that is run with a border of dark views (`vcc.run.drive`), the border's samples are given
+    what rays carry to them, too: that belongs to the neighbours, and is left to them.
+    """
+    if isinstance(core, Footprints):
+        return footprints_back(core, values, raster, samples, wanted, progress)
+    return Gradient.of(
+        partial(scattered, core, values.shape, raster, beside) if samples else None,
+        partial(ray_numbers_back, core, values, raster, wanted, beside, threads) if wanted else None,
+        progress,
+    )
+
+
+def footprints(core: Footprints, values: NDArray[Any], progress: Progress | None) -> Partial:
+    """The raster of samples by footprints: the sum above."""
     channels = values.shape[4:] or (1,)
     raster = np.zeros((*core.raster_shape, *channels))
     k, l = indices(core)
@@ -57,43 +87,9 @@ def footprints(
     return Partial(raster * core.scale)
 
 
-def rays(core: Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None) -> Partial:
-    """The raster of samples (v, u, t, s[, channels]) by the plan's own rays, in double precision."""
-    return traced(core, values, True, beside, progress)
-
-
-def rays_back(
-    core: Rays,
-    values: NDArray[Any],
-    raster: NDArray[np.floating],
-    *,
-    samples: bool = True,
-    wanted: Collection[str] = (),
-    beside: int = 0,
-    threads: int,
-    progress: Progress | None = None,
-) -> Gradient:
-    """What a raster's weights say of samples and numbers, float64; see `vcc.plan.protocol.BackRunner`.
-
-    Of a part of a core that is run with a border of dark views (`vcc.run.drive`), the border's samples are given
-    what rays carry to them, too: that belongs to the neighbours, and is left to them.
-    """
-    return Gradient.of(
-        partial(scattered, core, values.shape, raster, beside) if samples else None,
-        partial(ray_numbers_back, core, values, raster, wanted, beside, threads) if wanted else None,
-        progress,
-    )
-
-
-def together(cores: Any, values: Any, **options: Any) -> None:
-    """None: several cores run one after the other; see `vcc.plan.protocol.Engine`."""
-
-
-def to_prepare(core: Rays, before: Sequence[operators.Before], values: Any) -> None:
-    """Samples are prepared as a whole; see `vcc.plan.protocol.Engine`."""
-
-
-def prepared(before: Sequence[operators.Before], values: NDArray[Any], threads: int) -> NDArray[Any]:
+def prepared(
+    before: Sequence[operators.Before], values: NDArray[Any], threads: int, core: Footprints | Rays | None = None
+) -> NDArray[Any]:
     """Samples as a core takes them, filtered in double precision; bytes are sharpened exactly."""
     for operator in before:
         exact = isinstance(operator, operators.SharpenViews) and values.dtype == np.uint8

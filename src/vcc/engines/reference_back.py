@@ -36,14 +36,11 @@ def footprints_back(
     core: Footprints,
     values: NDArray[Any],
     raster: NDArray[np.floating],
-    *,
-    samples: bool = True,
-    wanted: Collection[str] = (),
-    beside: int = 0,
-    threads: int,
-    progress: Progress | None = None,
+    samples: bool,
+    wanted: Collection[str],
+    progress: Progress | None,
 ) -> Gradient:
-    """The derivative of ⟨raster, the raster of the samples⟩, float64; see `vcc.plan.protocol.BackRunner`.
+    """The derivative of ⟨raster, the raster of the samples⟩, float64; see `vcc.plan.protocol.Engine.back`.
 
     Each number is taken by itself: ``x`` of each tap, ``weights`` also of taps that let no light through. All have
     a derivative but ``sharpen_samples``, and where samples fall on the nearest pixel those that move them.

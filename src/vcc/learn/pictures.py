@@ -17,6 +17,7 @@ from vcc.advice.explain import explained
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.fingerprint import Untold, fingerprint
+from vcc.engines import abilities, chosen
 from vcc.fields.grid import Grid
 from vcc.fields.samples import InMemory, Samples
 from vcc.learn.chain import Chain
@@ -27,7 +28,8 @@ from vcc.optics.train import Train
 from vcc.plan.how import OF_THE_RUN, How
 from vcc.plan.protocol import Gradient, Partial
 from vcc.run.backwards import Backwards
-from vcc.run.drive import Drive, rounds_of
+from vcc.run.batches import rasters_each
+from vcc.run.drive import Drive
 
 Numbers = Mapping[str, NDArray[np.float64]]
 
@@ -165,10 +167,10 @@ def by_an_engine(how: How) -> How:
     Raises:
         InputError: ``"array_api"`` or ``"cuda"`` was.
     """
-    if how.engine in ("array_api", "cuda"):
-        carried = "carries gradients to samples only" if how.engine == "array_api" else "does not learn cameras"
-        raise InputError(f"engine={how.engine!r} {carried}: leave it out (numba), or pass 'reference', here")
-    return how if how.engine is not None else replace(how, engine="numba")
+    name = how.engine or chosen(None, None)
+    if why := abilities(name).no_learning:
+        raise InputError(f"engine={name!r} {why}: leave it out (numba), or pass 'reference', here")
+    return replace(how, engine=name)
 
 
 def kept_in(train: Train, name: str) -> float:
@@ -265,7 +267,7 @@ class Call:
     def _pictures(self, n: int) -> NDArray[np.floating]:
         """The pictures of a light field by several plans, which read it once where they can."""
         drives = [drive for drive, _ in self.ahead[n]]
-        found = rounds_of(drives)
+        found = rasters_each(drives)
         self.ahead[n] = list(zip(drives, found, strict=True))
         pictures = np.stack([drive.picture(each) for drive, each in zip(drives, found, strict=True)])
         if not np.isfinite(pictures).all():

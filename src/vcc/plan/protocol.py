@@ -101,10 +101,62 @@ class Gradient(Brief):
         )
 
 
-class BackRunner(Protocol):
-    """How an engine goes through a core backwards."""
+class Runner(Protocol):
+    """How a core is run on samples."""
 
     def __call__(
+        self, core: Any, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
+    ) -> Partial:
+        """See `Engine.run`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Abilities:
+    """What an engine can do, known before it is loaded.
+
+    Args:
+        double: it computes floating-point samples in double precision, and gives pictures in it.
+        copies: it converts all samples that it is given first, which takes memory.
+        parallel: it takes NumPy arrays, uses several threads, and has several cores share work (`Engine.batch`).
+        bands: its rays look at bands of rows of pixels, so that a store need not be read as a whole.
+        no_derivatives: why it does not go backwards, in words; "" where it does.
+        no_learning: why it does not go backwards to all numbers of a plan; "" where it does.
+    """
+
+    double: bool = False
+    copies: bool = False
+    parallel: bool = False
+    bands: bool = False
+    no_derivatives: str = ""
+    no_learning: str = ""
+
+
+class Engine(Protocol):
+    """What computes: a module with these functions. docs/how-it-works.md shows one of thirty lines."""
+
+    def run(
+        self, core: Any, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
+    ) -> Partial:
+        """The raster of samples.
+
+        Args:
+            core: what is computed: footprints or rays.
+            values: the samples, (v, u, t, s[, channels]), as `prepared` gives them.
+            beside: 0, or 1 for as many other rays, of the neighbouring block of points.
+            threads: how many work at once.
+            progress: called with (done, total).
+        """
+        ...
+
+    def batch(self, cores: Sequence[Any], values: Any, *, threads: int) -> list[Partial]:
+        """The rasters of the same samples by several cores, which share what they can of the work.
+
+        Asked of engines that are `Abilities.parallel`; others run one core after the other.
+        """
+        ...
+
+    def back(
         self,
         core: Any,
         values: Any,
@@ -116,7 +168,7 @@ class BackRunner(Protocol):
         threads: int,
         progress: Progress | None = None,
     ) -> Gradient:
-        """The derivative of ⟨raster, what `Runner` makes of the same⟩.
+        """The derivative of ⟨raster, what `run` makes of the same⟩.
 
         The same bytes from run to run, whatever the number of threads.
 
@@ -125,10 +177,10 @@ class BackRunner(Protocol):
             values: the samples, (v, u, t, s[, channels]). A core is linear in them: of an array without content
                 (``np.broadcast_to(np.float32(0), shape)``) only the shape is looked at where no number is wanted.
             raster: weights of the raster's values, (rows, columns, channels).
-            samples: whether the derivative to the samples is wanted: an array of their shape, float32 (float64 by
-                ``reference``).
+            samples: whether the derivative to the samples is wanted: an array of their shape, float32 (float64
+                where the engine is `Abilities.double`).
             wanted: names of the core's numbers to which it is wanted (`vcc.plan.numbers.numbers` of the core).
-            beside: see `Runner`.
+            beside: see `run`.
             threads: how many work at once.
             progress: called with (done, total).
 
@@ -137,69 +189,16 @@ class BackRunner(Protocol):
         """
         ...
 
-
-class Runner(Protocol):
-    """How an engine runs a core."""
-
-    def __call__(
-        self, core: Any, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
-    ) -> Partial:
-        """The raster of samples (v, u, t, s[, channels]).
+    def prepared(self, before: Sequence[Any], values: Any, threads: int, core: Any = None) -> Any:
+        """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it.
 
         Args:
-            core: what is computed.
-            values: the samples.
-            beside: 0, or 1 for as many other rays, of the neighbouring block of points.
-            threads: how many work at once.
-            progress: called with (done, total).
-        """
-        ...
-
-
-class Engine(Protocol):
-    """What computes: a module with these functions."""
-
-    footprints: Runner
-    rays: Runner
-    footprints_back: BackRunner
-    rays_back: BackRunner
-    copies: bool
-    """Whether all samples that it is given are converted first, which takes memory."""
-    double: bool
-    """Whether it computes floating-point samples in double precision, and gives pictures in it."""
-
-    def together(
-        self, cores: Sequence[Any], values: Any, *, threads: int, progress: Progress | None = None
-    ) -> list[Partial] | None:
-        """The rasters of the same samples by several cores, where this takes less than one after the other.
-
-        Args:
-            cores: what is computed.
+            before: the operators.
             values: the samples.
             threads: how many work at once.
-            progress: called with (done, total).
-
-        Returns:
-            One for each core; None where the cores differ in more than this engine can share, which is left to who
-            asks.
+            core: given, what comes out is for `run` of this core alone, which may prepare samples where it looks
+                at them; ``shape`` is then all that may be asked of it.
         """
-        ...
-
-    def to_prepare(self, core: Any, before: Sequence[Any], values: Any) -> Any | None:
-        """What `rays` takes in place of samples that are prepared, and prepares itself where rays look at it.
-
-        Args:
-            core: what is traced.
-            before: operators before the core.
-            values: samples (v, u, t, s[, channels]), all of them.
-
-        Returns:
-            None where samples are to be prepared as a whole.
-        """
-        ...
-
-    def prepared(self, before: Sequence[Any], values: Any, threads: int) -> Any:
-        """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it."""
         ...
 
     def prepared_back(
@@ -219,7 +218,8 @@ class Engine(Protocol):
             written_over: whether ``values`` may be, as nobody needs them any more: new memory takes long.
 
         Returns:
-            Of the shape of the samples that the first one takes: float32 (float64 by ``reference``).
+            Of the shape of the samples that the first one takes: float32 (float64 where the engine is
+            `Abilities.double`).
         """
         ...
 
@@ -253,14 +253,6 @@ class Core(Protocol):
     @property
     def raster_shape(self) -> tuple[int, int]:
         """(rows, columns) of what it makes."""
-        ...
-
-    def by(self, engine: Engine) -> Runner:
-        """The engine's way to run it."""
-        ...
-
-    def back_by(self, engine: Engine) -> BackRunner:
-        """The engine's way to go through it backwards."""
         ...
 
     def part(self, block: Block) -> Any:

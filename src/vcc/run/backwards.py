@@ -185,7 +185,7 @@ class Backwards:
     @property
     def _kind(self) -> np.dtype[Any]:
         """Of derivatives to samples."""
-        return np.dtype(np.float64 if self.drive.engine.double else np.float32)
+        return np.dtype(np.float64 if self.drive.able.double else np.float32)
 
     @cached_property
     def _blocks(self) -> list[Block]:
@@ -284,7 +284,7 @@ class Backwards:
             values = np.broadcast_to(np.float32(0), self.plan.shape((*around.shape, *channels)))
         ahead = self.plan.block(around)
         core = drive.core.part(ahead)
-        found = core.back_by(drive.engine)(
+        found = drive.engine.back(
             core,
             values,
             raster,

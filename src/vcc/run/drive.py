@@ -9,11 +9,11 @@ each the share that is there, and each block meets the same rays.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import count, groupby
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -24,20 +24,18 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
 from vcc.base.workers import Workers
-from vcc.engines import chosen, engine
+from vcc.engines import abilities, chosen, engine
 from vcc.fields.grid import Block
 from vcc.fields.sampled import has_values, to_dtype, to_numpy
 from vcc.fields.samples import Samples
 from vcc.plan.depth_rule import ViewsBetween
-from vcc.plan.footprints.mixtures import Mixture
-from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import LARGEST_SAMPLES, How
 from vcc.plan.model import Plan
-from vcc.plan.protocol import Core, Partial, Room
+from vcc.plan.protocol import Core, Partial
 from vcc.plan.rays.model import Rays
 from vcc.run.blocks import SUMS, Blocks, Need, cut_evenly
 from vcc.run.executors import Tree, Work, crew, memory_of_task
-from vcc.run.needed import needed, needed_by_all
+from vcc.run.needed import needed
 from vcc.run.sent import Carried, Sent
 
 SHARED = 0.5
@@ -46,10 +44,6 @@ HELD = 0.25
 """Share of the memory that views and maps, kept to be used again, may take where views in between are made."""
 IN_MEMORY = 2**28
 """Bytes of denser views that are there at a time, of a light field in memory."""
-TOGETHER = 8
-"""Plans that one thread runs together, at most."""
-TOGETHER_BYTES = 2**25
-"""Bytes of their rasters."""
 MUCH_UNSEEN = 0.01
 """Share of the samples between views that no view shows, from which on a warning says it."""
 
@@ -99,198 +93,6 @@ def drive(
     return Drive(*needed(plan, samples), how or How(), executor).recorded(progress)
 
 
-def rounds_of(drives: Sequence[Drive]) -> list[Partial]:
-    """The rasters of several plans of one light field, read once where an engine can share it.
-
-    It can where the same is done to the samples before, and the cores differ in one mask alone (see
-    `vcc.plan.protocol.Engine.together`); other plans are run side by side. Of samples that are not in memory each
-    block is read once for as many plans as there is memory for.
-
-    Args:
-        drives: plans on their way through one engine, with the same samples.
-    """
-    first = drives[0]
-    alike = [drive for drive in drives if drive.plan.before == first.plan.before]
-    if len(drives) > 1 and all(drive.is_one_block for drive in drives):
-        for drive in alike:
-            drive.prepared = first.prepared  # once for all, for the way back, too
-        found = None
-        if len(alike) == len(drives):
-            found = first.engine.together([drive.core for drive in drives], first.prepared, threads=first.threads)
-        if found is not None:
-            return found
-        if first.name == "numba":
-            # Each by one thread: nothing waits for the slowest of several at the end of each.
-            with Workers(first.threads) as pool:
-                return list(pool.map(Drive.rounds_by_one_thread, drives))
-    groups = map(_over_shared_blocks, _sharing(drives))
-    return [found for group in groups for found in group]
-
-
-def _sharing(drives: Sequence[Drive]) -> Iterator[Sequence[Drive]]:
-    """Plans next to each other that can look at the same blocks, as many as there is memory for their sums."""
-    for takes, alike in groupby(drives, key=Drive.takes):
-        group = list(alike)
-        most = 1 if takes is None else group[0].most_at_once
-        yield from (group[first : first + most] for first in range(0, len(group), most))
-
-
-def _over_shared_blocks(drives: Sequence[Drive]) -> list[Partial]:
-    """The rasters of plans that look at the same blocks, each of which is read once."""
-    if len(drives) == 1:
-        return [drives[0].rounds()]
-    reader = drives[0].reading_for(drives)
-    blocks = list(filter(reader.used_in, reader.blocks))
-    trees = [Tree(sum(map(bool, map(drive.used_in, blocks))), _sum) for drive in drives]
-    numbers = [count() for _ in drives]
-    for block in blocks:
-        values = reader.values(block, Counted(None, 0))
-        those = [n for n, drive in enumerate(drives) if drive.used_in(block)]
-        for n, part in zip(those, _parts([drives[n] for n in those], block, values), strict=True):
-            trees[n].put(next(numbers[n]), part)
-    return [_in_double(tree.total) for tree in trees]
-
-
-def _parts(drives: Sequence[Drive], block: Block, values: Any) -> list[Partial]:
-    """The rasters of a block by several plans; side by side each is made by one thread, as for `rounds_of`."""
-    first, cores = drives[0], [drive.core.part(drive.plan.block(drive.around(block))) for drive in drives]
-    found = first.engine.together(cores, values, threads=first.threads) if len(drives) > 1 else None
-    if found is not None:
-        return found
-    threads = 1 if first.name == "numba" and len(drives) > 1 else first.threads
-    runs = [
-        partial(drive.runner, core, values, threads=threads) for drive, core in zip(drives, cores, strict=True)
-    ]
-    with Workers(first.threads if threads == 1 else 1) as pool:
-        return list(pool.map(_called, runs))
-
-
-def _called(run: Callable[[], Partial]) -> Partial:
-    return run()
-
-
-def recorded_together(drives: Sequence[Drive]) -> list[Recorded]:
-    """What `Drive.recorded` gives of several plans of one light field, which share what `rounds_of` shares.
-
-    Args:
-        drives: plans on their way through one engine, with the same samples.
-    """
-    rasters = rounds_of(drives)
-    with Workers(drives[0].threads) as pool:
-        return list(pool.map(Drive.finished, drives, rasters))
-
-
-def each_recorded(
-    plans: Iterable[Plan], samples: Samples, how: How, room: Room | None = None
-) -> Iterator[tuple[Plan, Recorded]]:
-    """What `drive` gives of several plans of one light field, one after the other.
-
-    Plans that are there already, a sequence, and plans of samples that are read share what `rounds_of` shares. Of
-    samples in memory others are run as they come, some side by side, each by one thread. Nobody plans meanwhile:
-    planning and running that wait for Python's lock in turn take longer than one after the other.
-
-    Args:
-        plans: all that is done by one engine.
-        samples: as in `drive`.
-        how: likewise.
-        room: where pictures are put by the threads that make them, where these are several.
-    """
-    alone = (
-        chosen(how.engine, samples.whole()) == "numba" and samples.whole() is not None and how.tolerance is None
-    )
-    if isinstance(plans, Sequence) or not alone:
-        listed = list(plans)
-        yield from zip(listed, recorded_together(_drives(listed, samples, how)) if listed else (), strict=True)
-        return
-    before: Drive | None = None
-    first = 0
-    with Workers(how.workers) as pool:
-        for crowd in _crowds(Drive(plan, samples, how) for plan in plans):
-            if not crowd[0].by_one_thread:
-                yield crowd[0].plan, crowd[0].recorded()
-                first += 1
-                continue
-            if before is None or crowd[0].plan.before != before.plan.before:
-                before = crowd[0]
-            for one in crowd:
-                one.prepared = before.prepared  # once for all
-            each = -(-len(crowd) // how.workers)
-            starts = range(0, len(crowd), each)
-            groups = [crowd[start : start + each] for start in starts]
-            places = [
-                room and room(range(first + start, first + start + len(group)))
-                for start, group in zip(starts, groups, strict=True)
-            ]
-            first += len(crowd)
-            found = [one for group in pool.map(_recorded_by_one_thread, groups, places) for one in group]
-            yield from zip((one.plan for one in crowd), found, strict=True)
-
-
-def _drives(plans: Sequence[Plan], samples: Samples, how: How) -> list[Drive]:
-    """Plans on their way, of the samples that any of them needs."""
-    cut, part = needed_by_all(plans, samples)
-    return [Drive(plan, part, how) for plan in cut]
-
-
-def _crowds(drives: Iterable[Drive]) -> Iterator[list[Drive]]:
-    """Plans on their way in crowds that are run side by side; each by itself of those that all threads run."""
-    crowd: list[Drive] = []
-    for made in drives:
-        joined = crowd and made.by_one_thread and crowd[0].by_one_thread
-        if crowd and not (
-            joined and made.plan.before == crowd[0].plan.before and len(crowd) < made.threads * made.fellows
-        ):
-            yield crowd
-            crowd = []
-        crowd.append(made)
-    if crowd:
-        yield crowd
-
-
-def _recorded_by_one_thread(drives: Sequence[Drive], places: NDArray[np.float32] | None) -> list[Recorded]:
-    """What several plans give of the same samples, their pictures in places where there are any.
-
-    The bytes are the same for any number of threads.
-    """
-    alone = [copy(each) for each in drives]
-    for each in alone:
-        each.threads = 1
-    cores = [each.core for each in alone]
-    found = alone[0].engine.together(cores, alone[0].prepared, threads=1)
-    if found is None and len(cores) > 1 and all(isinstance(core, Footprints) for core in cores):
-        by_turns = late.module("vcc.engines.footprints_of_many").rasters_by_turns(cores, alone[0].prepared)
-        found = None if by_turns is None else list(map(Partial, by_turns))
-    if found is None:
-        found = [each.rounds() for each in alone]
-    made = list(map(Drive.finished, alone, found))
-    if places is None:
-        return made
-    for place, one in zip(places, made, strict=True):
-        place[...] = one.values
-    return [replace(one, values=place) for place, one in zip(places, made, strict=True)]
-
-
-def recorded_mixed(
-    mixture: Mixture,
-    samples: Samples,
-    how: How,
-    room: Room | None = None,
-) -> Iterator[Recorded]:
-    """What `drive` gives of several cameras whose pictures are sums of a few.
-
-    Args:
-        mixture: how.
-        samples: as in `drive`.
-        how: likewise.
-        room: where pictures are made.
-    """
-    found = recorded_together(_drives(mixture.plans, samples, how))
-    mixed = late.module("vcc.engines.mixed")
-    mixer = mixed.Mixer(mixture, [each.values for each in found], how.workers, room)
-    for values, missing in zip(mixer.pictures(), mixture.missing, strict=True):
-        yield Recorded(values, missing.share, missing.reason)
-
-
 class Drive:
     """A plan on its way through an engine.
 
@@ -308,13 +110,13 @@ class Drive:
         samples: those that the core looks at; others than given where views in between are made.
         name: of the engine.
         engine: its module.
+        able: what it can do.
         threads: how many work at once.
         limit: bytes within which blocks are cut.
         kind: of the samples as the core takes them.
         unit: what one of their numbers stands for in those given.
         radiance: what it stands for.
         core: the plan's, for samples of these numbers.
-        runner: the engine's way to run it.
 
     Raises:
         InputError: see `drive`.
@@ -331,17 +133,16 @@ class Drive:
         self.plan, self.how = plan, how
         self.given, self.samples = samples, samples
         self.name = chosen(how.engine, samples.whole())
-        self.engine, self.threads = engine(self.name), how.workers
+        self.engine, self.able, self.threads = engine(self.name), abilities(self.name), how.workers
         self.limit: float = memory_of_task(how.memory_limit, self.crew)
         if plan.views_between is not None:
             self._look_between(plan.views_between)
         kind = to_dtype(samples.whole()) if self.in_memory else self.samples.grid.kind
-        if self.engine.double and kind.kind == "f":
+        if self.able.double and kind.kind == "f":
             kind = np.dtype(np.float64)
         self.kind, self.unit = plan.kept_as(kind)
         self.radiance = self.unit / self.samples.grid.full_scale
         self.core = plan.core.scaled(self.radiance)
-        self.runner = plan.core.by(self.engine)
         self._kept: NDArray[Any] | None = None
 
     @classmethod
@@ -362,11 +163,8 @@ class Drive:
                 "between_views='depth' makes views by what hides what, which cannot be gone through backwards: "
                 "pass between_views='auto'"
             )
-        if chosen(how.engine, samples.whole()) == "array_api":
-            raise InputError(
-                "engine 'array_api' goes backwards by the gradients of its arrays' own library: take those of "
-                "camera.capture, or pass NumPy arrays and engine='numba' or 'reference'"
-            )
+        if why := abilities(chosen(how.engine, samples.whole())).no_derivatives:
+            raise InputError(why)
         return cls(plan, samples, how, executor)
 
     @property
@@ -384,10 +182,10 @@ class Drive:
         """What blocks take of memory."""
         threads = self.threads if self.crew is None else self.sent.how.workers
         taken = self.engine.memory(self.plan.core, self.channels, threads)
-        need = Need.of(self.plan, self.samples.grid, taken, self.engine.copies)
+        need = Need.of(self.plan, self.samples.grid, taken, self.able.copies)
         if self.plan.views_between is None:  # views made in between keep what they are made of
             need = need.with_readers(threads, self.limit)
-        if isinstance(self.plan.core, Rays) and self.name == "numba" and not any(map(any, self.plan.beside)):
+        if isinstance(self.plan.core, Rays) and self.able.bands and not any(map(any, self.plan.beside)):
             need = replace(need, bands=self.plan.core.bands)
         return need if self.crew is None else need.with_sums()
 
@@ -432,23 +230,6 @@ class Drive:
     def is_one_block(self) -> bool:
         """Whether all samples are there and go through one run, by rounds of a fixed number of rays."""
         return self.in_memory and self.how.tolerance is None and len(list(self.blocks)) == 1
-
-    @property
-    def by_one_thread(self) -> bool:
-        """Whether several plans are run side by side, each by one thread."""
-        return self.is_one_block and self.name == "numba"
-
-    @property
-    def fellows(self) -> int:
-        """How many plans one thread runs together, so that samples that are in the cache serve all of them."""
-        picture = 4 * math.prod(self.plan.core.raster_shape) * self.channels
-        return int(max(1, min(TOGETHER, TOGETHER_BYTES // picture)))
-
-    def rounds_by_one_thread(self) -> Partial:
-        """As `rounds`; the bytes are the same for any number of threads."""
-        alone = copy(self)
-        alone.threads = 1
-        return alone.rounds()
 
     def finished(self, found: Partial) -> Recorded:
         """The picture of a raster, and what is known about it."""
@@ -498,25 +279,30 @@ class Drive:
             beside: 0, or rays a pixel that there are already: then as many others.
             progress: called with (done, total).
         """
-        core, run = self._core_and_run(beside)
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
-            return run(core, self.taken, progress=progress)
-        return self._over_blocks(listed, beside, progress)
+            return self._run(self._with_rays(beside), self.taken, beside, progress)
+        if self.crew is None:
+            return over_blocks([self], listed, beside, progress)[0]
+        return self._by_others(listed, beside, progress)
 
-    def _core_and_run(self, beside: int) -> tuple[Core, Callable[..., Partial]]:
-        """The core with so many rays beside those taken, and what runs it."""
-        core = self.core.more(beside) if beside else self.core
-        return core, partial(self.runner, beside=int(beside > 0), threads=self.threads)
+    def _with_rays(self, beside: int) -> Any:
+        """The core with so many rays beside those taken."""
+        return self.core.more(beside) if beside else self.core
+
+    def _run(self, core: Any, values: Any, beside: int, progress: Progress | None = None) -> Partial:
+        return self.engine.run(core, values, beside=int(beside > 0), threads=self.threads, progress=progress)
 
     @cached_property
     def taken(self) -> Any:
         """What the core is run on where all samples are in memory: `prepared`, which others may have made already,
         or what rays prepare where they look at it."""
         if self.plan.by_rays and "prepared" not in vars(self):
-            found = self.engine.to_prepare(self.core, self.plan.before, self.samples.whole())
-            if found is not None:
+            whole = self.samples.whole()
+            found = self.engine.prepared(self.plan.before, whole, self.threads, self.core)
+            if not isinstance(found, type(whole)):
                 return found
+            self.prepared = found
         return self.prepared
 
     @cached_property
@@ -529,11 +315,14 @@ class Drive:
         """Which views are looked at, (v, u)."""
         return self.plan.used_views(self.samples.grid.shape)
 
-    def takes(self) -> Any:
-        """Which samples are read, and what is done with their blocks before they are looked at; None where that is
-        another thing for each plan, or a matter of several rounds."""
-        if self.in_memory or self.crew is not None or self.how.tolerance is not None or self.plan.views_between:
+    @cached_property
+    def shared(self) -> Any:
+        """What plans that are run together have in common: which samples they look at, and what is done with these
+        before; None where that is another thing for each plan, or a matter of several rounds."""
+        if self.crew is not None or self.how.tolerance is not None or self.plan.views_between:
             return None
+        if self.in_memory:
+            return (self.samples, self.plan.before) if self.is_one_block else None
         by_rays = self.need.bands if self.plan.by_rays else 0
         return self.samples, self.plan.before, self.plan.core.border, by_rays, self.kind, self.limit
 
@@ -547,6 +336,8 @@ class Drive:
 
     def reading_for(self, drives: Sequence[Drive]) -> Drive:
         """What reads blocks for several plans: all views that any of them looks at, within half of the memory."""
+        if len(drives) == 1:
+            return self
         made = copy(self)
         made.used, made.limit = np.logical_or.reduce([drive.used for drive in drives]), self.limit * SHARED
         made.__dict__.pop("blocks", None)
@@ -562,15 +353,11 @@ class Drive:
         """How many views of a block are looked at."""
         return int(self.used[slice(*block.rows), slice(*block.columns)].sum())
 
-    def _over_blocks(self, blocks: list[Block], beside: int, progress: Progress | None) -> Partial:
-        """The sum of what blocks give, in double precision; those of which no view is looked at are not read."""
+    def _by_others(self, blocks: list[Block], beside: int, progress: Progress | None) -> Partial:
+        """The sum of what blocks give that an executor's workers run."""
+        assert self.crew is not None
         used = list(filter(self.used_in, blocks))
         counted = Counted(progress, sum(map(self.used_in, used)))
-        if self.crew is None:
-            tree = Tree(len(used), _sum)
-            for number, block in enumerate(used):
-                tree.put(number, self.part(block, beside, counted))
-            return _in_double(tree.total)
         asked, views = [(block, beside) for block in used], [self.used_in(block) for block in used]
         work = Work(_share_of, self.sent, first=begun)
         total = self.crew.summed(work, asked, _sum_of_shares, lambda n: counted.add(views[n]))
@@ -586,9 +373,8 @@ class Drive:
             beside: see `summed`.
             counted: told of each view that is read.
         """
-        core, run = self._core_and_run(beside)
-        values = self.values(block, counted)
-        return run(core.part(self.plan.block(self.around(block))), values)
+        core = self._with_rays(beside).part(self.plan.block(self.around(block)))
+        return self._run(core, self.values(block, counted), beside)
 
     def begin(self) -> None:
         """Run a row of pixels of a view, so that all code is compiled."""
@@ -601,7 +387,7 @@ class Drive:
         )
         core = replace(self.core, raster_shape=(1, 1)) if self.plan.by_rays else self.core
         values = self.values(block, Counted(None, 0))
-        self.runner(core.part(self.plan.block(self.around(block))), values, threads=self.threads)
+        self.engine.run(core.part(self.plan.block(self.around(block))), values, threads=self.threads)
 
     def around(self, block: Block) -> Block:
         """What runs with a block: of those that are read, a border of views where it has neighbours, too."""
@@ -668,6 +454,42 @@ class Drive:
             self.limit = max(IN_MEMORY, math.ceil(self.need.least_for_views / (1 - HELD)))
         self.samples = denser(held=HELD * self.limit)
         self.limit = math.ceil(self.limit * (1 - HELD))
+
+
+def over_blocks(
+    drives: Sequence[Drive], blocks: Iterable[Block], beside: int = 0, progress: Progress | None = None
+) -> list[Partial]:
+    """The rasters of plans that look at the same blocks, each of which is read once: sums in double precision.
+
+    Args:
+        drives: plans with the same `Drive.shared`, or one. The first says how blocks are read.
+        blocks: of the light field. Those of which no view is looked at are not read.
+        beside: see `Drive.summed`; 0 for several.
+        progress: called with (done, total).
+    """
+    reader = drives[0].reading_for(drives)
+    used = list(filter(reader.used_in, blocks))
+    counted = Counted(progress, sum(map(reader.used_in, used)))
+    trees = [Tree(sum(map(bool, map(drive.used_in, used))), _sum) for drive in drives]
+    numbers = [count() for _ in drives]
+    for block in used:
+        those = [n for n, drive in enumerate(drives) if drive.used_in(block)]
+        if len(drives) == 1:
+            parts = [reader.part(block, beside, counted)]
+        else:
+            values = reader.values(block, counted)
+            cores = [drives[n].core.part(drives[n].plan.block(reader.around(block))) for n in those]
+            parts = rasters_of(reader, cores, values)
+        for n, part in zip(those, parts, strict=True):
+            trees[n].put(next(numbers[n]), part)
+    return [_in_double(tree.total) for tree in trees]
+
+
+def rasters_of(drive: Drive, cores: Sequence[Core], values: Any) -> list[Partial]:
+    """The rasters of the same samples by several cores; who drives says by which engine and how many threads."""
+    if drive.able.parallel and len(cores) > 1:
+        return drive.engine.batch(cores, values, threads=drive.threads)
+    return [drive.engine.run(core, values, threads=drive.threads) for core in cores]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

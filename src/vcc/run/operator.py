@@ -115,7 +115,7 @@ class Operator:
     @cached_property
     def dtype(self) -> np.dtype[Any]:
         """Of what is given back: float32, or float64 by ``engine="reference"``."""
-        return np.dtype(np.float64 if self._drive(self.light_field).engine.double else np.float32)
+        return np.dtype(np.float64 if self._drive(self.light_field).able.double else np.float32)
 
     def as_scipy(self) -> Any:
         """The same for SciPy's solvers, such as ``scipy.sparse.linalg.lsqr``.

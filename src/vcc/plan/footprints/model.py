@@ -23,7 +23,6 @@ from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.plan.footprints.shares import REACH, Division
 from vcc.plan.numbers import numbers
-from vcc.plan.protocol import BackRunner, Engine, Runner
 
 Array = NDArray[np.float64]
 
@@ -118,14 +117,6 @@ class Footprints(Value):
     method: ClassVar[str] = "footprints"
     border: ClassVar[int] = 0
     """Views around a block that are looked at with it."""
-
-    def by(self, engine: Engine) -> Runner:
-        """The engine's way to run it."""
-        return engine.footprints
-
-    def back_by(self, engine: Engine) -> BackRunner:
-        """The engine's way to go through it backwards."""
-        return engine.footprints_back
 
     def check_wanted(self, wanted: Collection[str]) -> None:
         """Whether there is a derivative to each of some numbers.

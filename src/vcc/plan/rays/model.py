@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.values import Value
 from vcc.fields.grid import Block
-from vcc.plan.protocol import BackRunner, Engine, Runner
 from vcc.plan.rays.points import DIGITS, TABLE, hashed
 from vcc.plan.rays.reach import Reach, index_from_sensor
 from vcc.plan.rays.steps import Bundle, Move, Packer, Step
@@ -77,14 +76,6 @@ class Rays(Value):
     method: ClassVar[str] = "rays"
     border: ClassVar[int] = 1
     """Views around a block that a ray may look at with it."""
-
-    def by(self, engine: Engine) -> Runner:
-        """The engine's way to run it."""
-        return engine.rays
-
-    def back_by(self, engine: Engine) -> BackRunner:
-        """The engine's way to go through it backwards."""
-        return engine.rays_back
 
     def part(self, block: Block) -> Rays:
         """The same rays, looking at a block of the light field; what all blocks give adds up to the picture."""

@@ -1,0 +1,161 @@
+"""Several plans of one light field: which of them run together, and what they give.
+
+Plans that look at the same samples are a *batch*: each block of samples is read once for all of them
+(`vcc.run.drive.over_blocks`), and an engine makes their rasters together (`vcc.plan.protocol.Engine.batch`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import late
+from vcc.base.workers import Workers
+from vcc.engines import abilities, chosen
+from vcc.fields.samples import Samples
+from vcc.plan.footprints.mixtures import Mixture
+from vcc.plan.how import How
+from vcc.plan.model import Plan
+from vcc.plan.protocol import Partial, Room
+from vcc.run.drive import Drive, Recorded, over_blocks, rasters_of
+from vcc.run.needed import needed_by_all
+
+COMING = 8
+"""Plans that come one after the other are run so many together for each thread, at most."""
+COMING_BYTES = 2**25
+"""Bytes of their rasters for each thread."""
+
+
+def rasters_each(drives: Sequence[Drive]) -> list[Partial]:
+    """The rasters of several plans of one light field, which share what they can.
+
+    Args:
+        drives: plans on their way through one engine, with the same samples.
+    """
+    return [raster for batch in _batches(drives) for raster in _rasters(batch)]
+
+
+def recorded_each(
+    plans: Iterable[Plan], samples: Samples, how: How, room: Room | None = None
+) -> Iterator[tuple[Plan, Recorded]]:
+    """What `vcc.run.drive.drive` gives of several plans of one light field, in their order.
+
+    Of samples in memory plans are run as they come, some together. Nobody plans meanwhile: planning and running
+    that wait for Python's lock in turn take longer than one after the other. Of samples that are read all plans
+    are made first.
+
+    Args:
+        plans: all that is done by one engine.
+        samples: as in `vcc.run.drive.drive`.
+        how: likewise.
+        room: where pictures are put by the threads that make them, where these are several.
+    """
+    coming = samples.whole() is not None and not isinstance(plans, Sequence)
+    if coming:
+        drives: Iterable[Drive] = (Drive(plan, samples, how) for plan in plans)
+    elif listed := list(plans):
+        cut, part = needed_by_all(listed, samples)
+        drives = [Drive(plan, part, how) for plan in cut]
+    else:
+        return
+    first = 0
+    for batch in _batches(drives, coming):
+        places = room and room(range(first, first + len(batch)))
+        first += len(batch)
+        yield from zip((drive.plan for drive in batch), _finished(batch, _rasters(batch), places), strict=True)
+
+
+def recorded_mixed(mixture: Mixture, samples: Samples, how: How, room: Room | None = None) -> Iterator[Recorded]:
+    """What `vcc.run.drive.drive` gives of several cameras whose pictures are sums of a few.
+
+    Args:
+        mixture: how.
+        samples: as in `vcc.run.drive.drive`.
+        how: likewise.
+        room: where pictures are made.
+    """
+    few = [recorded.values for _, recorded in recorded_each(mixture.plans, samples, how)]
+    mixer = late.module("vcc.engines.mixed").Mixer(mixture, few, how.workers, room)
+    for values, missing in zip(mixer.pictures(), mixture.missing, strict=True):
+        yield Recorded(values, missing.share, missing.reason)
+
+
+def may_be_mixed(samples: Samples, how: How) -> bool:
+    """Whether pictures of these samples may be made as sums of a few: in compiled loops, on NumPy arrays."""
+    return abilities(chosen(how.engine, samples.whole())).parallel
+
+
+def _batches(drives: Iterable[Drive], coming: bool = False) -> Iterator[list[Drive]]:
+    """Plans next to each other that run together; each by itself that shares nothing.
+
+    Args:
+        drives: plans on their way.
+        coming: whether they are made as they are asked for, so that not too many are to be waited for.
+    """
+    batch: list[Drive] = []
+    for drive in drives:
+        if batch and (len(batch) >= _most(batch[0], coming) or not _together(batch[0], drive)):
+            yield batch
+            batch = [_after(batch[0], drive)]
+        else:
+            batch.append(drive)
+    if batch:
+        yield batch
+
+
+def _together(one: Drive, other: Drive) -> bool:
+    return one.shared is not None and one.shared == other.shared
+
+
+def _after(last: Drive, drive: Drive) -> Drive:
+    """A plan on its way, with the samples that the last one has prepared where its own are the same."""
+    if drive.in_memory and _together(last, drive) and "prepared" in vars(last):
+        drive.prepared = last.prepared
+    return drive
+
+
+def _most(drive: Drive, coming: bool) -> float:
+    """How many plans like this one run together."""
+    if not drive.in_memory:
+        return drive.most_at_once
+    if not coming:
+        return math.inf
+    raster = 4 * math.prod(drive.plan.core.raster_shape) * drive.channels
+    return drive.threads * max(1, min(COMING, COMING_BYTES // max(raster, 1)))
+
+
+def _rasters(batch: Sequence[Drive]) -> list[Partial]:
+    """The rasters of a batch."""
+    first = batch[0]
+    if len(batch) == 1:
+        return [first.rounds()]
+    if not first.in_memory:
+        return over_blocks(batch, first.reading_for(batch).blocks)
+    for drive in batch:
+        drive.prepared = first.prepared  # once for all, for the way back, too
+    return rasters_of(first, [drive.core for drive in batch], first.prepared)
+
+
+def _finished(
+    batch: Sequence[Drive], found: Sequence[Partial], places: NDArray[np.float32] | None
+) -> list[Recorded]:
+    """The pictures of a batch's rasters, in places where there are any: side by side, each by one thread."""
+    alone = [copy(drive) for drive in batch]
+    if len(batch) > 1:
+        for drive in alone:
+            drive.threads = 1
+
+    def one(n: int) -> Recorded:
+        made = alone[n].finished(found[n])
+        if places is None:
+            return made
+        places[n] = made.values
+        return replace(made, values=places[n])
+
+    with Workers(batch[0].threads) as pool:
+        return list(pool.map(one, range(len(batch))))
