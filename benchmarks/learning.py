@@ -29,6 +29,7 @@ from backwards import SHAPE, THREADS, Case, Step, light_field, timed
 
 import vcc
 from vcc.engines import numba_cpu
+from vcc.engines.footprints_of_many import rasters
 from vcc.torch import CameraModule, sigmoid_mask
 from vcc.units import mm
 
@@ -153,7 +154,7 @@ def at_once(kind: str, shape: tuple[int, ...], place: str) -> Case:
         f"{times} times rasters of {MASKS} masks {place}, {kind}, {'×'.join(map(str, shape))}",
         {
             "one": several(lambda: numba_cpu.run(cores[0], values, threads=THREADS)),
-            f"{MASKS} in one pass": several(lambda: numba_cpu.batch(cores, values, threads=THREADS)),
+            f"{MASKS} in one pass": several(lambda: rasters(cores, values, THREADS)),
         },
         "one",
     )

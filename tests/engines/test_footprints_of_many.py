@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 from tests.engines.test_footprint_numbers import Drawn
+from vcc.base.workers import Workers
 from vcc.engines import numba_cpu
 from vcc.engines.footprints_of_many import rasters, rasters_by_turns
 from vcc.engines.many_kernels import SPAN
 from vcc.plan.footprints.model import Footprints
+from vcc.plan.protocol import Partial
 
 AGREEMENT = 1e-6
 COUNT = 5
@@ -44,10 +46,15 @@ def with_other_textures(core: Footprints, n: int) -> list[Footprints]:
     return [replace(core, masks=(*core.masks[:n], mask, *core.masks[n + 1 :])) for mask in masks]
 
 
+def batch(cores: list[Footprints], values: np.ndarray, threads: int) -> list[Partial]:
+    with Workers(threads) as pool:
+        return numba_cpu.batch(cores, values, pool=pool, then=lambda _, raster: raster)
+
+
 def assert_each_as_alone(cores: list[Footprints], values: np.ndarray) -> None:
     assert rasters(cores, values, 1) is not None  # in one pass
-    found = numba_cpu.batch(cores, values, threads=1)
-    again = numba_cpu.batch(cores, values, threads=3)
+    found = batch(cores, values, 1)
+    again = batch(cores, values, 3)
     largest = 0.0
     for core, one, other in zip(cores, found, again, strict=True):
         alone = numba_cpu.run(core, values, threads=2).values
@@ -105,7 +112,7 @@ def test_what_differs_in_more_is_made_one_by_one() -> None:
     ):
         assert rasters(cores, light, 1) is None
         for threads in (1, 3):
-            found = numba_cpu.batch(cores, light, threads=threads)
+            found = batch(cores, light, threads)
             for one, each in zip(cores, found, strict=True):
                 alone = numba_cpu.run(one, light, threads=1).values
                 np.testing.assert_allclose(each.values, alone, rtol=0, atol=AGREEMENT * np.abs(alone).max())

@@ -29,12 +29,13 @@ class Workers(ThreadPoolExecutor):
     off.
 
     Attributes:
+        threads: how many there are.
         ended: (1,), True once the work has ended early: for compiled loops that take long, which look at it.
     """
 
     def __init__(self, threads: int) -> None:
         super().__init__(threads, initializer=_begin)
-        self.ended = np.zeros(1, dtype=np.bool_)
+        self.threads, self.ended = threads, np.zeros(1, dtype=np.bool_)
         self._is_this_thread = threads == 1 and getattr(_this_thread, "works", False)
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:

@@ -10,7 +10,7 @@ bands of rows.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import Any
 
@@ -68,38 +68,35 @@ def run(
     return Partial(raster.reshape(*core.raster_shape, channels))
 
 
-def batch(cores: Sequence[Footprints | Rays], values: NDArray[Any], *, threads: int) -> list[Partial]:
-    """The rasters of several cores; see `vcc.plan.protocol.Engine`.
+def batch(
+    cores: Sequence[Footprints | Rays],
+    values: NDArray[Any],
+    *,
+    pool: Workers,
+    then: Callable[[int, Partial], Any],
+) -> list[Any]:
+    """What follows from the rasters of several cores; see `vcc.plan.protocol.Engine`.
 
     Footprints that differ only in the weights of views or in the texture of one mask are made in one pass over the
     samples. Others are made side by side, each by one thread: nothing waits for the slowest of several at the end
     of each. The bytes are the same for any number of threads.
     """
-    if (found := _in_one_pass_over_samples(cores, values, threads)) is not None:
-        return found
+    footprints = [core for core in cores if isinstance(core, Footprints)]
+    alike = len(footprints) == len(cores)
+
+    def by_one_thread(numbers: Sequence[int]) -> list[Any]:
+        some = footprints[numbers[0] : numbers[-1] + 1] if alike else []
+        made = rasters(some, values, 1) or rasters_by_turns(some, values) if len(some) > 1 else None
+        if made is None:
+            return [then(n, run(cores[n], values, threads=1)) for n in numbers]
+        return [then(n, Partial(raster)) for n, raster in zip(numbers, made, strict=True)]
+
+    if alike and (found := rasters(footprints, values, pool.threads)) is not None:
+        return list(pool.map(lambda n: then(n, Partial(found[n])), range(len(cores))))
     raster = 4 * math.prod(cores[0].raster_shape) * (values.shape[4] if values.ndim == 5 else 1)
-    most = max(1, min(TURNS, TURNS_BYTES // max(raster, 1), -(-len(cores) // threads)))
-    most = most if all(isinstance(core, Footprints) for core in cores) else 1
-    groups = [cores[first : first + most] for first in range(0, len(cores), most)]
-    with Workers(threads) as pool:
-        return [one for group in pool.map(partial(_by_one_thread, values), groups) for one in group]
-
-
-def _by_one_thread(values: NDArray[Any], cores: Sequence[Footprints | Rays]) -> list[Partial]:
-    found = _in_one_pass_over_samples(cores, values, 1)
-    if found is None and len(cores) > 1 and all(isinstance(core, Footprints) for core in cores):
-        by_turns = rasters_by_turns(cores, values)  # type: ignore[arg-type]
-        found = None if by_turns is None else list(map(Partial, by_turns))
-    return [run(core, values, threads=1) for core in cores] if found is None else found
-
-
-def _in_one_pass_over_samples(
-    cores: Sequence[Footprints | Rays], values: NDArray[Any], threads: int
-) -> list[Partial] | None:
-    if not all(isinstance(core, Footprints) for core in cores):
-        return None
-    made = rasters(cores, values, threads)  # type: ignore[arg-type]
-    return None if made is None else list(map(Partial, made))
+    most = max(1, min(TURNS, TURNS_BYTES // max(raster, 1), -(-len(cores) // pool.threads))) if alike else 1
+    groups = [range(len(cores))[first : first + most] for first in range(0, len(cores), most)]
+    return [one for group in pool.map(by_one_thread, groups) for one in group]
 
 
 def back(

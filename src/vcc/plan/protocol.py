@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.progress import Progress, part_of
+from vcc.base.workers import Workers
 from vcc.fields.grid import Block
 
 Room = Callable[[Sequence[int]], NDArray[np.float32] | None]
@@ -149,10 +150,21 @@ class Engine(Protocol):
         """
         ...
 
-    def batch(self, cores: Sequence[Any], values: Any, *, threads: int) -> list[Partial]:
-        """The rasters of the same samples by several cores, which share what they can of the work.
+    def batch(
+        self, cores: Sequence[Any], values: Any, *, pool: Workers, then: Callable[[int, Partial], Any]
+    ) -> list[Any]:
+        """What follows from rasters of the same samples by several cores, which share what they can of the work.
 
         Asked of engines that are `Abilities.parallel`; others run one core after the other.
+
+        Args:
+            cores: what is computed.
+            values: the samples.
+            pool: whose threads work. Those that are there keep their memory; new memory takes long.
+            then: called with the number of a core and its raster, in one of the threads, as soon as that is made.
+
+        Returns:
+            What ``then`` gives for each core.
         """
         ...
 

@@ -7,9 +7,10 @@ Plans that look at the same samples are a *batch*: each block of samples is read
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from vcc.plan.footprints.mixtures import Mixture
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.protocol import Partial, Room
-from vcc.run.drive import Drive, Recorded, over_blocks, rasters_of
+from vcc.run.drive import Drive, Recorded, made_of, over_blocks
 from vcc.run.needed import needed_by_all
 
 COMING = 8
@@ -37,7 +38,8 @@ def rasters_each(drives: Sequence[Drive]) -> list[Partial]:
     Args:
         drives: plans on their way through one engine, with the same samples.
     """
-    return [raster for batch in _batches(drives) for raster in _rasters(batch)]
+    with Workers(drives[0].threads) as pool:
+        return [raster for batch in _batches(drives) for raster in _made(batch, pool, lambda _, raster: raster)]
 
 
 def recorded_each(
@@ -64,10 +66,12 @@ def recorded_each(
     else:
         return
     first = 0
-    for batch in _batches(drives, coming):
-        places = room and room(range(first, first + len(batch)))
-        first += len(batch)
-        yield from zip((drive.plan for drive in batch), _finished(batch, _rasters(batch), places), strict=True)
+    with Workers(how.workers) as pool:
+        for batch in _batches(drives, coming):
+            places = room and room(range(first, first + len(batch)))
+            first += len(batch)
+            found = _made(batch, pool, _finishing(batch, places))
+            yield from zip((drive.plan for drive in batch), found, strict=True)
 
 
 def recorded_mixed(mixture: Mixture, samples: Samples, how: How, room: Room | None = None) -> Iterator[Recorded]:
@@ -129,33 +133,37 @@ def _most(drive: Drive, coming: bool) -> float:
     return drive.threads * max(1, min(COMING, COMING_BYTES // max(raster, 1)))
 
 
-def _rasters(batch: Sequence[Drive]) -> list[Partial]:
-    """The rasters of a batch."""
+def _made(batch: Sequence[Drive], pool: Workers, then: Callable[[int, Partial], Any]) -> list[Any]:
+    """What follows from the raster of each plan of a batch.
+
+    Args:
+        batch: plans that run together.
+        pool: whose threads work.
+        then: called with the number of a plan in the batch and its raster, in any thread.
+    """
     first = batch[0]
     if len(batch) == 1:
-        return [first.rounds()]
+        return [then(0, first.rounds())]
     if not first.in_memory:
-        return over_blocks(batch, first.reading_for(batch).blocks)
+        rasters = over_blocks(batch, first.reading_for(batch).blocks)
+        return list(pool.map(then, range(len(batch)), rasters))
     for drive in batch:
         drive.prepared = first.prepared  # once for all, for the way back, too
-    return rasters_of(first, [drive.core for drive in batch], first.prepared)
+    return made_of(first, [drive.core for drive in batch], first.prepared, pool, then)
 
 
-def _finished(
-    batch: Sequence[Drive], found: Sequence[Partial], places: NDArray[np.float32] | None
-) -> list[Recorded]:
-    """The pictures of a batch's rasters, in places where there are any: side by side, each by one thread."""
+def _finishing(batch: Sequence[Drive], places: NDArray[np.float32] | None) -> Callable[[int, Partial], Recorded]:
+    """What makes the picture of a batch's raster, in its place where there is one; of several, by one thread."""
     alone = [copy(drive) for drive in batch]
     if len(batch) > 1:
         for drive in alone:
             drive.threads = 1
 
-    def one(n: int) -> Recorded:
-        made = alone[n].finished(found[n])
+    def finished(n: int, raster: Partial) -> Recorded:
+        made = alone[n].finished(raster)
         if places is None:
             return made
         places[n] = made.values
         return replace(made, values=places[n])
 
-    with Workers(batch[0].threads) as pool:
-        return list(pool.map(one, range(len(batch))))
+    return finished

@@ -9,7 +9,7 @@ each the share that is there, and each block meets the same rays.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -472,24 +472,35 @@ def over_blocks(
     counted = Counted(progress, sum(map(reader.used_in, used)))
     trees = [Tree(sum(map(bool, map(drive.used_in, used))), _sum) for drive in drives]
     numbers = [count() for _ in drives]
-    for block in used:
-        those = [n for n, drive in enumerate(drives) if drive.used_in(block)]
-        if len(drives) == 1:
-            parts = [reader.part(block, beside, counted)]
-        else:
-            values = reader.values(block, counted)
-            cores = [drives[n].core.part(drives[n].plan.block(reader.around(block))) for n in those]
-            parts = rasters_of(reader, cores, values)
-        for n, part in zip(those, parts, strict=True):
-            trees[n].put(next(numbers[n]), part)
+    with Workers(reader.threads) as pool:
+        for block in used:
+            those = [n for n, drive in enumerate(drives) if drive.used_in(block)]
+            if len(drives) == 1:
+                parts = [reader.part(block, beside, counted)]
+            else:
+                values = reader.values(block, counted)
+                cores = [drives[n].core.part(drives[n].plan.block(reader.around(block))) for n in those]
+                parts = made_of(reader, cores, values, pool, lambda _, raster: raster)
+            for n, part in zip(those, parts, strict=True):
+                trees[n].put(next(numbers[n]), part)
     return [_in_double(tree.total) for tree in trees]
 
 
-def rasters_of(drive: Drive, cores: Sequence[Core], values: Any) -> list[Partial]:
-    """The rasters of the same samples by several cores; who drives says by which engine and how many threads."""
+def made_of(
+    drive: Drive, cores: Sequence[Core], values: Any, pool: Workers, then: Callable[[int, Partial], Any]
+) -> list[Any]:
+    """What follows from the rasters of the same samples by several cores.
+
+    Args:
+        drive: by which engine.
+        cores: what is computed.
+        values: the samples as these take them.
+        pool: whose threads work.
+        then: called with the number of each and its raster.
+    """
     if drive.able.parallel and len(cores) > 1:
-        return drive.engine.batch(cores, values, threads=drive.threads)
-    return [drive.engine.run(core, values, threads=drive.threads) for core in cores]
+        return drive.engine.batch(cores, values, pool=pool, then=then)
+    return [then(n, drive.engine.run(core, values, threads=drive.threads)) for n, core in enumerate(cores)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
