@@ -115,11 +115,12 @@ class Codes(Brief):
     def _of_path(self, grid: Grid, how: How) -> Mixture | None:
         one = compiled(self.first, grid, how, Blurs(None, None))
         core, own, path = one.plan.core, self.cells[0], one.in_path
-        masks = [n for n, plane in enumerate(path.planes) if plane.pattern is own]
-        elsewhere = [plane for plane in (*path.at_views, *path.planes) if holds(plane.pattern, own)]
+        planes = path.absorbing.in_path
+        masks = [n for n, plane in enumerate(planes) if plane.pattern is own]
+        elsewhere = [plane for plane in (*path.absorbing.at_views, *planes) if holds(plane.pattern, own)]
         if len(masks) != 1 or len(elsewhere) != 1 or not (isinstance(core, Footprints) and core.separable):
             return None
-        details = _Details(path.planes[masks[0]], self.cells)
+        details = _Details(planes[masks[0]], self.cells)
         members = [n for n in range(len(self.cells)) if path.same_by(details.of(n), how)]
         cells = [self.cells[n] for n in members]
         return of_cells(one.plan, masks[0], path.textures[masks[0]], members, cells, len(members))
