@@ -424,3 +424,34 @@ def test_even_light_between_filters_is_what_they_average():
     expected = np.zeros((7, 8))
     expected[2:5, 3:6] = np.outer([1, 2, 1], [1, 2, 1])
     np.testing.assert_allclose(evened_out(point), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("layout", ["square", "hexagonal"])
+def test_overtones_twice_as_fine_are_not_taken_for_the_lattice(layout):
+    """Waves of half the pitch ten times as strong as those of the pitch itself."""
+    grid = lattice(layout, 15.0, 0.05)
+    y, x = np.indices((150, 170))
+    frequencies = np.linalg.inv(np.transpose(grid.steps))
+    if layout == "hexagonal":
+        frequencies = np.concatenate([frequencies, frequencies[:1] + frequencies[1:]])
+    turns = [2 * np.pi * ((x - grid.origin[0]) * f[0] + (y - grid.origin[1]) * f[1]) for f in frequencies]
+    light = 4 + sum(np.cos(2 * each) + 0.1 * np.cos(each) for each in turns)
+    found = find_lenslets(light)
+    assert found.layout == layout
+    assert found.pitch == pytest.approx(15.0, rel=1e-3)
+
+
+def test_light_around_places_is_summed_up_in_round_windows_with_soft_rims():
+    """By sums over all pixels, also where a window reaches beyond the picture, whose edges go on there."""
+    from vcc.recover.white_image import _centroids
+
+    light = np.random.default_rng(0).random((12, 17))
+    places = np.array([[5.3, 4.6], [0.4, 10.8], [15.9, 0.2], [16.0, 11.0]])
+    found, mass = _centroids(light, places, 2.7)
+    y, x = np.mgrid[-6:20, -6:26]
+    shown = light[np.clip(y, 0, 11), np.clip(x, 0, 16)]
+    for (a, b), where, total in zip(places, found, mass, strict=True):
+        weight = np.clip(2.7 + 0.5 - np.hypot(x - a, y - b), 0, 1) * shown
+        assert total == pytest.approx(weight.sum(), rel=1e-12)
+        np.testing.assert_allclose(where, [(weight * x).sum() / total, (weight * y).sum() / total], rtol=1e-9)
+    assert (_centroids(np.zeros((9, 9)), np.array([[4.2, 4.0]]), 2.0)[0] == [4.2, 4.0]).all()
