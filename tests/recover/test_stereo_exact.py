@@ -135,3 +135,26 @@ def test_cameras_without_a_baseline_are_none(part):
         BiprismStereo.of(off)
     with pytest.raises(vcc.InputError, match="one biprism and one lens"):
         BiprismStereo.of(vcc.Camera([*CAMERA.elements, vcc.Lens(1.0, z=PLACE + AHEAD + 1 * mm)], SENSOR))
+
+
+def test_blocks_are_compared_by_their_normalised_correlation():
+    """With all partners that lie in the left half as a whole, two pixels from its border for what splines need."""
+    from vcc.recover.stereo import _correlations
+
+    values = 0.5 + 0.4 * np.random.default_rng(2).random(SENSOR.shape)
+    rows, columns, shifts, half = np.array([5, 9, 31]), np.array([300, 333, 351]), np.arange(80, 349), 5
+    found = _correlations(values, rows, columns, shifts, half, MIXED * PITCH, CAMERA)
+    for (n, i, j), here in np.ndenumerate(found):
+        partner = columns[j] - shifts[n]
+        if partner - half < 2 or partner - 269.5 >= -(MIXED + half + 1):
+            assert here == -np.inf
+            continue
+        if n % 20 == 0:
+            one, other = (
+                values[rows[i] - half : rows[i] + half + 1, c - half : c + half + 1].ravel()
+                for c in (columns[j], partner)
+            )
+            # A contrast of 1/8 of the brightest, against 0.002 that counts as none
+            assert here == pytest.approx(np.corrcoef(one, other)[0, 1], abs=(0.002 * 8) ** 2)
+    assert np.isinf(found).any()
+    assert np.isfinite(found).mean() > 0.5
