@@ -458,3 +458,35 @@ def test_light_around_places_is_summed_up_in_round_windows_with_soft_rims():
         assert total == pytest.approx(weight.sum(), rel=1e-12)
         np.testing.assert_allclose(where, [(weight * x).sum() / total, (weight * y).sum() / total], rtol=1e-9)
     assert (_centroids(np.zeros((9, 9)), np.array([[4.2, 4.0]]), 2.0)[0] == [4.2, 4.0]).all()
+
+
+@pytest.mark.parametrize(
+    ("layout", "shape", "rotation"),
+    [("square", (90, 141), 0.03), ("hexagonal", (131, 80), -0.05), ("square", (97, 96), 0)],
+)
+def test_the_spectrum_alone_tells_the_lattice_between_its_bins(layout, shape, rotation):
+    """Of waves under a smooth window a parabola finds peaks to some hundredths of a bin; phases are exact then."""
+    from vcc.recover.white_image import _from_spectrum
+
+    grid = lattice(layout, 10.37, rotation)
+    y, x = np.indices(shape)
+    along = np.linalg.inv(np.transpose(grid.steps))
+    if layout == "hexagonal":
+        along = np.concatenate([along, along[:1] + along[1:]])
+    light = 4 + sum(np.cos(2 * np.pi * ((x - grid.origin[0]) * f[0] + (y - grid.origin[1]) * f[1])) for f in along)
+    found = _from_spectrum(light)
+    assert found.layout == layout
+    # Bins of a picture twice as large are 1/(2·80) apart: 1/16 of the frequency, of which a hundredth.
+    assert found.pitch == pytest.approx(10.37, rel=6e-4)
+    assert found.rotation == pytest.approx(rotation, abs=6e-4)
+    np.testing.assert_allclose(found.origin, grid.nearest_to(found.origin), atol=0.1)
+    # The lattice starts from the micro-image in the middle.
+    assert np.linalg.norm(np.array(found.origin) - (np.array(shape[::-1]) - 1) / 2) < 10.37
+
+
+@pytest.mark.parametrize(
+    ("elements", "words"), [([], "its elements: none"), ([vcc.Lens(0.05)], "its elements: lens")]
+)
+def test_a_camera_without_lenslets_is_told_by_its_elements(elements, words):
+    with pytest.raises(InputError, match=words):
+        LensletGrid.of_camera(vcc.Camera(elements, vcc.Sensor(0.05, (9, 9), 1e-5)))
