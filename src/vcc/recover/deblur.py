@@ -123,7 +123,7 @@ def wiener(
             strength, variance = _likeliest(shown, power, squared, twice, share * noise**2, share < 1)
             variance = max(variance / share, noise**2)
         ratio = variance * squared / strength
-        inverse = np.where(passed, np.conj(transfer) / np.where(passed, power + ratio, 1), 0)
+        inverse = np.divide(np.conj(transfer), power + ratio, out=np.zeros_like(transfer), where=passed)
         out[...] = blur.seen(np.asarray(fft.irfft2(inverse * spectrum, s=blur.domain)))
     return Deblurred(channels_last(found, values.shape))
 
@@ -240,8 +240,7 @@ def _lucy_step(blur: Blur, held: Array, channel: Array, estimate: Array) -> Arra
     # Rounding of the FFT leaves tiny negative numbers where a picture is black.
     floor = 1e-12 * max(float(channel.max()), 1e-300)
     ratio = blur.adjoint(channel / np.maximum(blur.apply(estimate), floor))
-    updated = held > _FAINT
-    factor = np.where(updated, ratio / np.where(updated, held, 1.0), 1.0)
+    factor = np.divide(ratio, held, out=np.ones_like(ratio), where=held > _FAINT)
     return np.asarray(estimate * np.maximum(factor, 0) - estimate)
 
 

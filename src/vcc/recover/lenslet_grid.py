@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,6 +95,11 @@ class LensletGrid:
     def nearest_to(self, place: ArrayLike) -> Array:
         """(x, y) of the micro-image's centre next to a place (x, y), pixels."""
         return self.pixel_from_steps(np.rint(self.index_of(place)))
+
+    def turned(self, shape: tuple[int, int]) -> LensletGrid:
+        """The grid of a recording of ``shape`` (rows, columns) that was turned by 180°: the same steps."""
+        (x, y), (rows, columns) = self.origin, shape
+        return replace(self, origin=(columns - 1 - x, rows - 1 - y))
 
     @classmethod
     def from_lattice(cls, lattice: Lattice, sensor: Sensor) -> LensletGrid:

@@ -90,7 +90,7 @@ class LensletViews(Brief):
             weights = weights * (bilinear(told, y, x) > 0.999)[self.corners]
         total = weights.sum(axis=1)
         missing = total < 1e-3
-        scale = np.where(missing, 0.0, 1 / np.where(missing, 1.0, total))
+        scale = np.divide(1.0, total, out=np.zeros_like(total), where=~missing)
         picture = np.empty((len(self.corners), len(planes)), np.float32)
         for channel, plane in enumerate(planes):
             picture[:, channel] = (weights * bilinear(plane, y, x)[self.corners]).sum(axis=1) * scale

@@ -100,7 +100,7 @@ def decode_plenoptic(
             into a micro-image; NaNs; more memory needed than allowed.
     """
     prepared = _Prepared.of(recording, camera, white, dark, color_filter)
-    grid = _chosen_grid(grid, camera, white, dark, prepared.color_filter is not None)
+    grid = _chosen_grid(grid, camera, white, dark, prepared.color_filter is not None, inverted)
     counts = _view_counts(views, grid, view_step)
     step = grid.pitch * math.sqrt(ROW_HEIGHT[grid.layout]) if step is None else float(step)
     above_zero("step", step, unit="pixels of the recording")
@@ -186,8 +186,6 @@ class _Prepared:
             return cls(raw, None, kept)
         light = numbers_like(white, raw, "the white image") - darkness
         faintest = DARK_SHARE * brightness_of(white, light)
-        if light.ndim == 2 and raw.ndim == 3:
-            light = light[..., None]
         shown = grey(light) if kept is None else evened_out(grey(light))
         return cls(raw / np.maximum(light, faintest), (shown >= faintest).astype(np.float32), kept)
 
@@ -200,13 +198,14 @@ class _Prepared:
 
 
 def _chosen_grid(
-    grid: LensletGrid | None, camera: Camera | None, white: Any, dark: Any, mosaic: bool
+    grid: LensletGrid | None, camera: Camera | None, white: Any, dark: Any, mosaic: bool, inverted: bool
 ) -> LensletGrid:
     if grid is None:
         if white is not None:
             grid = find_lenslets(white, dark=dark, color_filter=mosaic)
         elif camera is not None:
-            return LensletGrid.of_camera(camera)
+            own = LensletGrid.of_camera(camera)
+            return own if inverted else own.turned(camera.sensor.shape)
         else:
             raise InputError(
                 "where the micro-images are is not known: give white= (a recording of something white), camera= "

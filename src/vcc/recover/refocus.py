@@ -352,9 +352,9 @@ def _view_index(light_field: LightField, u: float, v: float) -> tuple[float, flo
         step = linear[axis, axis]
         start = light_field.frame([0, 0, 0, 0])[axis]
         found = (place - start) / step
-        nearest = round(found) if math.isfinite(found) else 0
+        nearest = float(np.rint(found))
         if abs(found - nearest) < 1e-9:
-            found = float(nearest)
+            found = nearest
         if not -1e-9 <= found <= count - 1 + 1e-9:
             ends = sorted((float(offset[axis]), float(offset[axis] + step * (count - 1))))
             raise InputError(

@@ -261,8 +261,8 @@ def _correlations(
     result = np.full((len(shifts), len(rows), len(columns)), -np.inf)
     for n, shift in enumerate(shifts):
         partner = columns - shift
-        # Room for cubic interpolation on both sides.
-        there = (partner - half >= 2) & (partner + half < values.shape[1] - 2)
+        # Room for cubic interpolation on the left; on the right is the other half.
+        there = partner - half >= 2
         there &= places[np.clip(partner, 0, len(places) - 1)] < -(mixed + reach)
         if there.any():
             other = _standard(windows[np.ix_(rows - half, partner[there] - half)], floor)
@@ -316,10 +316,12 @@ def _refined(
         yo, yc = (own * other).sum(2), (own * change).sum(2)
         determinant = oo * cc - oc**2
         solvable = determinant > 1e-9 * np.maximum(oo * cc, 1e-300)
-        safe = np.where(solvable, determinant, 1)
-        gain, gain_step = (yo * cc - yc * oc) / safe, (yc * oo - yo * oc) / safe
-        move = np.where(solvable & (gain > 0), gain_step / np.where(gain > 0, gain, 1), 0)
+        gain, gain_step = (
+            np.divide(each, determinant, out=np.zeros_like(determinant), where=solvable)
+            for each in (yo * cc - yc * oc, yc * oo - yo * oc)
+        )
+        move = np.divide(gain_step, gain, out=np.zeros_like(gain), where=gain > 0)
         left = ((own - gain[..., None] * other - gain_step[..., None] * change) ** 2).mean(2)
-        explained = np.where(solvable & (gain > 0), 1 - (left + variance - (own**2).mean(2)) / variance, 0)
+        explained = np.where(gain > 0, 1 - (left + variance - (own**2).mean(2)) / variance, 0)
         shift = shift + np.clip(move, -0.5, 0.5)
     return shift, np.clip(explained, 0, 1)

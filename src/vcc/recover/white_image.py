@@ -67,8 +67,10 @@ def find_lenslets(
 def numbers_like(picture: Any, recording: Array, what: str) -> Array:
     """The numbers of a picture from the sensor that made a recording, grey where the recording is.
 
+    Of a grey picture and a recording in colour, they have one channel for all.
+
     Raises:
-        InputError: another size, or what `numbers_of` refuses.
+        InputError: another size, other channels, or what `numbers_of` refuses.
     """
     values = numbers_of(picture, what)
     if values.shape[:2] != recording.shape[:2]:
@@ -76,7 +78,15 @@ def numbers_like(picture: Any, recording: Array, what: str) -> Array:
             f"{what} is {values.shape[0]}×{values.shape[1]} pixels, the recording "
             f"{recording.shape[0]}×{recording.shape[1]}: they must come from the same sensor"
         )
-    return grey(values) if recording.ndim == 2 else values
+    if recording.ndim == 2:
+        return grey(values)
+    values = np.atleast_3d(values)
+    if values.shape[2] not in (1, recording.shape[2]):
+        raise InputError(
+            f"{what} has {values.shape[2]} channels, and the recording {recording.shape[2]}: give one for each, "
+            "or a grey one"
+        )
+    return values
 
 
 def brightness_of(white: Any, light: Array) -> float:
