@@ -7,11 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from typing import Any, Literal, Self, TypeVar, Unpack
 
-from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
-from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.explain import Explanation, explained
-from vcc.advice.no_focus import no_image
-from vcc.advice.noise import why_noisy
+from vcc.advice.of_images import Cautions
 from vcc.base import checks, late
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
@@ -39,6 +36,11 @@ from vcc.run.operators import carried_to
 Field = TypeVar("Field", bound=InMemory)
 
 
+def _warn_of(cautions: Iterable[str]) -> None:
+    for caution in cautions:
+        warn_of_result(caution)
+
+
 def _check_of_the_run(options: Options) -> None:
     """Refuse options that decide how a plan is made, where one is given."""
     for name in options:
@@ -47,17 +49,6 @@ def _check_of_the_run(options: Options) -> None:
                 f"{name} is decided when a plan is made: leave it out, or pass it to camera.compile, and that "
                 "plan here"
             )
-
-
-def _caution(plan: Plan, light_field: Samples, found: Recorded, absurd: str) -> str:
-    """What to say of a picture that is dark or lacks rays, with absurd lengths, which may be the reason."""
-    caution = why_dark(plan, light_field, found) or ""
-    if not caution and (darker := why_darker(found)):
-        absurd = absurd if found.missing_rays > MANY_MISSING else ""
-        caution = darker
-    if not caution and absurd and is_faint(found, light_field):
-        caution = "the picture is nearly black"
-    return f"{caution}. {absurd}" if caution and absurd else caution
 
 
 class Camera(Train):
@@ -204,27 +195,15 @@ class Camera(Train):
                 that is too large to be sent to it.
         """
         check_is_light_field(light_field)
-        chosen, absurd = How.of(how, options), self._absurd(light_field)
+        chosen = How.of(how, options)
+        cautions = Cautions(self, light_field.grid)
+        _warn_of(cautions.before())
         plan = self._planned(light_field, chosen, plan, options, progress)
         found = drive(plan, light_field, chosen, progress, executor)
-        if noisy := why_noisy(plan, chosen, found):
-            warn_of_result(noisy)
-        return self._image(plan, light_field, found, absurd)
+        _warn_of(cautions.of(plan, light_field, found, chosen))
+        return self._image(found)
 
-    def _absurd(self, light_field: Samples) -> str:
-        """What to ask where lengths are absurd; said now where hardly any light will come of it."""
-        absurd = metres_meant(self, light_field.grid)
-        if absurd and light_share(self, light_field.grid) < FAINT:  # said before what may take minutes
-            warn_of_result(f"hardly any light will reach the sensor. {absurd}")
-            return ""
-        return absurd
-
-    def _image(self, plan: Plan, light_field: Samples, found: Recorded, absurd: str) -> Image:
-        """The picture that was recorded; what it is to be read with care for is said."""
-        if caution := _caution(plan, light_field, found, absurd):
-            warn_of_result(caution)
-        if caution := no_image(self, light_field.grid):
-            warn_of_result(caution)
+    def _image(self, found: Recorded) -> Image:
         return Image(
             found.values,
             self.sensor.frame,
@@ -273,8 +252,7 @@ class Camera(Train):
         else:
             plan.check_fits(self, light_field.grid)
             _check_of_the_run(options)
-        for caution in plan.cautions:
-            warn_of_result(caution)
+        _warn_of(plan.cautions)
         return plan
 
     def expose(
@@ -446,13 +424,15 @@ def each_captured(
         return
     mixture = mixture_of(cameras, light_field.grid, how) if may_be_mixed(light_field, how) else None
     if mixture is not None:
-        absurd = metres_meant(cameras[0], light_field.grid)  # of all of them: they differ in cells alone
+        cautions = Cautions(cameras[0], light_field.grid)  # of all of them: they differ in cells alone
+        _warn_of(cautions.before())
         found = zip(mixture.members, recorded_mixed(mixture, light_field, how, room), strict=True)
         for number, one in found:
             camera = cameras[number]
             # A picture that is dark is explained by the camera's own plan.
             plan = mixture.plans[0] if one.values.any() else camera.compile(light_field, how)
-            yield number, camera._image(plan, light_field, one, camera._absurd(light_field) if absurd else "")
+            _warn_of(cautions.of(plan, light_field, one))
+            yield number, camera._image(one)
     done = set() if mixture is None else set(mixture.members)
     left = [number for number in range(len(cameras)) if number not in done]
     plans = compiled_each(
@@ -463,7 +443,7 @@ def each_captured(
     )
     room_of = room and (lambda places: room([left[place] for place in places]))
     for number, (plan, one) in zip(left, recorded_each(plans, light_field, how, room_of), strict=True):
-        for caution in plan.cautions:
-            warn_of_result(caution)
         camera = cameras[number]
-        yield number, camera._image(plan, light_field, one, camera._absurd(light_field))
+        cautions = Cautions(camera, light_field.grid)
+        _warn_of((*plan.cautions, *cautions.before(), *cautions.of(plan, light_field, one)))
+        yield number, camera._image(one)

@@ -19,9 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.limits import sampling_limits
-from vcc.advice.no_focus import no_image
+from vcc.advice.of_images import Cautions
 from vcc.base import units
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
@@ -576,11 +575,7 @@ class Session:
     def _notes(self, taken: Taken) -> list[Json]:
         """What to beware of, each at the element that its words name."""
         train, field = self._described.train, self._light_field()
-        said = list(taken.plan.cautions)
-        if dark := why_dark(taken.plan, field, taken.found) or why_darker(taken.found):
-            said.append(dark)
-        if unfocused := no_image(train, field.grid):
-            said.append(unfocused)
+        said = [*taken.plan.cautions, *Cautions(train, field.grid).of(taken.plan, field, taken.found)]
         far_near = vergences(field.grid, None)
         scene = None if far_near is None else (float(far_near.min()), float(far_near.max()))
         told = {item.advice: item for item in sampling_limits(train, field.grid, scene).to_watch}

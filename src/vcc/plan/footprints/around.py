@@ -105,8 +105,8 @@ class Around(Brief):
         return cls(filters.core.guarded(guard), tuple(before), tuple(after), detail is not None)
 
 
-@dataclass(frozen=True, eq=False)
-class Sharpened:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sharpened(Brief):
     """A core, and the filter of the picture that gives back what its interpolation takes (`vcc.plan.sharpening`).
 
     Args:
