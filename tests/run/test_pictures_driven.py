@@ -45,9 +45,8 @@ def camera(*others, z: float = 1.0, diameter: float = 7 * mm) -> vcc.Camera:
 
 SEVERAL = {
     "in turn with others": [
-        *[camera(z=0.9 + 0.02 * n) for n in range(10)],
+        *[camera(z=0.9 + 0.02 * n) for n in range(9)],
         *[camera(BLURRED, z=0.97 + 0.02 * n) for n in range(3)],
-        camera(LENSLETS),
         camera(diameter=3 * mm),
         camera(BLURRED, diameter=3 * mm),
         camera(vcc.Mask(CELLS[0], width=20 * mm, z=0.96 * FOCUS)),
@@ -63,8 +62,7 @@ def test_each_picture_is_that_of_its_camera(name, engine):
     cameras, given = SEVERAL[name], light_field()
     if engine == "reference":
         cameras = cameras[-6::2]
-    alone = [each.capture(given, engine=engine, refine=1) for each in cameras if LENSLETS not in each.elements]
-    cameras = [each for each in cameras if LENSLETS not in each.elements]
+    alone = [each.capture(given, engine=engine, refine=1) for each in cameras]
     for threads in (1, 2):
         together = captured_together(cameras, given, How(engine=engine, refine=1, threads=threads))
         assert len(together) == len(cameras)
@@ -73,6 +71,8 @@ def test_each_picture_is_that_of_its_camera(name, engine):
             assert found.missing_rays == pytest.approx(truth.missing_rays, rel=1e-6)
             np.testing.assert_allclose(found.values, truth.values, rtol=0, atol=1e-6 * truth.values.max())
             assert found.values.dtype == np.float32
+            if BLURRED in truth.camera.elements:  # such are run one after the other
+                np.testing.assert_array_equal(found.values, truth.values)
 
 
 @pytest.mark.parametrize("tolerance", [None, 0.3])
@@ -90,15 +90,15 @@ def test_each_picture_by_rays_is_that_of_its_camera(tolerance):
 
 def test_pictures_are_put_where_there_is_room_for_them():
     """Numbers of cameras, in the order in which they were given; places are written, and hold the pictures."""
-    cameras, given = SEVERAL["in turn with others"][:13], light_field(2)
-    places, asked = np.full((13, 9, 10, 2), np.nan, np.float32), []
+    cameras, given = SEVERAL["in turn with others"][:12], light_field(2)
+    places, asked = np.full((12, 9, 10, 2), np.nan, np.float32), []
 
     def room(numbers):
         asked.extend(numbers)
         return places[min(numbers) : max(numbers) + 1]
 
     found = dict(each_captured(cameras, given, How(threads=2, refine=1), room=room))
-    assert sorted(found) == sorted(asked) == list(range(13))
+    assert sorted(found) == sorted(asked) == list(range(12))
     for number, image in found.items():
         np.testing.assert_array_equal(places[number], image.values)
         assert np.shares_memory(places[number], image.values)
@@ -107,14 +107,15 @@ def test_pictures_are_put_where_there_is_room_for_them():
 
 
 def test_many_masks_are_made_of_few_pictures_in_memory_and_from_disk(tmp_path):
-    cameras = [camera(vcc.Mask(each, width=20 * mm, z=0.5 * FOCUS)) for each in np.repeat(CELLS, 5, 0)[:50]]
+    cameras = [camera(vcc.Mask(each, width=20 * mm, z=0.5 * FOCUS)) for each in np.repeat(CELLS, 3, 0)]
     given = light_field()
     stored = save_store(given, tmp_path / "a.zarr")
     for threads, each in ((1, given), (3, given), (2, stored)):
-        found = captured_together(cameras, each, How(threads=threads))
-        for number in (0, 17, 49):
-            truth = cameras[number].capture(given, engine="reference")
-            np.testing.assert_allclose(found[number].values, truth.values, rtol=0, atol=3e-6 * truth.values.max())
+        found = captured_together(cameras, each, How(threads=threads, refine=1))
+        for number in (0, 17, 35):
+            truth = cameras[number].capture(given, engine="reference", refine=1)
+            atol = 3e-6 * truth.values.max()
+            np.testing.assert_allclose(found[number].values, truth.values, rtol=0, atol=atol)
             assert found[number].missing_rays == pytest.approx(truth.missing_rays, rel=1e-6)
 
 
