@@ -19,7 +19,8 @@ from vcc.base.units import mm
 from vcc.camera import captured_together, each_captured
 from vcc.fields.grid import Block
 from vcc.plan.how import How
-from vcc.run.drive import Drive, drive, sampling_error
+from vcc.run.drive import Drive, drive, each_recorded, sampling_error
+from vcc.shapes.patterns import CosineSum
 from vcc.store import save_store
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
@@ -27,7 +28,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 SHAPE = (3, 4, 12, 14)
 FOCUS = 1 / (1 / 50e-3 - 1)
 SENSOR = vcc.Sensor(FOCUS, (9, 10), FOCUS * 3e-3)
-BLURRED = vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.004))
+BLURRED = (vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.004)), vcc.Mask(CosineSum((7 * mm, 5 * mm)), z=FOCUS / 2))
+"""What has views blurred before all else, a column of them at a time."""
 CELLS = np.random.default_rng(3).random((12, 9, 9))
 LENSLETS = vcc.LensArray(focal_length=2 * mm, pitch=1 * mm, z=FOCUS - 3 * mm)
 
@@ -46,9 +48,9 @@ def camera(*others, z: float = 1.0, diameter: float = 7 * mm) -> vcc.Camera:
 SEVERAL = {
     "in turn with others": [
         *[camera(z=0.9 + 0.02 * n) for n in range(9)],
-        *[camera(BLURRED, z=0.97 + 0.02 * n) for n in range(3)],
+        *[camera(*BLURRED, z=0.97 + 0.02 * n) for n in range(3)],
         camera(diameter=3 * mm),
-        camera(BLURRED, diameter=3 * mm),
+        camera(*BLURRED, diameter=3 * mm),
         camera(vcc.Mask(CELLS[0], width=20 * mm, z=0.96 * FOCUS)),
     ],
     "masks in mid-path": [camera(vcc.Mask(each, width=20 * mm, z=0.5 * FOCUS)) for each in CELLS[:3]],
@@ -62,16 +64,17 @@ def test_each_picture_is_that_of_its_camera(name, engine):
     cameras, given = SEVERAL[name], light_field()
     if engine == "reference":
         cameras = cameras[-6::2]
-    alone = [each.capture(given, engine=engine, refine=1) for each in cameras]
+    how = How(engine=engine, method="footprints", refine=1)
+    alone = [each.capture(given, how) for each in cameras]
     for threads in (1, 2):
-        together = captured_together(cameras, given, How(engine=engine, refine=1, threads=threads))
+        together = captured_together(cameras, given, replace(how, threads=threads))
         assert len(together) == len(cameras)
         for found, truth in zip(together, alone, strict=True):
             assert found.camera == truth.camera
             assert found.missing_rays == pytest.approx(truth.missing_rays, rel=1e-6)
             np.testing.assert_allclose(found.values, truth.values, rtol=0, atol=1e-6 * truth.values.max())
             assert found.values.dtype == np.float32
-            if BLURRED in truth.camera.elements:  # such are run one after the other
+            if BLURRED[0] in truth.camera.elements:  # such are run one after the other
                 np.testing.assert_array_equal(found.values, truth.values)
 
 
@@ -90,20 +93,45 @@ def test_each_picture_by_rays_is_that_of_its_camera(tolerance):
 
 def test_pictures_are_put_where_there_is_room_for_them():
     """Numbers of cameras, in the order in which they were given; places are written, and hold the pictures."""
-    cameras, given = SEVERAL["in turn with others"][:12], light_field(2)
-    places, asked = np.full((12, 9, 10, 2), np.nan, np.float32), []
+    cameras, given = SEVERAL["in turn with others"], light_field(2)
+    how = How(threads=2, refine=1, method="footprints")
+    places, asked = np.full((len(cameras), 9, 10, 2), np.nan, np.float32), []
 
     def room(numbers):
         asked.extend(numbers)
         return places[min(numbers) : max(numbers) + 1]
 
-    found = dict(each_captured(cameras, given, How(threads=2, refine=1), room=room))
-    assert sorted(found) == sorted(asked) == list(range(12))
+    found = dict(each_captured(cameras, given, how, room=room))
+    assert sorted(found) == list(range(len(cameras)))
+    # Those that all threads run, one after the other, have none.
+    blurred = {number for number, each in enumerate(cameras) if BLURRED[0] in each.elements}
+    assert asked == sorted(set(found) - blurred)
     for number, image in found.items():
-        np.testing.assert_array_equal(places[number], image.values)
-        assert np.shares_memory(places[number], image.values)
-        truth = cameras[number].capture(given, refine=1).values
-        np.testing.assert_allclose(places[number], truth, rtol=0, atol=1e-6 * truth.max())
+        truth = cameras[number].capture(given, how).values
+        np.testing.assert_allclose(image.values, truth, rtol=0, atol=1e-6 * truth.max())
+        if number not in blurred:
+            np.testing.assert_array_equal(places[number], image.values)
+            assert np.shares_memory(places[number], image.values)
+
+
+@pytest.mark.parametrize(
+    ("threads", "pixels", "together"),
+    [(1, (9, 10), 8), (2, (9, 10), 16), (2, (1000, 1398), 6), (1, (1000, 1399), 2), (1, (2100, 2000), 1)],
+)
+def test_so_many_cameras_are_planned_before_the_first_pictures_are_made(threads, pixels, together):
+    """Eight for each thread, or as many as have pictures of 32 MiB: of two channels, 4 bytes a number."""
+    given, made = light_field(2), []
+    plan = camera().compile(given)
+    large = replace(plan, core=replace(plan.core, raster_shape=pixels), sensor_shape=pixels)
+
+    def plans():
+        for number in range(40):
+            made.append(number)
+            yield large
+
+    recorded = each_recorded(plans(), given, How(threads=threads))
+    assert next(recorded)[0] == large
+    assert len(made) == together + 1
 
 
 def test_many_masks_are_made_of_few_pictures_in_memory_and_from_disk(tmp_path):
