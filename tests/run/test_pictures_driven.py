@@ -78,6 +78,41 @@ def test_each_picture_is_that_of_its_camera(name, engine):
                 np.testing.assert_array_equal(found.values, truth.values)
 
 
+@pytest.mark.parametrize("engine", ["numba", "reference"])
+@pytest.mark.parametrize("where", ["in memory", "on disk"])
+def test_plans_that_are_there_already_share_samples(tmp_path, engine, where):
+    """Plans in a list, alike in what is done to samples before and not: blurred views are nobody else's."""
+    given = light_field(2, kind="uint8")
+    samples = given if where == "in memory" else save_store(given, tmp_path / "a.zarr")
+    by_rays = {"method": "rays", "samples": 4}
+    lists = [
+        [each.compile(given, refine=1) for each in (camera(), camera(z=0.9), camera(z=1.1, diameter=3 * mm))],
+        [each.compile(given, refine=1) for each in SEVERAL["masks at the views"]],
+        [each.compile(given, refine=1) for each in SEVERAL["masks in mid-path"]],
+        [
+            camera(*BLURRED).compile(given, method="footprints", refine=1),
+            camera().compile(given, refine=1),
+            camera(*BLURRED, z=0.98).compile(given, method="footprints", refine=1),
+            camera().compile(given, **by_rays),
+        ],
+        [
+            camera().compile(given, **by_rays),
+            camera(z=0.9).compile(given, **by_rays),
+            camera().compile(given, interpolation="linear", **by_rays),  # of samples that nobody sharpens
+        ],
+    ]
+    for plans in lists:
+        how = How(engine=engine, threads=2)
+        found = list(each_recorded(plans, samples, how))
+        assert [plan.core.method for plan, _ in found] == [plan.core.method for plan in plans]
+        for plan, (_, one) in zip(plans, found, strict=True):
+            truth = drive(plan, given, how)
+            np.testing.assert_allclose(one.values, truth.values, rtol=0, atol=1e-6 * truth.values.max())
+            assert one.sampling_error == pytest.approx(truth.sampling_error, rel=1e-4)
+            assert (one.rays, one.samples) == (truth.rays, truth.samples)
+    assert list(each_recorded([], samples, How())) == []
+
+
 @pytest.mark.parametrize("tolerance", [None, 0.3])
 def test_each_picture_by_rays_is_that_of_its_camera(tolerance):
     """Rounds until a tolerance is met are each camera's own; pictures of colours have a channel axis."""
@@ -274,6 +309,9 @@ def test_what_is_in_focus_is_taken_from_the_views_as_they_are(tmp_path, channels
     for each, how in ((given, How()), (stored, How()), (stored, How(memory_limit=2**19))):
         found = drive(plan, each, how).values
         np.testing.assert_allclose(found, made * (1 - share) + plain * share, rtol=0, atol=1e-5 * plain.max())
+    # A quarter of the memory is for views and maps that are kept; in memory 256 MiB are there, or more for larger.
+    assert Drive(plan, stored, How(memory_limit=10**8)).limit == 75_000_000
+    assert Drive(plan, given, How(memory_limit=10**3)).limit == 3 * 2**26
     assert optics.capture(stored, between_views="depth").values.shape == (10, 13, *channels)
     other = given.replaced(array_api_strict.asarray(values))
     with pytest.raises(vcc.InputError, match="takes NumPy arrays, not array_api_strict"):
