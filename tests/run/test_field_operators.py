@@ -48,6 +48,14 @@ class Turn(Kernel):
         raise NotImplementedError
 
 
+@dataclass(frozen=True)
+class Bending(vcc.Element):
+    """Scatters, and is a lens besides."""
+
+    def faces(self):
+        return vcc.Faces(deflection=Affine.lens(0.05), scatter=turn(1, 0))
+
+
 def turn(columns: int, rows: int) -> Turn:
     """That moves a view's picture by whole pixels to the right and down; pixels count against slopes."""
     return Turn(-columns * SLOPE[1], -rows * SLOPE[0])
@@ -193,6 +201,8 @@ def test_what_cannot_be_scattered_is_refused():
     given = light_field()
     with pytest.raises(vcc.InputError, match="does not scatter light"):
         given.scattered(vcc.Lens(focal_length=0.05))
+    with pytest.raises(vcc.InputError, match="also bends rays"):
+        given.scattered(Bending())
     still = vcc.Diffuser(turn(1, 1))
     # Places of a millionth of the views' spacing are rounding; of more are not.
     for flown, refused in ((1e-9, False), (1e-3, True)):

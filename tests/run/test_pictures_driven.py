@@ -13,6 +13,7 @@ from typing import Any
 import array_api_strict
 import numpy as np
 import pytest
+import torch
 
 import vcc
 from vcc.base.units import mm
@@ -180,6 +181,19 @@ def test_many_masks_are_made_of_few_pictures_in_memory_and_from_disk(tmp_path):
             atol = 3e-6 * truth.values.max()
             np.testing.assert_allclose(found[number].values, truth.values, rtol=0, atol=atol)
             assert found[number].missing_rays == pytest.approx(truth.missing_rays, rel=1e-6)
+
+
+@pytest.mark.parametrize("cut", [(), (2,)])
+def test_columns_of_blurred_views_add_up_in_arrays_of_other_libraries(cut):
+    """Blurred views are made a column at a time; arrays of another library stay theirs."""
+    given, optics = light_field(*cut), camera(*BLURRED)
+    whole = optics.capture(given, engine="reference", method="footprints", refine=1).values
+    other = given.replaced(torch.asarray(given.values))
+    plan = optics.compile(other, method="footprints", refine=1)
+    assert len(list(Drive(plan, other, How()).blocks)) == 4
+    found = drive(plan, other).values
+    assert isinstance(found, torch.Tensor)
+    np.testing.assert_allclose(found, whole, rtol=0, atol=1e-5 * whole.max())
 
 
 # --- rounds of rays ---

@@ -8,6 +8,7 @@ from __future__ import annotations
 import pickle
 from concurrent.futures import CancelledError, Executor, Future
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,11 +16,12 @@ import pytest
 
 import vcc
 from vcc.base.units import mm
+from vcc.base.version import VERSION
 from vcc.fields.grid import Block
 from vcc.plan.how import How
-from vcc.run import sent
+from vcc.run import executors, sent
 from vcc.run.drive import Drive
-from vcc.run.executors import Cluster, Pool, Work, crew, memory_of_task
+from vcc.run.executors import Cluster, Pool, Tree, Work, crew, memory_of_task
 from vcc.run.sent import Carried, Sent, check_may_be_sent
 from vcc.store import save_store
 
@@ -217,3 +219,201 @@ def test_blocks_in_memory_and_in_stores_make_the_picture_elsewhere(tmp_path, kin
         np.testing.assert_allclose(found, whole, rtol=0, atol=1e-6 * whole.max())
     views = int(CAMERA.compile(given).used_views(SHAPE).sum())
     assert calls == [(views, views)] * 2
+
+
+# --- a cluster, whose client is made up: what it is asked ---
+
+
+class Done:
+    """A task's result, there at once; of a cancelled one there is none, of one that failed what it raised."""
+
+    def __init__(self, make, status: str = "finished") -> None:
+        self.status, self._made = status, None
+        if status == "finished":
+            try:
+                self._made = make()
+            except Exception as error:
+                self.status, self._made = "error", error
+        self.waiting = False
+
+    def result(self):
+        if self.status == "cancelled":
+            raise CancelledError
+        if self.status == "error":
+            raise self._made
+        return self._made
+
+    def done(self) -> bool:
+        return not self.waiting
+
+    def add_done_callback(self, told) -> None:
+        if not self.waiting:
+            told(self)
+
+
+class Client:
+    """Speaks like a client of Dask; does each task at once, and writes down what it is asked."""
+
+    asynchronous, status = False, "running"
+
+    def __init__(self, hosts=("one", "one", "other"), version=VERSION) -> None:
+        self.scheduler = SimpleNamespace(echo=None, address="tcp://made.up:1")
+        self.workers = {
+            f"tcp://{n}": {"host": host, "nthreads": 2, "memory_limit": 0} for n, host in enumerate(hosts)
+        }
+        self.asked: list[tuple[str, object, dict]] = []
+        self.version, self.cancelled, self.states, self.looks = version, [], {}, 0
+
+    def nthreads(self):
+        return {address: worker["nthreads"] for address, worker in self.workers.items()}
+
+    def scheduler_info(self):
+        return {"workers": self.workers}
+
+    def run(self, function, *given, on_error):
+        return dict.fromkeys(self.workers, self.version)
+
+    def sync(self, function, **named):
+        self.looks += 1
+
+    def submit(self, function, *given, pure, parcel=None, **named):
+        assert not pure
+        self.asked.append((function.__name__, given, named))
+
+        def there(thing):
+            if isinstance(thing, list):
+                return [there(each) for each in thing]
+            return thing.result() if isinstance(thing, Done) else thing
+
+        named = {} if parcel is None else {"parcel": there(parcel)}
+        return Done(lambda: function(*map(there, given), **named))
+
+    def map(self, function, items, *, parcel, pure, **named):
+        assert not pure
+        self.asked.append(("map", list(items), named))
+        made = [
+            Done(partial(function, item, parcel.result()), self.states.get(item, "finished")) for item in items
+        ]
+        for one in made:
+            one.waiting = one.status == "pending"
+        return made
+
+    def cancel(self, futures):
+        self.cancelled += futures
+
+
+def brackets(one, other):
+    return f"({one}+{other})"
+
+
+def marked(mark, item):
+    return f"{item}{mark}"
+
+
+def test_a_cluster_is_asked_for_each_item_once_and_for_sums_before_others():
+    """Something is begun once on each machine; of 70 items 9 + 2 + 1 sums are asked, the later the more urgent."""
+    client = Client()
+    told: list[int] = []
+    STARTED.clear()
+    found = crew(client).summed(Work(marked, "!", first=begin), range(70), brackets, told.append)
+    tree = Tree(70, brackets)
+    for number in range(70):
+        tree.put(number, f"{number}!")
+    assert found == tree.total
+    assert sorted(told) == list(range(70))
+    assert STARTED == [("!", None)] * 2
+    began = [named for name, _, named in client.asked if name == "perform"]
+    assert [(each["workers"], each["allow_other_workers"]) for each in began] == [
+        ("tcp://1", True),
+        ("tcp://2", True),
+    ]
+    assert all(each["retries"] == 3 for each in began)
+    assert [(items, named) for name, items, named in client.asked if name == "map"] == [
+        (list(range(70)), {"retries": 3})
+    ]
+    sums = [(len(given[1]), named) for name, given, named in client.asked if name == "_added"]
+    assert [number for number, _ in sums] == [8] * 8 + [6] + [8, 1] + [2]
+    assert [named["priority"] for _, named in sums] == [1] * 9 + [2] * 2 + [3]
+    assert all(named["retries"] == 3 for _, named in sums)
+    assert not client.cancelled
+    client.asked.clear()
+    assert crew(client).summed(Work(marked, "?"), ["a"], brackets, told.append) == "a?"
+    assert [name for name, _, _ in client.asked] == ["_kept", "map"]
+
+
+def test_a_cluster_without_workers_is_waited_for_and_it_is_said():
+    client = Client(hosts=())
+    with pytest.warns(vcc.ResultWarning, match="tcp://made.up:1 has no workers yet"):
+        found = dict(crew(client).each(Work(marked, "!", first=begin), "ab"))
+    assert found == {0: "a!", 1: "b!"}
+    assert [named for name, _, named in client.asked if name == "perform"] == [{"retries": 3}]
+
+
+def test_what_workers_have_is_asked_before_work():
+    for version, words in (("0.1", "version 0.1 of the package"), (None, "none of the package")):
+        with pytest.raises(vcc.InputError, match=f"worker tcp://0 has {words}"):
+            list(crew(Client(version=version)).each(Work(marked, "!"), "ab"))
+    # What a worker raises when it is asked is no version: it may be busy.
+    assert dict(crew(Client(version=OSError())).each(Work(marked, "!"), "a")) == {0: "a!"}
+
+
+@pytest.mark.parametrize("verb", ["each", "summed"])
+def test_what_is_not_done_is_cancelled_when_work_ends(verb):
+    """Where a task was cancelled, failed or waits; not where the connection is gone and nobody hears it."""
+
+    def ended(states, error, status="running"):
+        client = Client()
+        workers = crew(client)
+        client.states = states
+        made = client.map
+
+        def mapped(*given, **named):
+            found = made(*given, **named)
+            client.status = status
+            return found
+
+        client.map = mapped
+        given = Work(divided, 1), [1, 0, 5, 7]
+        with pytest.raises(error) as raised:
+            _ = list(workers.each(*given)) if verb == "each" else workers.summed(*given, brackets, lambda _: None)
+        return client, raised.value
+
+    client, _ = ended({5: "pending", 7: "pending"}, ZeroDivisionError)
+    assert [future.status for future in client.cancelled] == ["pending"] * 2
+    client, error = ended({0: "cancelled", 5: "pending"}, vcc.InputError)
+    assert "or the work cancelled, before it was done" in str(error)
+    assert [future.status for future in client.cancelled] == ["pending"]
+    client, _ = ended({5: "pending", 7: "pending"}, ZeroDivisionError, "closed")
+    assert client.cancelled == []
+
+
+def divided(shared, item):
+    return shared / item
+
+
+@pytest.mark.parametrize(
+    ("failure", "words"),
+    [
+        (OSError("gone"), "connection to the Dask scheduler tcp://made.up:1 was lost"),
+        (TimeoutError(), "has not answered"),
+    ],
+)
+def test_a_scheduler_that_does_not_answer_is_told_and_nobody_is_cancelled_there(monkeypatch, failure, words):
+    monkeypatch.setattr(executors, "LOOK", 0.01)
+    client = Client()
+    workers = crew(client)
+    assert client.looks == 1  # it is asked when it is taken
+    client.states = {"b": "pending"}
+
+    def sync(*_, **named):
+        assert named["callback_timeout"] == 60
+        raise failure
+
+    client.sync = sync
+    with pytest.raises(vcc.InputError, match=words):
+        list(workers.each(Work(marked, "!"), "ab"))
+    assert len(client.cancelled) == (0 if isinstance(failure, TimeoutError) else 1)
+    client.scheduler = None
+    client.status = "closed"
+    with pytest.raises(vcc.InputError, match="scheduler that was given was lost"):
+        crew(client)
