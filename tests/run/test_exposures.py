@@ -17,6 +17,8 @@ import tifffile
 import vcc
 from vcc.files.pictures import read_picture
 from vcc.optics.electronics import Electronics
+from vcc.run.demosaic import demosaic
+from vcc.run.expose import Exposure, below_zero, fixed_pattern
 
 QUIET = Electronics(read_noise=0, dark_current=0)
 XTRANS = ("GBGGRG", "RGRBGB", "GBGGRG", "GRGGBG", "BGBRGR", "GRGGBG")
@@ -575,3 +577,105 @@ def test_a_sensor_of_one_tile_is_demosaiced():
     on = sensor(dataclasses.replace(QUIET, color_filter="RGGB"), shape=(2, 2))
     got = vcc.expose_image(picture((0.2, 0.6, 0.4), on), on, "auto").demosaiced("bilinear").values
     np.testing.assert_allclose(got / got[..., 1:2], np.broadcast_to([1 / 3, 1, 2 / 3], got.shape), rtol=0.1)
+
+
+# --- what belongs to the sensor, number by number ---
+
+
+@pytest.mark.parametrize("shape", [(600, 1000), (500, 400, 3)])
+def test_the_fixed_pattern_is_what_recordings_hold(shape):
+    """In the dark, without read noise, offsets are all that there is; in bright light sensitivities."""
+    uneven = dataclasses.replace(QUIET, dsnu=40.0, black_level=500, gain=2.0, bit_depth=16, pattern_seed=7)
+    on, dark = sensor(uneven, shape[:2]), np.zeros(shape, np.float32)
+    sensitivity, offset = fixed_pattern(shape, uneven)
+    assert sensitivity.shape == offset.shape == shape
+    recorded = Exposure(on, 1e-3).recorded(dark).values
+    np.testing.assert_array_equal(recorded, np.rint(500 + 2.0 * 40.0 * offset))
+    bright = dataclasses.replace(QUIET, prnu=0.1, full_well=2e9, gain=2e-5, bit_depth=16, pattern_seed=7)
+    light = np.full(shape, 4e8 / (bright.electrons_per_joule() * 25e-12 * 1e-3), np.float32)
+    numbers = Exposure(sensor(bright, shape[:2]), 1e-3).recorded(light).values
+    # Shot noise is 5e-5 of 4e8 electrons, 64 + 8000 DN: rounding is a half, and five of its deviations 2.
+    np.testing.assert_allclose(numbers, 64 + 8000 * np.maximum(1 + 0.1 * sensitivity, 0), rtol=0, atol=3)
+
+
+def test_noise_and_pattern_of_the_same_seed_have_nothing_in_common():
+    both = dataclasses.replace(QUIET, prnu=0.1, read_noise=20.0, black_level=500, gain=2.0, bit_depth=16)
+    noise = flat(both, 0, (256, 256), seed=0).electrons().ravel()
+    for pattern in fixed_pattern((256, 256), both):
+        assert abs(np.corrcoef(noise, pattern.ravel())[0, 1]) < 4 / 256
+
+
+def test_a_pixel_saturates_where_any_of_its_channels_does():
+    """Of 8 × 8 pixels 16 in the first channel, 16 in the third, 8 of them in both; dark ones do not."""
+    on = sensor(dataclasses.replace(QUIET, full_well=3), (8, 8))
+    light = np.zeros((8, 8, 3), np.float32)
+    light[:4, :4, 0] = light[2:6, :4, 2] = 1e6
+    got = Exposure(on, 1.0).recorded(light, missing_rays=0.25)
+    assert got.saturated == 24 / 64
+    assert (got.missing_rays, got.exposure, got.seed, got.radiance) == (0.25, 1.0, 0, 1.0)
+    np.testing.assert_array_equal(got.values > 64, light > 0)
+    # The largest number is saturated, the one before it is not: 4095 and 4094 of 12 bits.
+    for black, share in ((4094.6, 1.0), (4094.4, 0.0)):
+        on = sensor(dataclasses.replace(QUIET, black_level=black), (4, 4))
+        assert Exposure(on, 1.0).recorded(np.zeros((4, 4), np.float32)).saturated == share
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"), [(-0.149, 1.0, False), (-0.151, 1.0, True), (-0.29, 2.0, False), (0.0, 0.0, False),
+                              (-1.0, -0.5, True), (-1e-6, 0.0, True), (0.5, 1.0, False)]
+)  # fmt: skip
+def test_below_zero_is_said_beyond_what_interpolation_undershoots(low, high, said):
+    assert (below_zero(np.array([[low, high]], np.float32)) is not None) == said
+
+
+@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
+def test_light_that_is_not_finite_is_refused(bad):
+    light = np.ones((4, 4), np.float32)
+    light[2, 1] = bad
+    with pytest.raises(vcc.InputError, match="not finite"):
+        Exposure(sensor(shape=(4, 4)), 1e-3).recorded(light)
+
+
+@pytest.mark.parametrize("tile", ["RGGB", XTRANS, ("RGB",), ("0123", "3201"), ("01", "22", "00")])
+def test_each_channel_is_filled_by_a_tent_that_reaches_all_pixels(tile):
+    """The smallest that meets a sample of the channel from each pixel, written out; what is measured stays."""
+    behind = Electronics(color_filter=tile)
+    high, wide = len(behind.tile), len(behind.tile[0])
+    shape = (2 * high + 1, 2 * wide + 2)
+    mosaic = np.random.default_rng(1).random(shape).astype(np.float32)
+    found = demosaic(mosaic, behind, "bilinear")
+    assert found.shape == (*shape, behind.filter_channels)
+    assert found.dtype == np.float32
+    row, column = np.mgrid[: shape[0], : shape[1]]
+    channel = np.array(behind.tile)[row % high, column % wide]
+    for n in range(behind.filter_channels):
+        here = channel == n
+        for reach in range(7):
+            away = [np.abs(one[:, :, None, None] - one) / (reach + 1) for one in (row, column)]
+            weights = np.maximum(1 - away[0], 0) * np.maximum(1 - away[1], 0) * here
+            total = weights.sum(axis=(2, 3))
+            if (total > 1e-9).all():
+                break
+        expected = np.where(here, mosaic, (weights * mosaic).sum(axis=(2, 3)) / total)
+        np.testing.assert_allclose(found[..., n], expected, rtol=0, atol=2e-6, err_msg=f"channel {n}")
+
+
+def test_a_mosaic_that_just_holds_a_tile_is_filled_and_a_smaller_one_refused():
+    for tile, (high, wide) in ((XTRANS, (6, 6)), (("01", "22", "00"), (3, 2)), ("RGGB", (2, 2))):
+        behind = Electronics(color_filter=tile)
+        assert demosaic(np.ones((high, wide), np.float32), behind, "bilinear").min() == pytest.approx(1)
+        for shape in ((high - 1, wide), (high, wide - 1)):
+            with pytest.raises(vcc.InputError, match=f"does not hold a whole tile of .*{high}×{wide}"):
+                demosaic(np.ones(shape, np.float32), behind, "bilinear")
+
+
+def test_a_mosaic_goes_on_as_its_mirror_image():
+    """The library's own, of the mosaic mirrored at the middle of its last pixels as a whole."""
+    library = pytest.importorskip("colour_demosaicing")
+    mosaic = np.random.default_rng(1).random((9, 12)).astype(np.float32)
+    mirrored = np.block([[mosaic[:0:-1, :0:-1], mosaic[:0:-1], mosaic[:0:-1, -2::-1]],
+                         [mosaic[:, :0:-1], mosaic, mosaic[:, -2::-1]],
+                         [mosaic[-2::-1, :0:-1], mosaic[-2::-1], mosaic[-2::-1, -2::-1]]])  # fmt: skip
+    expected = library.demosaicing_CFA_Bayer_Malvar2004(mirrored[:, 1:], "GRBG")[8:17, 10:22]
+    found = demosaic(mosaic, Electronics(color_filter="GRBG"), "malvar")
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5)

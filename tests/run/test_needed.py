@@ -15,7 +15,8 @@ import pytest
 import vcc
 from tests.physics.random_cameras import AFFINE, drawn
 from vcc.base.units import mm
-from vcc.run.needed import Needed, needed
+from vcc.fields.grid import Block
+from vcc.run.needed import Needed, needed, needed_by_all
 from vcc.shapes.patterns import CosineSum
 from vcc.store import StoredLightField, save_store
 
@@ -135,3 +136,76 @@ def test_all_samples_that_rays_look_at_are_needed(tmp_path):
         here = camera.capture(stored, **options).values
         np.testing.assert_allclose(here, whole, rtol=0, atol=1e-6 * whole.max())
     assert fewer > 6
+
+
+def test_of_several_cameras_all_that_any_of_them_needs_is_read(tmp_path):
+    """Stops that let different views through, sensors that see different pixels: a union, counted view by view."""
+    given = light_field(2)
+    stored = save_store(given, tmp_path / "a.zarr", chunks=(8, 8))
+    pitch = FOCUS * 2e-3
+    cameras = [
+        vcc.Camera(
+            [vcc.Lens(focal_length=50 * mm, diameter=2 * mm, decentre=(2.2 * x * mm, 1.5 * y * mm))],
+            vcc.Sensor(0.97 * FOCUS, (5, 7), pitch, decentre=(9 * x * pitch, 6 * y * pitch)),
+        )
+        for x, y in ((-1, 1), (1, 0))
+    ]
+    plans = [camera.compile(stored, method="footprints") for camera in cameras]
+    views = [plan.used_views(SHAPE) for plan in plans]
+    assert (views[0] & ~views[1]).any()
+    assert (views[1] & ~views[0]).any()
+    cut, part = needed_by_all(plans, stored)
+    assert isinstance(part, Needed)
+    each = [plan.used_pixels(SHAPE) for plan in plans]
+    for view in np.ndindex(SHAPE[:2]):
+        there = [one[view] for one in each if (one[view][:, 1] > one[view][:, 0]).all()]
+        if there:
+            np.testing.assert_array_equal(part.pixels[view][:, 0], np.min(there, axis=0)[:, 0])
+            np.testing.assert_array_equal(part.pixels[view][:, 1], np.max(there, axis=0)[:, 1])
+        else:
+            assert (part.pixels[view][:, 1] <= part.pixels[view][:, 0]).all()
+    rows, columns = (
+        (min(one[..., n, 0][seen].min() for one, seen in zip(each, views, strict=True)),
+         max(one[..., n, 1][seen].max() for one, seen in zip(each, views, strict=True)))
+        for n in (0, 1)
+    )  # fmt: skip
+    assert part.block.ranges == ((0, 3), (0, 4), rows, columns)
+    assert part.grid.shape == (3, 4, rows[1] - rows[0], columns[1] - columns[0], 2)
+    # A block of it holds what is stored there, and is dark where no camera looks.
+    read = Block((1, 3), (0, 3), (1, part.grid.shape[2] - 1), (2, part.grid.shape[3]))
+    expected = np.zeros(SHAPE, bool)
+    for view in np.ndindex(SHAPE[:2]):
+        (top, bottom), (left, right) = part.pixels[view]
+        expected[view][top:bottom, left:right] = True
+    expected = np.where(expected[..., None], given.values, 0)[:, :, slice(*rows), slice(*columns)][read.slices]
+    np.testing.assert_array_equal(part.read(read), expected)
+    assert expected.any()
+    assert not expected.all()
+    for camera, plan in zip(cameras, cut, strict=True):
+        found, whole = camera.capture(stored, method="footprints").values, camera.capture(given).values
+        np.testing.assert_allclose(found, whole, rtol=0, atol=1e-6 * whole.max())
+        assert plan.grid_shape == part.grid.shape[:4]
+    assert part.stored_bytes == stored.stored_bytes
+    assert part.whole() is None
+
+
+def test_where_all_is_needed_nothing_is_cut(tmp_path):
+    """Of a sensor that sees all rows of pixels and not all columns, some are; of one that sees all, none."""
+    stored = save_store(light_field(), tmp_path / "a.zarr")
+    pitch = FOCUS * 2e-3
+    whole = vcc.Camera([LENS], vcc.Sensor(FOCUS, (60, 70), pitch))
+    plan = whole.compile(stored)
+    assert needed(plan, stored) == (plan, stored)
+    for shape, axis in (((60, 10), 3), ((10, 70), 2)):
+        camera = vcc.Camera([LENS], vcc.Sensor(FOCUS, shape, pitch))
+        part = needed(camera.compile(stored), stored)[1]
+        assert isinstance(part, Needed)
+        assert part.grid.shape[axis] < SHAPE[axis]
+        assert part.grid.shape[5 - axis] == SHAPE[5 - axis]
+    # One that looks at none of the samples, and one beside another that stays.
+    aside = vcc.Camera([LENS], vcc.Sensor(FOCUS, (4, 4), pitch, decentre=(1.0, 0.0))).compile(stored)
+    assert needed(aside, stored) == (aside, stored)
+    few = vcc.Camera([LENS], vcc.Sensor(FOCUS, (8, 10), pitch)).compile(stored)
+    assert needed_by_all([few, plan], stored) == ([few, plan], stored)
+    in_memory = light_field()
+    assert needed(few, in_memory) == (few, in_memory)

@@ -12,6 +12,7 @@ import pytest
 
 import vcc
 from vcc.optics.electronics import Electronics
+from vcc.run.photon_transfer import PhotonTransfer
 
 LEVELS = np.arange(1, 13) / 12
 """Twelve flats up to 70 % of saturation, where EMVA 1288 fits."""
@@ -115,3 +116,76 @@ def test_read_noise_below_the_rounding_is_not_told():
     assert coarse.gain == pytest.approx(0.05, rel=0.1)
     with pytest.raises(vcc.InputError, match="rounding"):
         _ = coarse.read_noise
+
+
+def test_what_is_read_from_a_curve_by_hand():
+    """Signals 1 … 10 over a dark level of 100: those up to 7 count. A least-squares slope through 0."""
+    signal = np.arange(1.0, 11)
+    variance = 0.5 * signal + np.array([0.1, -0.2, 0.3, 0.0, -0.1, 0.2, -0.3, 9, 9, 9])
+    curve = PhotonTransfer(100 + signal, 2.0 + variance, 100.0, 2.0)
+    assert curve.fitted.tolist() == [True] * 7 + [False] * 3
+    slope = np.linalg.lstsq(signal[:7, None], variance[:7], rcond=None)[0][0]
+    assert curve.gain == pytest.approx(slope, rel=1e-12)
+    assert curve.read_noise == pytest.approx(np.sqrt(2.0 - 1 / 12) / slope, rel=1e-12)
+    # EMVA 1288 takes a dark variance of 0.24 DN² as the least that rounding leaves to be told.
+    at_least = dataclasses.replace(curve, dark_variance=0.24, variance=0.24 + variance)
+    assert at_least.read_noise == pytest.approx(np.sqrt(0.24 - 1 / 12) / slope, rel=1e-12)
+    with pytest.raises(vcc.InputError, match=r"dark noise is 0\.239 DN²"):
+        _ = dataclasses.replace(curve, dark_variance=0.239).read_noise
+
+
+def test_levels_are_even_and_pairs_differ_by_noise_alone():
+    """A pixel of 1e6 electrons at 1 DN each: means to 4 standard errors √(charge / 2N), variances as Poisson's."""
+    exact = Electronics(full_well=1e6, gain=0.05, bit_depth=16, black_level=500, read_noise=100, dark_current=0)
+    got = vcc.photon_transfer(exact, levels=5, shape=(64, 128), seed=3)
+    charges = np.arange(1, 6) / 5 * 1.1e6
+    noise = np.sqrt(charges + 100**2) / np.sqrt(2 * 64 * 128)
+    assert got.mean.shape == got.variance.shape == (5,)
+    assert np.all(np.abs((got.mean - 500) / 0.05 - charges)[:4] < 4 * noise[:4])
+    assert got.mean[4] == pytest.approx(500 + 0.05 * 1e6, abs=1)
+    expected = 0.05**2 * (charges + 100**2) + 1 / 12
+    np.testing.assert_allclose(got.variance[:4], expected[:4], rtol=4 * np.sqrt(2 / (64 * 128)))
+    assert got.dark_mean == pytest.approx(500, abs=4 * 5 / np.sqrt(2 * 64 * 128))
+    assert got.dark_variance == pytest.approx(25 + 1 / 12, rel=4 * np.sqrt(2 / (64 * 128)))
+    again = vcc.photon_transfer(exact, levels=5, shape=(64, 128), seed=3)
+    other = vcc.photon_transfer(exact, levels=5, shape=(64, 128), seed=4)
+    np.testing.assert_array_equal(got.mean, again.mean)
+    assert (got.mean[:4] != other.mean[:4]).all()
+    assert len(vcc.photon_transfer(exact, levels=4, shape=(8, 8)).mean) == 4
+    assert len(vcc.photon_transfer(exact, shape=(1, 2)).mean) == 16  # two pixels are enough
+    # By default 512² pixels, at which 0.5 % of a variance are 1.8 standard errors, and the seed 0.
+    default = vcc.photon_transfer(exact, levels=4)
+    assert default.mean.tolist() == vcc.photon_transfer(exact, levels=4, shape=(512, 512), seed=0).mean.tolist()
+
+
+@pytest.mark.parametrize(
+    ("noise", "exposure", "least"),
+    [
+        ({"read_noise": 3.0, "dsnu": 4.0, "dark_current": 0}, 1e-3, 20.0),  # √(9 + 16) = 5, four times
+        ({"read_noise": 3.0, "dsnu": 0.0, "dark_current": 160}, 0.1, 4.0),  # 16 − 4 √(9 + 16)
+        ({"read_noise": 2.0, "dsnu": 0.0, "dark_current": 0}, 1e-3, 8.0),
+    ],
+)
+@pytest.mark.parametrize("gain", [1.0, 0.5])
+def test_a_black_level_holds_four_standard_deviations_of_dark_noise(noise, exposure, least, gain):
+    dark = Electronics(gain=gain, **noise)
+    enough = dataclasses.replace(dark, black_level=gain * least)
+    assert vcc.photon_transfer(enough, levels=4, shape=(8, 8), exposure=exposure).mean.shape == (4,)
+    little = dataclasses.replace(dark, black_level=gain * least - 0.01)
+    with pytest.raises(vcc.InputError, match="cuts off dark noise"):
+        vcc.photon_transfer(little, levels=4, shape=(8, 8), exposure=exposure)
+
+
+def test_dark_current_is_in_the_dark_recordings_and_not_in_the_signal():
+    dark = Electronics(gain=1.0, bit_depth=16, full_well=20_000, dark_current=5e4, black_level=200)
+    got = vcc.photon_transfer(dark, levels=4, shape=(128, 128), exposure=0.02)
+    assert got.dark_mean == pytest.approx(200 + 1000, abs=4 * np.sqrt(1000 / 2 / 128**2))
+    assert got.mean[0] - got.dark_mean == pytest.approx(5500, rel=1e-3)
+    with_default = vcc.photon_transfer(dark, levels=4, shape=(128, 128))  # 1 ms
+    assert with_default.dark_mean == pytest.approx(200 + 50, abs=0.3)
+
+
+@pytest.mark.parametrize("shape", [(0, 5), (5, 0), (-2, -3), (4,), (2, 2, 2), (1, 1)])
+def test_shapes_that_are_none(shape):
+    with pytest.raises(vcc.InputError, match="at least two pixels"):
+        vcc.photon_transfer(Electronics(), shape=shape)

@@ -6,6 +6,8 @@ bytes. Single precision sums in another order differ by about 1e-7 of the bright
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -91,3 +93,27 @@ def test_sums_keep_to_half_of_the_memory(stored):
     raster = made[0].need.raster  # three sums of blocks and the raster of one, for each camera and thread
     assert made[0].most_at_once == int(0.5e6 / (4 * raster)) - 2
     assert made[0].reading_for(made).limit == 0.5e6
+
+
+def test_where_there_is_not_even_room_for_whole_views_cameras_come_one_by_one(stored):
+    plan = CAMERAS["places"][0].compile(stored)
+    need = replace(drive.Drive(plan, stored, How(threads=1)).need, raster=500)
+    for within, most in ((need.least_for_views, True), (need.least_for_views - 1, False)):
+        made = drive.Drive(plan, stored, How(threads=1, memory_limit=2 * within))
+        made.need = need
+        assert made.most_at_once == (int(within / 2000) - 1 if most else 1)
+    assert int(need.least_for_views / 2000) > 10
+    # Where sums leave no room for threads there is one camera at least.
+    assert drive.Drive(plan, stored, How(threads=10**6, memory_limit=10**8)).most_at_once == 1
+
+
+def test_what_cameras_share_and_what_not(stored):
+    """The same samples, kept alike, with the same done to them before; not where rays come in rounds."""
+    plans = [each.compile(stored) for each in CAMERAS["places"][:2]]
+    one, other = (drive.Drive(plan, stored, How()).takes() for plan in plans)
+    assert one == other is not None
+    by_rays = CAMERAS["places"][0].compile(stored, method="rays", samples=4)
+    assert drive.Drive(by_rays, stored, How()).takes() not in (None, one)
+    assert drive.Drive(by_rays, stored, How(tolerance=0.1)).takes() is None
+    assert drive.Drive(plans[0], stored.read(), How()).takes() is None
+    assert drive.Drive(plans[0], stored, How(memory_limit=10**8)).takes() not in (None, one)
