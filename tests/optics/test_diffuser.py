@@ -221,3 +221,76 @@ def test_functions_of_ones_own_are_checked_where_they_are_used(functions, messag
     scatter = Scatter(TWO, **{**even, **functions}, largest_width=2.0)
     with pytest.raises(vcc.InputError, match=message):
         scatter.at(np.zeros(3), np.zeros(3))
+
+
+def test_a_scatterer_is_even_where_nothing_varies():
+    even = SheetMap(np.ones((2, 2)), 1.0, 1.0)
+    assert Scatter((KERNEL,)).uniform
+    assert not Scatter((KERNEL,), width=even).uniform
+    assert not Scatter((KERNEL,), weights=SheetMap(np.ones((1, 2, 2)), 1.0, 1.0)).uniform
+    shares, widths = Scatter((KERNEL,)).at(np.zeros((3, 1)), np.zeros(4))
+    assert (shares.shape, widths.shape) == ((3, 4, 1), (3, 4))
+    assert (shares == 1).all()
+    assert (widths == 1).all()
+
+
+def test_a_scatterer_reaches_as_far_as_its_widest_kernel_along_each_axis():
+    kernels = (Samples(np.full((1, 5), 0.2), 0.01), Samples(np.full((7, 1), 1 / 7), 0.01))
+    reaches = np.array([kernel.reach for kernel in kernels])
+    assert reaches[0, 0] > reaches[1, 0]
+    assert reaches[0, 1] < reaches[1, 1]
+    mixed = Scatter(kernels, weights=lambda x, y: np.stack([x, 1 - x], -1), largest_width=3.0)
+    assert mixed.reach == pytest.approx((3 * reaches[0, 0], 3 * reaches[1, 1]))
+    assert Scatter((kernels[0],), largest_width=0.0).reach == (0.0, 0.0)
+
+
+def test_sums_and_widths_of_functions_may_differ_by_rounding():
+    def of(extra):
+        scatter = Scatter(
+            TWO, weights=lambda x, y: np.stack([x + extra, 1 - x], -1), width=lambda x, y: 2 * (1 + extra + 0 * x),
+            largest_width=2.0,
+        )  # fmt: skip
+        return scatter.at(np.array([0.25, 0.5]), 0.0)
+
+    shares, widths = of(0.9e-6)
+    np.testing.assert_allclose(shares, [[0.25, 0.75], [0.5, 0.5]], atol=1e-6)
+    np.testing.assert_allclose(widths, 2, rtol=1e-6)
+    for extra in (1.1e-6, -1.1e-6):
+        with pytest.raises(vcc.InputError, match="sum to 1"):
+            of(extra)
+    wide = Scatter((KERNEL,), width=lambda x, y: 2 * (1 + 1.1e-6 + 0 * x), largest_width=2.0)
+    with pytest.raises(vcc.InputError, match="above its largest_width"):
+        wide.at(0.0, 0.0)
+    assert wide.at(np.zeros(0), np.zeros(0))[1].shape == (0,)
+
+
+def test_a_coded_diffuser_of_cells_of_one_shape_has_square_cells():
+    """Maps of 2×4 and of 4×8 cells: the sheet is half as high as wide; of another shape the height is given."""
+    widths, finer = np.ones((2, 4)), np.full((2, 4, 8), 0.5)
+    assert vcc.CodedDiffuser(TWO, width=6 * mm, weights=finer, widths=widths).height == 3 * mm
+    assert vcc.CodedDiffuser(KERNEL, width=6 * mm, widths=widths, height=1 * mm).height == 1 * mm
+    sheet = vcc.CodedDiffuser(KERNEL, width=6 * mm, widths=widths).faces()
+    assert sheet.pattern([2.9 * mm, 3.1 * mm, 0, 0], [0, 0, 1.4 * mm, 1.6 * mm]).tolist() == [1, 0, 1, 0]
+    assert sheet.spread.weights is None
+    assert sheet.spread.largest_width == 1.0
+    mixed = vcc.CodedDiffuser(TWO, width=3 * mm, weights=HALVES).faces().spread
+    assert (mixed.width, mixed.largest_width) == (None, 1.0)
+
+
+def test_weights_are_shares_to_a_millionth():
+    for off in (0.9e-6, -0.9e-6):
+        vcc.CodedDiffuser(TWO, width=3 * mm, weights=HALVES * (1 + off))
+    for off in (1.1e-6, -1.1e-6):
+        with pytest.raises(vcc.InputError, match="and must to 1"):
+            vcc.CodedDiffuser(TWO, width=3 * mm, weights=HALVES * (1 + off))
+    uneven = HALVES * np.arange(1, 10).reshape(3, 3)
+    np.testing.assert_allclose(vcc.CodedDiffuser(TWO, 3 * mm, uneven, normalise=True).weights, HALVES)
+    uneven[:, 1, 2] = 0
+    with pytest.raises(vcc.InputError, match=r"all 0 in cell \(1, 2\)"):
+        vcc.CodedDiffuser(TWO, 3 * mm, uneven, normalise=True)
+    worst = HALVES.copy()
+    worst[0, 2, 1], worst[1, 0, 2] = 0.2, 0.9
+    with pytest.raises(vcc.InputError, match=r"in cell \(2, 1\)"):
+        vcc.CodedDiffuser(TWO, 3 * mm, worst)
+    with pytest.raises(ValueError, match="read-only"):
+        vcc.CodedDiffuser(TWO, 3 * mm, HALVES).weights[0, 0, 0] = 1

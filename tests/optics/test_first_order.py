@@ -270,3 +270,138 @@ def test_a_stop_behind_a_lens_is_seen_magnified():
     lens = FirstOrder(whole, length=50 * mm, stop_from_entrance=to_stop, stop_diameter=6 * mm)
     pupils = [(pupil.distance, pupil.diameter) for pupil in (lens.entrance_pupil, lens.exit_pupil)]
     np.testing.assert_allclose(pupils, [(100 / 3 * mm, 10 * mm), (-30 * mm, 6 * mm)], rtol=1e-9)
+
+
+# --- by closed forms ---
+
+GLASS = FirstOrder.thick_lens((31 * mm, -47 * mm), 6 * mm, 1.5168, diameter=9 * mm, name="G")
+"""A thick lens; its figures below are those of textbooks (Hecht, Optics, section 6.1)."""
+
+
+def test_a_thick_lens_obeys_the_lensmakers_equation():
+    n, r1, r2, d = 1.5168, 31 * mm, -47 * mm, 6 * mm
+    f = 1 / ((n - 1) * (1 / r1 - 1 / r2 + (n - 1) * d / (n * r1 * r2)))
+    front, back = -f * (n - 1) * d / (n * r2), -f * (n - 1) * d / (n * r1)
+    assert GLASS.focal_length == pytest.approx(f, rel=1e-9)
+    assert GLASS.front_principal_distance == pytest.approx(front, rel=1e-9)
+    assert GLASS.back_principal_distance == pytest.approx(back, rel=1e-9)
+    assert GLASS.front_focal_distance == pytest.approx(front - f, rel=1e-9)
+    assert GLASS.back_focal_distance == pytest.approx(back + f, rel=1e-9)
+    assert GLASS.image_distance(math.inf) == pytest.approx(back + f, rel=1e-9)
+    # Gauss's equation, distances from the principal planes: real and virtual images
+    for o in (0.3, 0.02):
+        image = 1 / (1 / f - 1 / (o + front)) + back
+        assert GLASS.image_distance(o) == pytest.approx(image, rel=1e-9)
+    assert GLASS.f_number == pytest.approx(f / (9 * mm), rel=1e-9)
+    diverging = FirstOrder(((1.0, 0.0), (40.0, 1.0)), stop_from_entrance=np.eye(2), stop_diameter=5 * mm)
+    assert diverging.f_number == pytest.approx(5.0)
+    plane = FirstOrder.thick_lens((math.inf, -50 * mm), 4 * mm, 1.5)
+    assert (plane.focal_length, plane.back_principal_distance) == (pytest.approx(0.1), pytest.approx(0, abs=1e-15))
+    assert plane.source == "radii inf m and -50 mm, index 1.5"
+
+
+def test_a_thick_lens_takes_two_radii():
+    for radii in ((0.05,), (0.05, 0.05, 0.05), 0.05):
+        with pytest.raises(InputError, match="radii of thick lens at z = 2 mm are"):
+            FirstOrder.thick_lens(radii, 1 * mm, 1.5, z=2 * mm)
+    assert FirstOrder.thick_lens([0.05, -0.05], 0.0, 1.5).length == 0
+
+
+def test_powers_and_magnifications_count_as_none_only_where_rounding_leaves_them():
+    assert FirstOrder(((1, 0), (-2e-9, 1))).focal_length == pytest.approx(5e8)
+    assert FirstOrder(((1, 0), (2e-9, 1))).focal_length == pytest.approx(-5e8)
+    assert FirstOrder(((1, 0), (-0.9e-9, 1))).focal_length == math.inf
+
+    def stop(a):
+        return FirstOrder(THIN, stop_from_entrance=((a, 0.05), (-20.0, 0.0)), stop_diameter=5 * mm)
+
+    assert stop(2e-12).entrance_pupil.distance == pytest.approx(0.05 / 2e-12)
+    assert stop(-2e-12).entrance_pupil == Pupil(pytest.approx(-0.05 / 2e-12), pytest.approx(5 * mm / 2e-12))
+    assert stop(0.9e-12).entrance_pupil == Pupil(math.inf, math.inf)
+    assert FirstOrder(THIN).image_distance(0.05 * (1 + 2e-12)) == pytest.approx(0.05 / 2e-12, rel=1e-3)
+    with pytest.raises(InputError, match="lies at infinity"):
+        FirstOrder(THIN).image_distance(0.05 * (1 + 0.9e-12))
+    afocal = FirstOrder(np.eye(2), stop_from_entrance=np.eye(2), stop_diameter=5 * mm)
+    assert afocal.f_number == math.inf
+
+
+def behind_glass(distance):
+    """A lens of 50 mm with its stop so far behind it: the matrix to the stop, and to the plane 30 mm behind."""
+    to_stop = np.array([[1, distance], [0, 1]]) @ np.array(THIN)
+    return to_stop, np.array([[1, 30 * mm], [0, 1]]) @ np.array(THIN)
+
+
+@pytest.mark.parametrize("distance", [8 * mm, 15 * mm, 20 * mm])
+def test_told_from_its_entrance_pupil_a_lens_makes_the_same_of_rays(distance):
+    """The pupil, d·f/(f − d) behind the first plane, becomes the first plane: rays there fly back to the old one.
+
+    With the stop 20 mm behind, the pupil lies behind the last plane, 30 mm on, which moves to the pupil then.
+    """
+    to_stop, whole = behind_glass(distance)
+    lens = FirstOrder(whole, 30 * mm, to_stop, 6 * mm, z=5 * mm, source="a book")
+    at = distance / (1 - distance / (50 * mm))
+    moved = lens.from_entrance_pupil(0.25)
+    last = max(30 * mm, at)
+    assert (moved.z, moved.length) == (0.25, pytest.approx(last - at, abs=1e-15))
+    by_hand = Affine.propagation(last - 30 * mm) @ lens.affine @ Affine.propagation(-at)
+    assert moved.affine.isclose(by_hand, 1e-12)
+    assert moved.entrance_pupil.distance == 0
+    assert moved.entrance_pupil.diameter == pytest.approx(lens.entrance_pupil.diameter, rel=1e-12)
+    assert moved.exit_pupil.diameter == pytest.approx(lens.exit_pupil.diameter, rel=1e-9)
+    assert moved.source == "a book, from its entrance pupil"
+    assert lens.from_entrance_pupil().z == 0
+
+
+def test_rims_stay_where_their_planes_stay():
+    (near, whole), (far, _) = behind_glass(15 * mm), behind_glass(20 * mm)
+    rim = {"exit_diameter": 7 * mm}
+    kept = FirstOrder(whole, 30 * mm, near, 6 * mm, **rim).from_entrance_pupil()
+    assert (kept.exit_diameter, kept.source) == (7 * mm, "")
+    for given in (
+        FirstOrder(whole, 30 * mm, far, 6 * mm, **rim),
+        FirstOrder(whole, 30 * mm, near, 6 * mm, entrance_diameter=7 * mm),
+    ):
+        with pytest.raises(InputError, match="rim of first order"):
+            given.from_entrance_pupil()
+    telecentric = FirstOrder(THIN, stop_from_entrance=np.array([[1, 0.05], [0, 1]]) @ THIN, stop_diameter=1 * mm)
+    with pytest.raises(InputError, match="lies at infinity"):
+        telecentric.from_entrance_pupil()
+
+
+def test_met_from_its_other_end_light_goes_the_same_way_back():
+    """A ray through the lens, sent back with its slope turned round, leaves where it came in; so the stop."""
+    to_stop, whole = behind_glass(12 * mm)
+    lens = FirstOrder(whole, 30 * mm, to_stop, 6 * mm, source="a book")
+    back = lens.reversed()
+    ray = np.array([2 * mm, -1 * mm, 0.03, 0.02])
+    turn = np.array([1, 1, -1, -1.0])
+    np.testing.assert_allclose(back.affine(lens.affine(ray) * turn), ray * turn, atol=1e-15)
+    assert np.shape(back.matrix) == (2, 2)
+    assert back.entrance_pupil.distance == pytest.approx(-lens.exit_pupil.distance)
+    assert back.exit_pupil.distance == pytest.approx(-lens.entrance_pupil.distance)
+    assert back.entrance_pupil.diameter == pytest.approx(lens.exit_pupil.diameter)
+    assert (back.source, FirstOrder(THIN).reversed().source) == ("a book, reversed", "")
+    assert FirstOrder(THIN).reversed().stop_from_entrance is None
+    # tilted and shifted: 5×5 there and back
+    tilted = FirstOrder((Affine.prism((0.01, -0.02)) @ lens.affine).matrix, 30 * mm, to_stop, 6 * mm)
+    again = tilted.reversed()
+    assert np.shape(again.matrix) == (5, 5)
+    np.testing.assert_allclose(again.affine(tilted.affine(ray) * turn), ray * turn, atol=1e-15)
+
+
+def test_determinants_are_one_to_a_thousandth():
+    for off in (0.99e-3, -0.99e-3):
+        FirstOrder(((1.0, 0.0), (-20.0, 1 + off)))
+    for off in (1.01e-3, -1.01e-3):
+        with pytest.raises(InputError, match="determinant"):
+            FirstOrder(((1.0, 0.0), (-20.0, 1 + off)))
+    four = np.eye(4)
+    four[0, 0] = 1.0009  # of both axes together
+    FirstOrder(four)
+
+
+def test_it_says_where_it_stands_off_the_axis_and_where_its_matrix_comes_from():
+    lens = FirstOrder(THIN, 2 * mm, decentre=(1 * mm, -3 * mm), entrance_diameter=4 * mm, source="a book")
+    assert lens.described() == (
+        "focal length 50 mm, length 2 mm, entrance diameter 4 mm, decentre (1 mm, -3 mm), from a book"
+    )

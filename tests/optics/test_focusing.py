@@ -161,3 +161,53 @@ def test_wrong_focus_in_a_camera_file(tmp_path, place, message):
     file.write_text(FILE.format(place=place))
     with pytest.raises(vcc.InputError, match=message):
         vcc.load_camera(file)
+
+
+def test_an_image_on_the_last_element_is_taken_but_for_rounding():
+    """Of a distant point, by a lens of 50 mm: a mask 50 mm behind stands on the image, one further on hides it."""
+    for z in (50 * mm, 50 * mm * (1 + 1e-12), 50 * mm * (1 - 1e-6)):
+        camera = vcc.Camera.focused([vcc.Lens(50 * mm), vcc.Mask(np.eye(2), 1 * mm, z=z)], SENSOR, math.inf)
+        assert camera.sensor.z == pytest.approx(50 * mm, rel=1e-9)
+        assert camera.sensor.z >= z
+    with pytest.raises(vcc.InputError, match="before mask at z"):
+        vcc.Camera.focused([vcc.Lens(50 * mm), vcc.Mask(np.eye(2), 1 * mm, z=50.001 * mm)], SENSOR, math.inf)
+
+
+def test_light_of_little_convergence_is_parallel():
+    weak = vcc.Camera.focused([vcc.Lens(0.9e8)], SENSOR, math.inf)
+    assert weak.sensor.z == pytest.approx(0.9e8)
+    with pytest.raises(vcc.InputError, match="leaves the last element parallel"):
+        vcc.Camera.focused([vcc.Lens(1.1e9)], SENSOR, math.inf)
+
+
+def test_axes_that_focus_elsewhere_are_told_with_their_places():
+    """Lenses of 100 mm along x and 50 mm along y; of a cylinder alone one axis is sharp nowhere."""
+    toric = np.eye(4)
+    toric[2, 0], toric[3, 1] = -10, -20
+    with pytest.raises(vcc.InputError, match="along x at z = 102 mm and along y at z = 52 mm"):
+        vcc.Camera.focused([vcc.FirstOrder(toric, z=2 * mm)], SENSOR, math.inf)
+    with pytest.raises(vcc.InputError, match="along x at z = 50 mm and along y at z = inf"):
+        vcc.Camera.focused([vcc.FirstOrder(cylinder())], SENSOR, math.inf)
+    toric[3, 1] = -10 * (1 + 1e-8)  # rounding of data
+    assert vcc.Camera.focused([vcc.FirstOrder(toric)], SENSOR, math.inf).sensor.z == pytest.approx(0.1)
+    toric[3, 1] = -10 * (1 + 1e-5)
+    with pytest.raises(vcc.InputError, match="sharp along x"):
+        vcc.Camera.focused([vcc.FirstOrder(toric)], SENSOR, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("elements", "distance", "message"),
+    [
+        ([vcc.Lens(-50 * mm, z=1 * mm), vcc.Lens(0.5)], math.inf, "behind lens at z = 1 mm it spreads"),
+        (
+            [vcc.Lens(50 * mm), vcc.Prism((0.1, 0.0), z=2 * mm)],
+            0.04,
+            "behind lens at z = 0 mm.* farther away",
+        ),
+        ([vcc.Lens(-50 * mm)], 0.04, "lens of positive focal length"),
+        ([vcc.FirstOrder(np.eye(2), 10 * mm)], 1.0, "nothing here focuses"),
+    ],
+)
+def test_what_spreads_the_light_is_named_with_a_way_out(elements, distance, message):
+    with pytest.raises(vcc.InputError, match=message):
+        vcc.Camera.focused(elements, SENSOR, distance)

@@ -184,3 +184,19 @@ def test_what_is_named_after_its_kind_is_called_so_once():
         assert (lens.called, lens.label) == (called, label)
     assert '\n  z =         0 mm  "lens 2", ' in repr(vcc.Camera([vcc.Lens(50 * mm, name="lens 2")], SENSOR))
     assert vcc.FirstOrder([[1, 0], [0, 1]], name="first order").called == "first order"
+
+
+def test_masks_of_functions_and_arrays_end_at_their_sheets():
+    x, y = np.array([1.9, 2.1, 0, 0, 0, 0]) * mm, np.array([0, 0, 0.9, 1.1, 1.9, 2.1]) * mm
+
+    def passes(pattern, **options):
+        return vcc.Mask(pattern, **options).faces().pattern(x, y).tolist()
+
+    half = lambda x, y: 0.5 + 0 * x  # noqa: E731
+    assert passes(half) == [0.5] * 6
+    assert passes(half, width=4 * mm) == [0.5, 0, 0.5, 0.5, 0.5, 0]
+    assert passes(half, width=4 * mm, height=2 * mm) == [0.5, 0, 0.5, 0, 0, 0]
+    assert passes([[1.0, 1.0]], width=4 * mm) == [1, 0, 1, 0, 0, 0]
+    assert passes(((1.0, 1.0),), width=4 * mm, height=4 * mm) == [1, 0, 1, 1, 1, 0]
+    assert vcc.Mask(np.ones((1, 1)), 1 * mm).described().endswith("width 1 mm")
+    assert vcc.Mask(np.ones((1, 1)), 1 * mm, source="code.png").described().endswith("width 1 mm, from code.png")
