@@ -50,7 +50,7 @@ def test_the_sum_that_defines_a_picture_written_out(angle, interpolation):
             )
             weight = 0.7 * passed * down[:, None] * across
             expected += weight[..., None] * values[core.view_rows[b], core.view_columns[a], l, k]
-    found = reference.footprints(core, values, threads=1).values
+    found = reference.run(core, values, threads=1).values
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
@@ -61,8 +61,8 @@ def test_progress_counts_taps_of_views_one_by_one_with_light_or_without():
     core = replace(core, weights=dark)
     values, total = light_of(core), core.weights.size
     ahead, back = [], []
-    found = reference.footprints(core, values, threads=1, progress=lambda *call: ahead.append(call))
-    reference.footprints_back(core, values, found.values, threads=1, progress=lambda *call: back.append(call))
+    found = reference.run(core, values, threads=1, progress=lambda *call: ahead.append(call))
+    reference.back(core, values, found.values, threads=1, progress=lambda *call: back.append(call))
     assert ahead == back == [(n, total) for n in range(total + 1)]
 
 
@@ -99,8 +99,8 @@ def test_rays_beside_those_of_the_first_round_have_derivatives_of_their_own():
     core, values, weights = case("plenoptic")
     found = []
     for beside in (0, 1):
-        picture = reference.rays(core, values, beside=beside, threads=1).values
-        told = reference.rays_back(core, values, weights, wanted=["scale"], beside=beside, threads=1)
+        picture = reference.run(core, values, beside=beside, threads=1).values
+        told = reference.back(core, values, weights, wanted=["scale"], beside=beside, threads=1)
         product = float((picture.reshape(weights.shape) * weights).sum())
         assert float(told.numbers["scale"]) * core.scale == pytest.approx(product, rel=1e-6)
         assert float((told.samples * values).sum()) == pytest.approx(product, rel=1e-6)

@@ -14,7 +14,6 @@ import vcc
 from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.engines import reference
-from vcc.engines.reference_back import footprints_back
 from vcc.fields.grid import Block
 from vcc.plan.footprints.model import Footprints, MaskLookup
 from vcc.plan.how import How
@@ -61,18 +60,18 @@ BLOCKS = [
 @pytest.mark.parametrize("step", STEPS)
 def test_blocks_of_a_light_field_add_up_to_the_raster_and_to_its_derivatives(step):
     core, values = core_of(STEPS[step]), RANDOM.random(SHAPE)
-    whole = reference.footprints(core, values, threads=1).values
-    parts = [reference.footprints(core.part(block), values[block.slices], threads=1).values for block in BLOCKS]
+    whole = reference.run(core, values, threads=1).values
+    parts = [reference.run(core.part(block), values[block.slices], threads=1).values for block in BLOCKS]
     np.testing.assert_allclose(sum(parts), whole, rtol=1e-12, atol=1e-13)
 
     weights, wanted = RANDOM.standard_normal(whole.shape), ["step", "masks[0].step", "weights", "scale"]
-    told = footprints_back(core, values, weights, wanted=[*wanted, "x", "y"], threads=1).numbers
+    told = reference.back(core, values, weights, wanted=[*wanted, "x", "y"], threads=1).numbers
     total: dict[str, np.ndarray] = {}
     needed = core.needed(wanted)
     assert needed == {*wanted, "x", "y", "masks[0].column", "masks[0].row"}
     assert core.needed({"weights"}) == {"weights"}
     for block in BLOCKS:
-        part = footprints_back(core.part(block), values[block.slices], weights, wanted=sorted(needed), threads=1)
+        part = reference.back(core.part(block), values[block.slices], weights, wanted=sorted(needed), threads=1)
         for name, value in core.whole_numbers(block, part.numbers).items():
             total[name] = total.get(name, 0.0) + value
     for name, value in told.items():
@@ -86,7 +85,7 @@ def test_samples_that_are_looked_at_hold_all_that_weigh_and_hardly_more(step, in
     """By the transpose: a box around the samples of each view that reach the raster, and a few beside it."""
     core = core_of(STEPS[step], interpolation, refine)
     core = replace(core, masks=(), raster_shape=(3, 4))
-    light = footprints_back(core, np.zeros(SHAPE), np.ones((*core.raster_shape, 1)), threads=1).samples
+    light = reference.back(core, np.zeros(SHAPE), np.ones((*core.raster_shape, 1)), threads=1).samples
     used, boxes = core.used_views(SHAPE), core.used_pixels(SHAPE)
     assert boxes.shape == (3, 4, 2, 2)
     np.testing.assert_array_equal(used, np.outer([1, 0, 1], [1, 1, 1, 1]) > 0)
@@ -120,14 +119,14 @@ def test_where_no_view_gives_light_one_is_looked_at():
 
 def test_some_columns_of_taps_and_a_wider_raster():
     core, values = core_of(STEPS["sheared"]), RANDOM.random(SHAPE)
-    whole = reference.footprints(core, values, threads=1).values
+    whole = reference.run(core, values, threads=1).values
     some, rest = (core.of_columns(np.array(columns)) for columns in ([0, 3], [1, 2, 4]))
-    both = [reference.footprints(each, values, threads=1).values for each in (some, rest)]
+    both = [reference.run(each, values, threads=1).values for each in (some, rest)]
     np.testing.assert_allclose(sum(both), whole, rtol=1e-12, atol=1e-13)
-    wide = reference.footprints(core.guarded(2), values, threads=1).values
+    wide = reference.run(core.guarded(2), values, threads=1).values
     assert wide.shape == (10, 11, 1)
     np.testing.assert_allclose(wide[2:-2, 2:-2], whole, rtol=1e-9, atol=1e-13)
-    np.testing.assert_allclose(reference.footprints(core.scaled(3.0), values, threads=1).values, 3 * whole)
+    np.testing.assert_allclose(reference.run(core.scaled(3.0), values, threads=1).values, 3 * whole)
     assert core.scaled(1) is core
     assert core.more(4) is core
 

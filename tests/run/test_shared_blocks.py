@@ -110,10 +110,11 @@ def test_where_there_is_not_even_room_for_whole_views_cameras_come_one_by_one(st
 def test_what_cameras_share_and_what_not(stored):
     """The same samples, kept alike, with the same done to them before; not where rays come in rounds."""
     plans = [each.compile(stored) for each in CAMERAS["places"][:2]]
-    one, other = (drive.Drive(plan, stored, How()).takes() for plan in plans)
+    one, other = (drive.Drive(plan, stored, How()).shared for plan in plans)
     assert one == other is not None
     by_rays = CAMERAS["places"][0].compile(stored, method="rays", samples=4)
-    assert drive.Drive(by_rays, stored, How()).takes() not in (None, one)
-    assert drive.Drive(by_rays, stored, How(tolerance=0.1)).takes() is None
-    assert drive.Drive(plans[0], stored.read(), How()).takes() is None
-    assert drive.Drive(plans[0], stored, How(memory_limit=10**8)).takes() not in (None, one)
+    assert drive.Drive(by_rays, stored, How()).shared not in (None, one)
+    assert drive.Drive(by_rays, stored, How(tolerance=0.1)).shared is None
+    there = stored.read()
+    assert drive.Drive(plans[0], there, How()).shared == drive.Drive(plans[1], there, How()).shared != one
+    assert drive.Drive(plans[0], stored, How(memory_limit=10**8)).shared not in (None, one)
