@@ -679,3 +679,18 @@ def test_a_mosaic_goes_on_as_its_mirror_image():
     expected = library.demosaicing_CFA_Bayer_Malvar2004(mirrored[:, 1:], "GRBG")[8:17, 10:22]
     found = demosaic(mosaic, Electronics(color_filter="GRBG"), "malvar")
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5)
+
+
+def test_what_is_not_said_of_a_recording():
+    """It is one of radiance 1, seed 0, of which nothing is saturated or missing."""
+    made = vcc.Recording(np.zeros((4, 6), np.uint16), sensor(shape=(4, 6)), 1e-3)
+    assert (made.radiance, made.seed, made.saturated, made.missing_rays) == (1.0, 0, 0.0, 0.0)
+    taken = Exposure(sensor(shape=(4, 6)), 1e-3).recorded(np.zeros((4, 6), np.float32))
+    assert (taken.radiance, taken.seed, taken.saturated, taken.missing_rays) == (1.0, 0, 0.0, 0.0)
+    for shape in ((4, 7), (5, 6), (6, 4)):
+        with pytest.raises(vcc.InputError, match=r"the sensor has \(4, 6\) pixels"):
+            Exposure(sensor(shape=(4, 6)), 1e-3).recorded(np.zeros(shape, np.float32))
+        with pytest.raises(vcc.InputError, match=r"the sensor has \(4, 6\) pixels"):
+            vcc.Recording(np.zeros(shape, np.uint16), sensor(shape=(4, 6)), 1e-3)
+    with pytest.raises(vcc.InputError, match="the shape"):
+        vcc.Recording(np.zeros((4, 6, 3, 1), np.uint16), sensor(shape=(4, 6)), 1e-3)

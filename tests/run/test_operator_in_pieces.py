@@ -14,7 +14,7 @@ import pytest
 import vcc
 from vcc.base.units import mm
 from vcc.plan.how import How
-from vcc.run.backwards import AHEAD, back
+from vcc.run.backwards import Backwards, back
 from vcc.run.drive import Drive
 from vcc.shapes.patterns import CosineSum
 from vcc.store import save_store
@@ -25,11 +25,12 @@ SHAPE = (5, 6, 12, 14)
 FOCUS = 1 / (1 / 50e-3 - 1)
 SENSOR = vcc.Sensor(FOCUS, (9, 10), FOCUS * 3e-3)
 LENS = vcc.Lens(50 * mm, 14 * mm)
+MASK = vcc.Mask(CosineSum((9 * mm, 8 * mm)), z=FOCUS / 2)
 CAMERAS = {
-    "plain": (vcc.Camera([LENS, vcc.Mask(CosineSum((9 * mm, 8 * mm)), z=FOCUS / 2)], SENSOR), {"refine": 1}),
+    "plain": (vcc.Camera([LENS, MASK], SENSOR), {"refine": 1}),
     "diffuser": (
-        vcc.Camera([LENS, vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.004))], SENSOR),
-        {"method": "footprints"},
+        vcc.Camera([LENS, vcc.Diffuser(kernel=vcc.kernels.Gaussian(0.004)), MASK], SENSOR),
+        {"method": "footprints", "refine": 1},
     ),
     "rays": (vcc.Camera([LENS], SENSOR), {"method": "rays", "samples": 4}),
 }
@@ -143,9 +144,9 @@ def test_progress_of_the_way_back_counts_views(stored, executor):
     first = next(pieces)[0]
     assert first.shape[2:] == SHAPE[2:]
     if given is not None:
-        assert given.done == AHEAD
+        assert given.done == 4  # ahead of what is taken, for each place
     number = 1 + sum(1 for _ in pieces)
-    assert number > AHEAD
+    assert number > 4
     views = int(plan.used_views(SHAPE).sum())
     assert [total for _, total in calls] == [views] * number
     assert [done for done, _ in calls] == sorted(done for done, _ in calls)
@@ -181,3 +182,21 @@ def test_what_opening_closed_taps_would_add_is_told_of_blocks_too(stored, monkey
             expected = seen(ahead) - seen(behind)
             assert found.numbers["core.weights"][tap] == pytest.approx(expected, rel=1e-6, abs=1e-9)
             assert expected != 0
+
+
+@pytest.mark.parametrize(("name", "times"), [("plain", 1), ("diffuser", 3)])
+def test_where_numbers_are_wanted_a_block_s_samples_are_there_too(stored, name, times):
+    """As the engine converts them, beside the derivatives to them: by the reference 16 bytes for each."""
+    camera, options = CAMERAS[name]
+    plan = camera.compile(stored, **options)
+    need = Drive(plan, stored, How(engine="reference", threads=1)).need
+    assert bool(plan.before) == (times == 3)
+    assert need.times == 1 + 16 / (need.view / math.prod(plan.shape(stored.grid.shape)[2:]))
+    derivative = 8 * math.prod(plan.shape(stored.grid.shape)[2:])
+    beside = need.fixed + 8 * math.prod(plan.core.raster_shape) * 2 + 3 * need.view
+    for wanted, view in (((), times * derivative), (("core.scale",), times * derivative + need.times * need.view)):
+        for columns in (1, 2):
+            how = How(engine="reference", threads=1, memory_limit=math.ceil(beside + columns * view))
+            blocks = Backwards(Drive.of_linear(plan, stored, how), wanted)._blocks
+            assert max(block.shape[1] for block in blocks) == columns
+            assert {block.shape[0] for block in blocks} == {1}
