@@ -55,7 +55,7 @@ def recorded_each(
         plans: all that is done by one engine.
         samples: as in `vcc.run.drive.drive`.
         how: likewise.
-        room: where pictures are put by the threads that make them, where these are several.
+        room: where pictures of NumPy are put by the threads that make them.
     """
     coming = samples.whole() is not None and not isinstance(plans, Sequence)
     if coming:
@@ -161,7 +161,7 @@ def _finishing(batch: Sequence[Drive], places: NDArray[np.float32] | None) -> Ca
 
     def finished(n: int, raster: Partial) -> Recorded:
         made = alone[n].finished(raster)
-        if places is None:
+        if places is None or not isinstance(made.values, np.ndarray):
             return made
         places[n] = made.values
         return replace(made, values=places[n])
