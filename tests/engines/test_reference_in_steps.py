@@ -68,7 +68,7 @@ def test_progress_counts_taps_of_views_one_by_one_with_light_or_without():
     assert ahead == back == [(n, total) for n in range(total + 1)]
 
 
-@pytest.mark.parametrize("name", ["plenoptic", "views apart"])
+@pytest.mark.parametrize("name", ["plenoptic", "views apart", "round lenslets"])
 def test_as_many_rays_are_followed_at_once_as_may_be(monkeypatch, name):
     """Pixels one by one, some at a time, or all at once: derivatives are the same to rounding."""
     core, values, weights = case(name)
