@@ -25,13 +25,15 @@ pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 SMALL = (3, 2, 5, 6)
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.3])
-@pytest.mark.parametrize("interpolation", ["linear", "sharp"])
-def test_the_sum_that_defines_a_picture_written_out(angle, interpolation):
+@pytest.mark.parametrize("sheared", [0.0, -0.2, 0.2])
+@pytest.mark.parametrize(("angle", "interpolation"), [(0.0, "linear"), (0.3, "sharp")])
+def test_the_sum_that_defines_a_picture_written_out(angle, interpolation, sheared):
     """I(x, y) = scale · Σ_q L(q) · w(view) · Π T(m(q)) · F(x; x(q)) · F(y; y(q)), one sample after the other."""
     given = turned(field(samples(SMALL)), angle)
     core = core_of(CAMERAS["three masks"], given, interpolation=interpolation, between_views="none", refine=1)
     core = replace(core, scale=0.7, opening=0.8)
+    if sheared:  # rows of samples fall into rows of pixels, and columns aslant
+        core = replace(core, step=core.step * [[1, 0], [0, 1]] + [[0, sheared], [0, 0]])
     values, (rows, columns) = light_of(core), core.raster_shape
     expected = np.zeros((rows, columns, values.shape[4]))
     (xx, xy), (yx, yy) = core.step
@@ -66,7 +68,7 @@ def test_progress_counts_taps_of_views_one_by_one_with_light_or_without():
     assert ahead == back == [(n, total) for n in range(total + 1)]
 
 
-@pytest.mark.parametrize("name", ["plenoptic", "views apart"])
+@pytest.mark.parametrize("name", ["plenoptic", "views apart", "round lenslets"])
 def test_as_many_rays_are_followed_at_once_as_may_be(monkeypatch, name):
     """Pixels one by one, some at a time, or all at once: derivatives are the same to rounding."""
     core, values, weights = case(name)
