@@ -535,7 +535,8 @@ def test_what_is_missing_in_words():
     [
         {"scene_distance": 0.0}, {"scene_distance": 1.0, "between_views": "depth"}, {"refine": 0}, {"refine": 9},
         {"refine": 1.5}, {"refine": "all"}, {"samples": 1}, {"samples": 2**16 + 1}, {"tolerance": 0.0},
-        {"seed": -1}, {"engine": "gpu"}, {"threads": 0}, {"memory_limit": 0}, {"memory_limit": -1.0}, {"interpolation": "no"},
+        {"seed": -1}, {"engine": "gpu"}, {"threads": 0}, {"memory_limit": 0}, {"memory_limit": -1.0},
+        {"interpolation": "no"},
     ],
 )  # fmt: skip
 def test_options_that_do_not_exist_are_refused(wrong):
