@@ -1,4 +1,4 @@
-"""How finely cells of views and samples are divided, for errors that are told; and what of a plan has to hold while
+"""How finely cells of views and samples are divided for errors that are told; what of a plan has to hold while
 its numbers follow a camera."""
 
 from __future__ import annotations
@@ -162,6 +162,15 @@ def test_cells_that_a_mask_cuts_are_divided_for_what_would_fall_beside():
     assert (little.finer, little.where.any()) == (1, False)
     once = divide_views([], [plane()], between(), geometry(), "auto", Told((2.7e-3 / 0.36) ** 2))
     assert (once.finer, once.error) == (2, pytest.approx(2.7e-3 / 2**1.5))
+    # Of two masks one errs: cells that it cuts are divided, and those in which both vary.
+    far = plane(Circle(0.4), AT_INDEX * 3)
+    wrong = Told(0.0, Apart(lambda parts: 0.0, 0.1, (False, False)))
+    wrong.lost = lambda which, known, added: 0.04 if which is far else 1e-9
+    two = divide_views([], [plane(), far], between(), geometry(), "auto", wrong)
+    cut = geometry().varying([far])
+    assert cut.any()
+    assert not cut.all()
+    np.testing.assert_array_equal(two.where, cut)
     # Few cells that vary together, divided further, leave less than many divided a little.
     apart = Apart(lambda parts: 0.08 / parts**3, 0.1, (False, False))
     calm = Told(lambda added: (2e-3 / 0.36) ** 2, apart)
@@ -359,6 +368,7 @@ def test_kernels_that_vary_by_functions_become_textures(decisions):
     np.testing.assert_allclose(step.width(x + 0.3 * mm, y - 0.2 * mm)[..., 0], 1 + 100 * y, atol=1e-6)
     assert (step.kernels, step.pick, step.column) == (2, 8, 4)
     assert core.points.shape[1] == 9
+    assert compile_rays(camera, FIELD.grid, How(method="rays")).grid_shape == (5, 6, 9, 11)
 
 
 def test_sheets_of_diffusers_are_looked_up_where_they_stand():
@@ -413,7 +423,16 @@ def test_what_is_in_focus_takes_in_the_samples_beside_it():
     field = vcc.LightField.from_views(RANDOM.random(disparity.shape), 5 * mm, slope, far, disparity=disparity)
     to_sensor = 1 / (1 / 50e-3 - 1 / near)
     train = vcc.Camera([vcc.Lens(50 * mm)], vcc.Sensor(to_sensor, (11, 13), to_sensor * slope))
-    _, views, _ = denser(train, field.grid)
+    made, views, _ = denser(train, field.grid)
+    # views made for each one stand around its place
+    down, across = views.times
+    assert min(down, across) > 1
+    for j, i in ((0, 0), (2, 1)):
+        around = np.mean(
+            [made.frame([i * across + a, j * down + b, 0, 0]) for a in range(across) for b in range(down)], 0
+        )
+        np.testing.assert_allclose(around, field.frame([i, j, 0, 0]), atol=1e-12)
+    np.testing.assert_allclose(made.frame([1, 0, 0, 0])[0] - made.frame([0, 0, 0, 0])[0], 5 * mm / across)
     share = share_in_focus(train, field.grid, views, np.ones((3, 3), bool))
     wanted = np.zeros((11, 13))
     wanted[4, 7:10] = wanted[3:6, 8] = 1
@@ -438,11 +457,14 @@ def test_what_is_in_focus_takes_in_the_samples_beside_it():
         [
             vcc.PhasePlate(vcc.surfaces.Cubic(20.0), 6 * mm, z=10 * mm),
             vcc.CodedDiffuser(
-                (Gaussian(0.01), TopHat(0.02)), 6 * mm, weights=RANDOM.dirichlet([1, 1], (3, 4)).transpose(2, 0, 1),
-                widths=RANDOM.uniform(0.5, 1, (4, 6)), height=5 * mm, z=20 * mm,
+                (Gaussian(0.01), TopHat(0.02)), 6 * mm, height=5 * mm, z=20 * mm,
+                weights=RANDOM.dirichlet([1, 1], (3, 4)).transpose(2, 0, 1), widths=RANDOM.uniform(0.5, 1, (4, 6)),
             ),
         ],
-        [vcc.FirstOrder(np.kron(np.eye(2), np.array([[0.8, -0.6], [0.6, 0.8]])), z=5 * mm), vcc.Biprism(0.01, z=6 * mm)],
+        [
+            vcc.FirstOrder(np.kron(np.eye(2), np.array([[0.8, -0.6], [0.6, 0.8]])), z=5 * mm),
+            vcc.Biprism(0.01, z=6 * mm),
+        ],
     ],
     ids=["lenslets", "prisms", "masks", "plate and diffuser", "turned"],
 )  # fmt: skip

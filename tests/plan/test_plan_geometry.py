@@ -11,16 +11,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import convolve
 
 import vcc
 from vcc.base.affine import Affine
 from vcc.base.units import mm
+from vcc.engines import reference
 from vcc.plan.correlation import correlated
 from vcc.plan.coverage import AskedLight, Missing, _cut
 from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.footprints.cells import Geometry, SampleDivision, parts_of_sheared
+from vcc.plan.footprints.compile import _Sharpened
 from vcc.plan.footprints.detail import detail_lost, details_lost
 from vcc.plan.footprints.mask_textures import mask_as_met
+from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane, along_axes, cell_tiles, depends_on_view_only, tap_origin
 from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.plan.footprints.together import Looks
@@ -29,6 +33,7 @@ from vcc.plan.how import How, cores
 from vcc.plan.model import Plan
 from vcc.plan.operators import AlongAxes, BlurViews, DarkBorder, SharpenViews
 from vcc.plan.parallax_rule import index_motions
+from vcc.plan.rays.textures import Points
 from vcc.shapes.patterns import Cells, Circle, Open, as_pattern
 
 RANDOM = np.random.default_rng(12)
@@ -70,6 +75,8 @@ def test_a_point_of_the_scene_is_seen_along_its_motion():
         np.testing.assert_allclose(
             one[2:] - inverse * one[:2], another[2:] - inverse * another[:2], rtol=1e-9, atol=1e-12
         )
+    tiny = Affine.from_parts(1e-13 * frame.linear, np.zeros(4))  # in whatever units
+    np.testing.assert_allclose(index_motions(tiny, vergences), motions, rtol=1e-9)
     flat = index_motions(Affine(np.diag([1.0, 1, 0, 0, 1])), np.array([0.0]))
     assert not flat.any()
 
@@ -525,6 +532,87 @@ def test_what_is_missing_in_words():
     assert Missing.of(np.array([1000.0, 998.0, 998.0]), "s").reason.startswith("0.2% of the light")
     assert Missing.of(np.zeros(3), "").share == 0
     assert Missing.of(np.array([0.5, 0.5, 0.25]), "").share == 0.5
+
+
+def test_what_one_mask_of_many_lacks_is_what_its_camera_lacks():
+    """Of cells all over a sheet twice as wide as the grid of views, with a lens that has a rim."""
+    code = RANDOM.random((4, 4))
+
+    def asked(values):
+        return missing([vcc.Lens(50 * mm, 13 * mm), vcc.Mask(values, 14 * mm, z=1 * mm, decentre=(1 * mm, 0.0))])
+
+    every = asked(np.ones((4, 4)))
+    cells = [Cells(values, 14 * mm) for values in (code, np.eye(4))]
+    found = every.missing_with(1, cells)
+    for values, one in zip((code, np.eye(4)), found, strict=True):
+        own = asked(values).missing
+        assert one.share == pytest.approx(own.share, abs=2e-3)
+        assert own.share > 0.1
+    (alone,) = every.missing_with(1, cells[:1])
+    assert alone.share == found[0].share
+
+
+# --- filters that give sharpness back ---
+
+
+@pytest.mark.parametrize("refine", [1, 2])
+@pytest.mark.parametrize("sample", ["point", "mean"])
+@pytest.mark.parametrize(
+    "step",
+    [
+        np.diag([0.8, -0.7]),
+        np.diag([1.6, 1.5]),
+        np.array([[0.8, 0.3], [-0.25, 0.9]]),
+        np.array([[0.7, -0.4], [0.5, 0.8]]),
+    ],
+)
+def test_a_bright_sample_is_as_wide_as_what_nobody_gives_back(step, sample, refine):
+    """Second moments: the mean over a sensitive area of ¾ pixel, less what the sample's own averaging took.
+
+    Filters are fitted over all frequencies: of second moments that are to be given back they miss up to a tenth.
+    """
+    taps = 7
+    offsets = np.linspace(0, 1, taps, endpoint=False)
+    interpolation = "linear" if refine == 1 and step[0, 0] < 1.25 else "spline" if refine == 1 else "linear"
+    one = np.ones((1, 1))
+    core = Footprints(
+        (41, 41), interpolation, 1.0, np.zeros(1, int), np.zeros(1, int), one, 20 * one, 20 * one, step, (1, 1),
+        refine=refine, opening=0.75,
+    )  # fmt: skip
+    made = _Sharpened.of(core, sample, ANEW)
+    found, places = np.zeros((2, 2)), np.arange(41.0)
+    for dx, dy in itertools.product(offsets, offsets):
+        moved = replace(made.core, x=core.x + dx, y=core.y + dy)
+        raster = reference.footprints(moved, np.ones((1, 1, 1, 1)), threads=1).values
+        if made.along is not None:
+            picture = AlongAxes(*made.along, "").apply(raster)[..., 0]
+        else:
+            picture = convolve(raster[..., 0], made.plane, mode="same")
+        light = picture.sum()
+        away = places - 20 - dx, places - 20 - dy
+        x2, y2 = (picture.sum(axis=axis) @ at**2 / light for axis, at in zip((0, 1), away, strict=True))
+        xy = away[1] @ picture @ away[0] / light
+        found += np.array([[x2, xy], [xy, y2]]) / taps**2
+    wanted = 0.75**2 / 12 * np.eye(2) - (step @ step.T / 12 if sample == "mean" else 0)
+    lost = np.abs(step @ step.T).max() * (1 / 4 if sample == "mean" else 1 / 6)
+    np.testing.assert_allclose(found, wanted, atol=0.12 * lost)
+    reach = max(map(len, made.along)) // 2 if made.along is not None else max(made.plane.shape) // 2
+    assert made.reach == reach > 0
+    assert _Sharpened(core).reach == 0
+
+
+def test_points_of_textures_are_alike_where_they_are_as_many_and_almost_as_close():
+    points = Points(257, (-1.0, -2.0), (0.1, 0.2), 1e-6)
+    assert points.like(replace(points, spacing=(0.14, 0.2), start=(0.0, 0.0), error=1.0))
+    assert not points.like(replace(points, spacing=(0.1, 0.5)))
+    for size in (256, 513):
+        assert not points.like(replace(points, size=size))
+    low, high = np.array([-1.1, -2.2]), np.array([-1 + 25.7, -2 + 51.4])
+    assert points.holds(low + 1e-9, high - 1e-9)
+    for axis in (0, 1):
+        beyond = np.eye(2)[axis] * 1e-6
+        assert not points.holds(low - beyond, high - 1)
+        assert not points.holds(low + 1, high + beyond)
 
 
 # --- what may be chosen, and plans as values ---

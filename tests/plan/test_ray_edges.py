@@ -64,6 +64,7 @@ def test_a_stop_that_cells_image_within_a_pixel_is_an_edge():
     sharp = vcc.Camera(elements, vcc.Sensor(402.5 * mm, (36, 36), 0.1 * mm)).compile(light_field, method="rays")
     assert [words for words in edges_that_cut(sharp.core) if "image sharply" in words]
     assert not [words for words in edges_that_cut(sharp.core, ["scale"]) if "image sharply" in words]
+    assert [words for words in edges_that_cut(sharp.core, ["aim.stop.half"]) if "image sharply" in words]
     # With f-numbers that match, a micro-image is blurred by a good part of a pixel.
     plenoptic = vcc.Camera.plenoptic(
         50 * mm, lenslet_pitch=0.1 * mm, f_number=4, pixels_per_lenslet=9, lenslets=(10, 10)
