@@ -16,7 +16,8 @@ from vcc.optics.scatter import Scatter
 from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.depth_rule import denser
 from vcc.plan.footprints.cells import Detail, Geometry, SampleDivision, _misplaced, divide_samples, divide_views
-from vcc.plan.footprints.compile import _check_raster, _cleaned, _sharp_footprint, _smear, used_taps
+from vcc.plan.footprints.compile import _check_raster, _cleaned, _sharp_footprint, _smear, compiled, used_taps
+from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision
 from vcc.plan.footprints.together import Apart
@@ -291,6 +292,20 @@ def test_aims_are_alike_where_they_aim_at_the_same_by_as_many_rays():
     for other in ({"everything": False}, {"strips": (0, 2)}, {"reach": (2, 2)}, {"halvings": 2}):
         assert not one.like(replace(one, **other))
         assert not replace(one, **other).like(one)
+
+
+@pytest.mark.parametrize(("degrees", "beyond"), [(0, ((2, 1), (3, 0))), (90, ((3, 0), (2, 1)))])
+def test_pieces_are_divided_as_the_whole_is_along_the_axes_that_pixels_have(degrees, beyond):
+    """Of a piece without the first 2 and the last row, and the first 3 columns; turned, rows are columns."""
+    angle = math.radians(degrees)
+    turn = np.round([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    train = vcc.Camera([vcc.FirstOrder(np.kron(np.eye(2), turn)), LENS], SENSOR)
+    made = compiled(train, FIELD[:, :, 2:-1, 3:].grid, How(), Blurs(None, None))
+    assert made.in_path.geometry.beyond == beyond
+    assert made.in_path.geometry.samples == ((6, 8) if degrees == 0 else (8, 6))
+    assert made.in_path.geometry.views == (5, 6)
+    margin = made.in_path.geometry.margin
+    assert margin == 4 + max(made.in_path.between.gap_filled)
 
 
 # --- sums that add up ---

@@ -182,6 +182,18 @@ def test_boxes_of_taps_lie_around_their_places():
     np.testing.assert_allclose(boxes.y[:, 0], -0.2 + 2 * (np.arange(6) / 2 - 0.25), atol=1e-7)
 
 
+def test_boxes_of_turned_cells_are_the_rectangles_that_stand_for_them():
+    step = np.array([[1.0, -0.4], [0.3, 0.9]])
+    plane = plane_of(np.hstack([step, np.zeros((2, 2))]), (0.3, -0.2))
+    taps, tiles = Taps.of((3, 4), CellDivision(1, False)), cell_tiles(step)
+    made = plane.boxes(taps.index, taps.shift, STILL, (8, 9))
+    assert len(made) == len(tiles) > 1
+    for (boxes, share), tile in zip(made, tiles, strict=True):
+        place = np.stack([boxes.x - tile.x, boxes.y - tile.y], -1)
+        np.testing.assert_allclose(place, taps.index @ step.T + plane.offset, atol=1e-12)
+        assert (share, boxes.width, boxes.height) == (tile.share, tile.width, tile.height)
+
+
 def test_planes_tell_views_apart_only_where_samples_hardly_move_on_them():
     """Over 9 columns and 8 rows of samples, by a millionth of a cell of 1 mm × 2 mm."""
     for place, count, cell in (((0, 2), 9, 1 * mm), ((0, 3), 8, 1 * mm), ((1, 2), 9, 2 * mm), ((1, 3), 8, 2 * mm)):

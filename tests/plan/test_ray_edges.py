@@ -53,6 +53,18 @@ def test_cells_that_are_aimed_at_one_by_one_have_no_border():
     assert edges_that_cut(core(array, samples=2)) == ('a border between cells of lens array "array"',)
 
 
+def test_kernels_that_are_picked_by_position_have_a_border():
+    """Shares that vary along rows only, along columns only, and not at all."""
+    rows, columns = np.array([[0.2], [0.7]]), np.array([[0.3, 0.6]])
+    for shares, cuts in ((rows, True), (columns, True), (np.array([[0.4, 0.4]]), False)):
+        mixed = vcc.CodedDiffuser(
+            (kernels.Gaussian(0.001), kernels.Gaussian(0.002)), 30 * mm, weights=np.stack([shares, 1 - shares]),
+            height=30 * mm, z=20 * mm, name="mixed",
+        )  # fmt: skip
+        found = edges_that_cut(core(mixed))
+        assert bool([words for words in found if "is picked" in words]) == cuts
+
+
 def test_a_stop_that_cells_image_within_a_pixel_is_an_edge():
     # Parallel light comes from the stop, 200 mm before the relay lens, and lenslets gather it in their focus.
     elements = [
