@@ -16,11 +16,21 @@ from vcc.optics.scatter import Scatter
 from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.depth_rule import denser
 from vcc.plan.footprints.cells import Detail, Geometry, SampleDivision, _misplaced, divide_samples, divide_views
-from vcc.plan.footprints.compile import _check_raster, _cleaned, _sharp_footprint, _smear, compiled, used_taps
+from vcc.plan.footprints.compile import (
+    _check_raster,
+    _cleaned,
+    _sharp_footprint,
+    _Sharpened,
+    _smear,
+    compiled,
+    used_taps,
+)
 from vcc.plan.footprints.diffusers import Blurs
+from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision
 from vcc.plan.footprints.together import Apart
+from vcc.plan.footprints.words import notes_of
 from vcc.plan.how import How
 from vcc.plan.in_focus import share_in_focus
 from vcc.plan.parallax_rule import BetweenViews, index_motions
@@ -490,3 +500,57 @@ def test_compiled_rays_go_by_the_numbers_of_the_steps(elements):
     wanted = reference.rays(core, values, threads=1).values
     found = numba_cpu.rays(core, values, threads=1).values
     np.testing.assert_allclose(found, wanted, atol=1e-5 * wanted.max())
+
+
+# --- in words ---
+
+
+def test_notes_say_how_finely_all_is_divided():
+    """Numbers in words: how many parts of how many views, and errors from a thousandth of the light on."""
+    train = vcc.Camera([LENS, vcc.Mask(CODE.values, 1 * mm)], SENSOR)
+    where = np.zeros((3, 4), bool)
+    where[0, :3] = True
+
+    def said(division, samples=SampleDivision(1, 0.0, False), swapped=False, planes=((), (), ())):
+        notes = notes_of(train, *map(list, planes), between(), division, samples, "it is fine", swapped)
+        return "\n".join(notes)
+
+    plain = said(CellDivision(1, False))
+    assert plain.count("\n") == 1
+    assert "lens at z = 0 mm, and the flight" in plain
+    assert "mask" not in plain
+    assert "divided 2×2" in said(CellDivision(2, True))
+    assert "cells of 3 of 12 views divided 4×4" in said(CellDivision(1, False, 4, where))
+    assert "cells of all views divided 4×4" in said(CellDivision(1, False, 4, where | True))
+    assert said(CellDivision(1, False, 4, where & False)) == plain
+    for error, there in ((1e-3, False), (1.1e-3, True)):
+        assert ("up to 0.1% of the light" in said(CellDivision(1, False, error=error))) is there
+        assert ("about 0.1% of the light" in said(CellDivision(1, False), SampleDivision(1, error, True))) is there
+    assert "samples divided 3×3: it is fine" in said(CellDivision(1, False), SampleDivision(3, 0.0, True))
+    assert "change places" in said(CellDivision(1, False), swapped=True)
+    for n, words in enumerate(("one weight a view", "one weight a sample", "multiplied into the picture")):
+        planes = [(), (), ()]
+        planes[n] = (plane(), replace(plane(), label="other"))
+        assert f"{words}" in said(CellDivision(1, False), planes=planes)
+        assert "mask, other" in said(CellDivision(1, False), planes=planes)
+
+
+def test_samples_too_wide_to_be_sharpened_are_interpolated_by_cubics():
+    """Of 10 pixels a side and four samples besides, 2²⁴ pixels are reached between steps of 1021 and 1022."""
+    one = np.ones((1, 1))
+    for size, cubic in ((1021.0, False), (-1022.0, True)):
+        core = Footprints(
+            (10, 10),
+            "linear",
+            1.0,
+            np.zeros(1, int),
+            np.zeros(1, int),
+            one,
+            one,
+            one,
+            np.diag([size, size]),
+            (1, 1),
+        )
+        made = _Sharpened.of(core, "mean", ANEW)
+        assert (made.core.interpolation == "cubic") is cubic
+        assert (made.along is None) is cubic
