@@ -511,7 +511,9 @@ def test_notes_say_how_finely_all_is_divided():
     where = np.zeros((3, 4), bool)
     where[0, :3] = True
 
-    def said(division, samples=SampleDivision(1, 0.0, False), swapped=False, planes=((), (), ())):
+    whole = SampleDivision(1, 0.0, False)
+
+    def said(division, samples=whole, swapped=False, planes=((), (), ())):
         notes = notes_of(train, *map(list, planes), between(), division, samples, "it is fine", swapped)
         return "\n".join(notes)
 
