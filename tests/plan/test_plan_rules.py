@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scipy.integrate import quad
 import vcc
 from vcc.base.affine import Affine
 from vcc.base.units import mm
+from vcc.optics.deflections import CellDeflection
 from vcc.plan.choice import compile_best
 from vcc.plan.decisions import ANEW
 from vcc.plan.depth_rule import Parallax, denser
@@ -28,9 +30,14 @@ from vcc.plan.footprints.diffusers import (
 from vcc.plan.footprints.shares import Taps, cumulative, share_slopes, shares, weight
 from vcc.plan.how import How
 from vcc.plan.parallax_rule import index_motions
+from vcc.plan.rays.aim import _parted
+from vcc.plan.rays.cell_windows import Seen
 from vcc.plan.rays.points import columns_of, table
+from vcc.plan.rays.strips import Bound
 from vcc.plan.rays.textures import Sampled, made_fine_enough, means_around
+from vcc.plan.rays.windows import CellOpening, CellWindows, Sight, Stop, Window
 from vcc.shapes import kernels
+from vcc.shapes.lattice import Lattice
 from vcc.shapes.patterns import Circle, as_pattern
 
 RANDOM = np.random.default_rng(9)
@@ -360,3 +367,56 @@ def test_points_of_the_table_are_spread_over_pixels_aims_and_kernels():
     assert table(3, (), True).dtype == np.float32
     assert table(3, (plain,), True, np.float64).dtype == np.float64
     assert not np.array_equal(table(3, (), False), table(4, (), False))
+
+
+# --- aims ---
+
+
+def bound(loose, circle=True, half=(1.0, 1.0)):
+    step = Affine(
+        np.vstack([np.hstack([np.arange(1.0, 17).reshape(4, 4), [[0.5], [0.7], [0], [0]]]), np.eye(5)[4]])
+    )
+    return Bound(2, step, slice(0, 2), np.array([3.0, 4.0]), np.array(half), np.array(loose), circle, "hole")
+
+
+def test_a_round_hole_that_rays_stray_from_is_a_disc_or_the_rectangle_around_it():
+    """Widened all round by how far they stray, where that is smaller: π(1 + √0.05)² < 4·1.1·1.2, π·1.9² > 4·1.9."""
+    size, disc = bound((0.1, 0.2)).widened()
+    np.testing.assert_allclose((size, disc), (np.full(2, 1 + math.sqrt(0.05)), [True, True]))
+    size, disc = bound((0.9, 0.0)).widened()
+    np.testing.assert_allclose((size, disc), ([1.9, 1.0], [False, False]))
+    size, disc = bound((0.9, 0.3)).widened(np.array([0.9, 0.2]))  # of which some is known
+    np.testing.assert_allclose((size, disc), ([1.1, 1.1], [True, True]))
+    assert not bound((0.1, 0.2), circle=False).widened()[1]
+    for n, strip in enumerate(bound((0.9, 0.0)).strips()):
+        assert strip.from_sensor.tolist() == [4 * n + 1, 4 * n + 2, 4 * n + 3, 4 * n + 4]
+        assert (strip.middle, strip.half) == (pytest.approx([2.5, 3.3][n]), [1.9, 1.0][n])
+        assert (strip.number, strip.disc, strip.words) == (2, False, "hole")
+
+
+def test_strips_bound_slopes_unless_they_are_a_million_wide():
+    strip = bound((0.0, 0.0)).strips()[0]  # of a row (1, 2, 3, 4): 5 to slopes
+    assert replace(strip, half=4.99e6).bounds_slopes
+    assert not replace(strip, half=5.01e6).bounds_slopes
+
+
+def test_cells_are_aimed_at_where_that_saves_rays_or_where_there_are_enough():
+    """Of a window of solid angle 4: cells that see less than 70 % of it, or up to 1/0.7 of it with rays for each."""
+    whole = Window(np.eye(2), np.zeros((2, 2)), np.zeros(2), False, "window")
+    pairs = np.ones(2)
+    cells = CellWindows(
+        CellDeflection(Lattice("square", 1.0), np.zeros((1, 1)), np.zeros((1, 1, 2))),
+        CellOpening(pairs, np.zeros((0, 2)), np.inf), Sight(*[pairs] * 7), Stop(pairs, pairs, False), (1, 1), "cells",
+    )  # fmt: skip
+
+    def aim(solid_angle, number, samples):
+        return _parted(SimpleNamespace(samples=samples), whole, cells, Seen(solid_angle, number))
+
+    assert aim(2.79, 8.0, 2) is cells
+    parted = aim(2.81, 8.0, 16)
+    assert isinstance(parted, CellWindows)
+    assert parted.halvings == 3
+    assert aim(2.81, 8.0, 15) is whole
+    assert aim(2.81, 0.5, 2).halvings == 0
+    assert isinstance(aim(5.7, 8.0, 16), CellWindows)
+    assert aim(5.72, 8.0, 16) is whole
