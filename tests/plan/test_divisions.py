@@ -329,6 +329,8 @@ def test_partial_rasters_add_up_and_are_averaged_with_those_of_other_rays():
     total = one + other
     assert (total.values, total.difference, total.rays, total.samples) == (4.0, 0.75, 10, 4)
     assert (Partial(np.ones(1)) + Partial(np.ones(1))).difference is None
+    plain = Partial(np.ones(1))
+    assert (plain.difference, plain.rays, plain.samples) == (None, 0, 0)
     both = one.with_rays(other)
     assert (both.values, both.difference, both.rays, both.samples) == (2.0, -2.0, 30, 12)
 

@@ -373,20 +373,20 @@ def test_points_of_the_table_are_spread_over_pixels_aims_and_kernels():
 
 
 def bound(loose, circle=True, half=(1.0, 1.0)):
-    step = Affine(
-        np.vstack([np.hstack([np.arange(1.0, 17).reshape(4, 4), [[0.5], [0.7], [0], [0]]]), np.eye(5)[4]])
-    )
+    step = Affine.from_parts(np.arange(1.0, 17).reshape(4, 4), np.array([0.5, 0.7, 0, 0]))
     return Bound(2, step, slice(0, 2), np.array([3.0, 4.0]), np.array(half), np.array(loose), circle, "hole")
 
 
 def test_a_round_hole_that_rays_stray_from_is_a_disc_or_the_rectangle_around_it():
-    """Widened all round by how far they stray, where that is smaller: π(1 + √0.05)² < 4·1.1·1.2, π·1.9² > 4·1.9."""
-    size, disc = bound((0.1, 0.2)).widened()
-    np.testing.assert_allclose((size, disc), (np.full(2, 1 + math.sqrt(0.05)), [True, True]))
-    size, disc = bound((0.9, 0.0)).widened()
-    np.testing.assert_allclose((size, disc), ([1.9, 1.0], [False, False]))
-    size, disc = bound((0.9, 0.3)).widened(np.array([0.9, 0.2]))  # of which some is known
-    np.testing.assert_allclose((size, disc), ([1.1, 1.1], [True, True]))
+    """Widened by how far they stray, where that is smaller: π(1 + √0.05)² < 4·1.1·1.2, but π·1.9² > 4·1.9."""
+    for loose, known, wanted, round_still in (
+        ((0.1, 0.2), 0.0, np.full(2, 1 + math.sqrt(0.05)), True),
+        ((0.9, 0.0), 0.0, [1.9, 1.0], False),
+        ((0.9, 0.3), np.array([0.9, 0.2]), [1.1, 1.1], True),  # of which some is known
+    ):
+        size, disc = bound(loose).widened(known)
+        np.testing.assert_allclose(size, wanted)
+        assert disc is round_still
     assert not bound((0.1, 0.2), circle=False).widened()[1]
     for n, strip in enumerate(bound((0.9, 0.0)).strips()):
         assert strip.from_sensor.tolist() == [4 * n + 1, 4 * n + 2, 4 * n + 3, 4 * n + 4]
@@ -401,12 +401,12 @@ def test_strips_bound_slopes_unless_they_are_a_million_wide():
 
 
 def test_cells_are_aimed_at_where_that_saves_rays_or_where_there_are_enough():
-    """Of a window of solid angle 4: cells that see less than 70 % of it, or up to 1/0.7 of it with rays for each."""
+    """Of a window of solid angle 4: cells that see less than 70 % of it, or up to 1/0.7 with rays for each."""
     whole = Window(np.eye(2), np.zeros((2, 2)), np.zeros(2), False, "window")
     pairs = np.ones(2)
     cells = CellWindows(
         CellDeflection(Lattice("square", 1.0), np.zeros((1, 1)), np.zeros((1, 1, 2))),
-        CellOpening(pairs, np.zeros((0, 2)), np.inf), Sight(*[pairs] * 7), Stop(pairs, pairs, False), (1, 1), "cells",
+        CellOpening(pairs, np.zeros((0, 2)), np.inf), Sight(*[pairs] * 7), Stop(pairs, pairs, False), (1, 1), "",
     )  # fmt: skip
 
     def aim(solid_angle, number, samples):
