@@ -222,7 +222,7 @@ CORES = {
 @pytest.mark.parametrize("name", CORES)
 def test_rays_stay_within_the_samples_and_views_that_are_said_to_be_looked_at(name):
     """By tracing many rays of each pixel: bounds hold, and are as tight as a pixel and a sample allow."""
-    core = CORES[name]().more(4096)
+    core = CORES[name]().more(1024)
     shape = core.views
     rows, columns = core.raster_shape
     pixel = np.arange(rows * columns)

@@ -439,9 +439,10 @@ def hills(x, y):
 TURNED = np.array([[1.0, 0.3, 0.25, -0.08], [-0.2, 0.9, 0.1, 0.3]])
 
 
-@pytest.mark.parametrize("kept", [False, True])
-@pytest.mark.parametrize("over_samples", [False, True])
-@pytest.mark.parametrize("finer", [1, 2])
+@pytest.mark.parametrize(
+    ("kept", "over_samples", "finer"),
+    [(False, False, 1), (False, True, 2), (True, True, 1)],
+)
 @pytest.mark.parametrize(
     "at_index", [np.array([[1.0, 0, 0.3, 0], [0, 0.8, 0, -0.25]]), TURNED], ids=["straight", "turned"]
 )
