@@ -8,7 +8,10 @@ import pytest
 import vcc
 from vcc.plan import choice
 from vcc.plan.choice import compile_best, compiled_each
+from vcc.plan.footprints.codes import Codes, exchanged
 from vcc.plan.how import How
+from vcc.shapes.patterns import Bounded, Cells, Circle
+from vcc.shapes.sheets import Product, Shifted
 from vcc.units import mm
 
 RANDOM = np.random.default_rng(3)
@@ -73,3 +76,40 @@ def test_cameras_that_differ_in_more_are_planned_alone():
     for different in (moved, smaller, circle):
         first, second = compiled_each([one, different], FIELD.grid, How())
         assert (first, second) == tuple(compile_best(each, FIELD.grid) for each in (one, different))
+
+
+def test_cells_are_exchanged_wherever_they_stand_in_a_pattern():
+    old, new, other = (Cells(RANDOM.random((2, 2)), 1 * mm) for _ in range(3))
+    around = Product((other, Bounded(old, 2 * mm, 3 * mm), Shifted(old, (1 * mm, 0.0)), Circle(4 * mm)))
+    first, bounded, shifted, circle = exchanged(around, old, new).patterns
+    assert (first, circle) == (other, Circle(4 * mm))
+    assert bounded.pattern is shifted.pattern is new
+    assert (bounded.width, bounded.height, shifted.middle) == (2 * mm, 3 * mm, (1 * mm, 0.0))
+    assert exchanged(old, old, new) is new
+    assert exchanged(other, old, new) is other
+    assert exchanged(Cells(old.values, 1 * mm), old, new) != new  # equal ones are not the same ones
+
+
+def test_cameras_differ_in_the_cells_of_one_mask_alone():
+    lens, code = vcc.Lens(50 * mm), RANDOM.random((2, 5, 6))
+
+    def cameras_of(*masks, lenses=(lens, lens)):
+        return [vcc.Camera([one, mask], SENSOR) for one, mask in zip(lenses, masks, strict=True)]
+
+    def mask(n, **changed):
+        return vcc.Mask(code[n], **{"width": 8 * mm, "z": 1 * mm, "name": "code", **changed})
+
+    codes = Codes.of(cameras_of(mask(0, source="a"), mask(1, source="b")))
+    assert codes is not None
+    assert codes.number == 1
+    assert (codes.open.values == 1).all()
+    assert [cells.values.tolist() for cells in codes.cells] == code.tolist()
+    assert codes.base.elements[1].pattern is codes.open
+    assert codes.base.elements[0] is lens
+    for other in (
+        mask(1, width=9 * mm), mask(1, height=9 * mm), mask(1, z=2 * mm), mask(1, name="other"),
+        mask(1, decentre=(1 * mm, 0.0)), vcc.Mask(code[1][1:], 8 * mm, z=1 * mm, name="code"),
+        vcc.Mask(Cells(code[1], 8 * mm, middle=(1 * mm, 0.0)), z=1 * mm, name="code"), mask(0),
+    ):  # fmt: skip
+        assert Codes.of(cameras_of(mask(0), other)) is None
+    assert Codes.of(cameras_of(mask(0), mask(1), lenses=(lens, vcc.Lens(51 * mm)))) is None

@@ -65,11 +65,27 @@ CASES = {
     ),
     "by rays": ([LENS, vcc.Lens(1.0, 4 * mm), mask(25 * mm)], {"method": "rays"}),
     "plate": (
-        [LENS, vcc.PhasePlate(surfaces.Zernike((0.0, 0, 0, 0, 2e-6, 1e-6, 1e-6), 6 * mm), 6 * mm, z=5 * mm)],
+        [
+            LENS,
+            vcc.PhasePlate(
+                surfaces.Zernike((0.0, 0, 0, 0, 2e-6, 1e-6, 1e-6), 6 * mm),
+                5 * mm,
+                z=5 * mm,
+                decentre=(0.4 * mm, -0.3 * mm),
+            ),
+        ],
         {},
     ),
     "heights": (
-        [LENS, vcc.PhasePlate(surfaces.PathMap(1e-6 * RANDOM.random((6, 5)), width=6 * mm), 5 * mm, z=5 * mm)],
+        [
+            LENS,
+            vcc.PhasePlate(
+                surfaces.PathMap(1e-6 * RANDOM.random((6, 5)), width=6 * mm),
+                4 * mm,
+                z=5 * mm,
+                decentre=(-0.3 * mm, 0.2 * mm),
+            ),
+        ],
         {},
     ),
     "widths": (

@@ -21,6 +21,7 @@ from vcc.plan.operators import (
     AlongAxes,
     Blur,
     BlurViews,
+    DarkBorder,
     OnSensor,
     SharpenViews,
     SwapPixelAxes,
@@ -56,6 +57,7 @@ BEFORE = {
     "views blurred": lambda rng: BlurViews(signed(rng, odd(rng), odd(rng))),
     "views blurred beyond their size": lambda rng: BlurViews(signed(rng, 31, 19)),
     "views sharpened": lambda rng: SharpenViews(sharpening(rng)),
+    "dark border": lambda rng: DarkBorder(tuple(map(tuple, rng.integers(0, 3, (4, 2)).tolist()))),
 }
 AFTER = {
     "along axes": lambda rng: AlongAxes(signed(rng, odd(rng)), signed(rng, odd(rng)), "filter"),
@@ -341,3 +343,41 @@ def test_operators_of_equal_weights_are_equal():
         assert make(kernel) != make(changed)
     assert SwapPixelAxes() == SwapPixelAxes()
     assert SharpenViews((1424, -240, 40)) != SharpenViews((1424, -239, 39))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("name", list(BEFORE))
+def test_samples_are_made_of_those_that_are_named(name, seed):
+    """By the transpose: what weighs in some rows and columns of what the core takes, and nothing beside it."""
+    rng = np.random.default_rng(seed)
+    operator = BEFORE[name](rng)
+    shape = (1, 1, int(rng.integers(12, 20)), int(rng.integers(12, 20)))
+    made = operator.shape(shape)
+    rows, columns = (np.sort(rng.choice(np.arange(2, n - 2), 2, replace=False)) for n in made[2:4])
+    taken = np.zeros(made)
+    view = tuple(before for before, _ in operator.beside[:2]) if isinstance(operator, DarkBorder) else (0, 0)
+    taken[view][rows[0] : rows[1], columns[0] : columns[1]] = rng.uniform(
+        1, 2, (np.diff(rows)[0], np.diff(columns)[0])
+    )
+    weighs = np.argwhere(np.abs(operator.transpose(taken)[0, 0]) > 1e-9)
+    found = operator.made_of(np.array([rows, columns]))
+    (top, bottom), (left, right) = np.clip(found, 0, np.array(shape[2:])[:, None])
+    if name == "views blurred beyond their size":
+        return  # kernels of random weights as wide as views may cancel
+    assert weighs.min(axis=0).tolist() == [top, left]
+    assert (weighs.max(axis=0) + 1).tolist() == [bottom, right]
+
+
+def test_a_dark_border_stands_around_the_samples():
+    border, values = DarkBorder(((1, 0), (0, 2), (3, 1), (2, 0))), np.random.default_rng(0).random((2, 3, 4, 5, 3))
+    found = border.apply(values)
+    assert found.shape == border.shape(values.shape) == (3, 5, 8, 7, 3)
+    np.testing.assert_array_equal(found[1:, :3, 3:7, 2:], values)
+    assert found.sum() == pytest.approx(values.sum())
+    np.testing.assert_array_equal(border.apply(torch.asarray(values)).numpy(), found)
+    np.testing.assert_array_equal(border.transpose(found), values)
+    block = border.block(Block((0, 1), (1, 3), (2, 4), (0, 5)))
+    assert block.ranges == ((0, 2), (1, 5), (2, 8), (0, 7))
+    assert border.made_of(np.array([[3, 7], [2, 7]])).tolist() == [[0, 4], [0, 5]]
+    assert border.kept_as(np.dtype(np.uint8)) == (np.uint8, 1.0)
+    assert border.pull(values, found, ["kernel"]) == {}

@@ -104,6 +104,15 @@ def test_samples_that_are_looked_at_hold_all_that_weigh_and_hardly_more(step, in
             assert min(high, count) <= found.max() + 1 + beside or step == "sheared"
 
 
+@pytest.mark.parametrize("shift", [1000.0, -1000.0])
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_of_views_that_fall_beside_the_raster_nothing_is_looked_at(axis, shift):
+    core = core_of(STEPS["straight"])
+    beside = replace(core, **{axis: getattr(core, axis) + shift}).used_pixels(SHAPE)
+    first, stop = np.clip(beside, 0, np.array(SHAPE[2:])[:, None]).transpose(3, 0, 1, 2)
+    assert (stop <= first).any(axis=-1).all()
+
+
 def test_a_view_that_falls_into_a_line_is_looked_at_as_a_whole():
     core = replace(core_of(STEPS["straight"]), step=np.array([[1e-15, 0.0], [0.0, 1.0]]))
     assert core.used_pixels(SHAPE)[0, 0].tolist() == [[0, 9], [0, 11]]
@@ -212,7 +221,7 @@ CORES = {
 @pytest.mark.parametrize("name", CORES)
 def test_rays_stay_within_the_samples_and_views_that_are_said_to_be_looked_at(name):
     """By tracing many rays of each pixel: bounds hold, and are as tight as a pixel and a sample allow."""
-    core = CORES[name]().more(4096)
+    core = CORES[name]().more(1024)
     shape = core.views
     rows, columns = core.raster_shape
     pixel = np.arange(rows * columns)

@@ -53,6 +53,18 @@ def test_cells_that_are_aimed_at_one_by_one_have_no_border():
     assert edges_that_cut(core(array, samples=2)) == ('a border between cells of lens array "array"',)
 
 
+def test_kernels_that_are_picked_by_position_have_a_border():
+    """Shares that vary along rows only, along columns only, and not at all."""
+    rows, columns = np.array([[0.2], [0.7]]), np.array([[0.3, 0.6]])
+    for shares, cuts in ((rows, True), (columns, True), (np.array([[0.4, 0.4]]), False)):
+        mixed = vcc.CodedDiffuser(
+            (kernels.Gaussian(0.001), kernels.Gaussian(0.002)), 30 * mm, weights=np.stack([shares, 1 - shares]),
+            height=30 * mm, z=20 * mm, name="mixed",
+        )  # fmt: skip
+        found = edges_that_cut(core(mixed))
+        assert bool([words for words in found if "is picked" in words]) == cuts
+
+
 def test_a_stop_that_cells_image_within_a_pixel_is_an_edge():
     # Parallel light comes from the stop, 200 mm before the relay lens, and lenslets gather it in their focus.
     elements = [
@@ -64,6 +76,7 @@ def test_a_stop_that_cells_image_within_a_pixel_is_an_edge():
     sharp = vcc.Camera(elements, vcc.Sensor(402.5 * mm, (36, 36), 0.1 * mm)).compile(light_field, method="rays")
     assert [words for words in edges_that_cut(sharp.core) if "image sharply" in words]
     assert not [words for words in edges_that_cut(sharp.core, ["scale"]) if "image sharply" in words]
+    assert [words for words in edges_that_cut(sharp.core, ["aim.stop.half"]) if "image sharply" in words]
     # With f-numbers that match, a micro-image is blurred by a good part of a pixel.
     plenoptic = vcc.Camera.plenoptic(
         50 * mm, lenslet_pitch=0.1 * mm, f_number=4, pixels_per_lenslet=9, lenslets=(10, 10)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vcc.base.affine import Affine
 from vcc.plan.rays import steps
 from vcc.shapes.lattice import Lattice
 
@@ -43,3 +44,21 @@ def test_cells_of_an_array_bend_by_their_own_power_and_slopes():
             np.testing.assert_allclose(
                 (rays.s[n, m], rays.t[n, m]), (0.3 * power - s, -0.7 * power - t), atol=1e-13
             )
+
+
+def test_moves_are_packed_with_all_numbers_where_x_and_y_mix():
+    """Each of the eight entries by which they can makes it so; offsets do not."""
+    plain = np.diag([1.1, 0.9, 1.2, 0.8, 1.0])
+    plain[0, 2], plain[1, 3], plain[2, 0], plain[3, 1] = 0.3, 0.4, -0.2, -0.1
+    plain[:4, 4] = 0.5, 0.6, 0.7, 0.8
+    packer = steps.Packer()
+    steps.Move(Affine(plain)).packed(packer)
+    assert packer.codes == [steps.Move.code_parted]
+    assert packer.real == [[1.1, 0.3, 0.5, -0.2, 1.2, 0.7, 0.9, 0.4, 0.6, -0.1, 0.8, 0.8]]
+    for entry in ((0, 1), (0, 3), (1, 0), (1, 2), (2, 1), (2, 3), (3, 0), (3, 2)):
+        mixed = plain.copy()
+        mixed[entry] = 0.01
+        packer = steps.Packer()
+        steps.Move(Affine(mixed)).packed(packer)
+        assert packer.codes == [steps.Move.code_mixed]
+        assert packer.real == [mixed[:4].ravel().tolist()]

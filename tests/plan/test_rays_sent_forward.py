@@ -13,6 +13,7 @@ from vcc import patterns, surfaces
 from vcc.base.units import mm
 from vcc.plan.decisions import Decisions
 from vcc.plan.how import How
+from vcc.plan.rays.aim import aimed
 from vcc.plan.rays.compile import compile_rays
 from vcc.plan.rays.path import Path
 from vcc.plan.rays.windows import CellWindows, Window
@@ -91,11 +92,20 @@ CAMERAS = {
 }
 
 
-def sent_forward(camera, rays):
+LIT = {
+    "masks": 1.0, "cells off the middle of their sheet": 0.995, "in one plane": 0.94, "facets": 0.42,
+    "prisms": 0.23, "lenslets": 0.095, "round lenslets": 0.19, "plate": 0.99, "thick lens": 1.0, "turned": 0.96,
+}  # fmt: skip
+"""At least this share of the rays passes all that they are aimed through: aims are no wider than that."""
+
+
+def sent_forward(camera, rays, places=None):
     """Rays (n, 4) of the entrance plane on the sensor, and what of each the elements let pass."""
     passed = np.ones(len(rays))
+    places = [] if places is None else places
     for stage in camera.stages:
         rays = stage.approach(rays)
+        places.append(rays[:, :2])
         if stage.faces.pattern is not None:
             x, y = (rays[:, :2] - stage.element.decentre).T
             passed = passed * stage.faces.pattern(x, y)
@@ -130,6 +140,26 @@ def test_rays_come_to_their_pixels_and_weigh_what_elements_let_pass(name, kept):
     else:
         assert isinstance(core.aim, CellWindows)
         assert (passed[lit] > 0).mean() > 0.995
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_rays_are_aimed_no_wider_than_light_comes_and_meet_elements_where_that_is_foretold(name):
+    """Places of rays on elements against the regions in which textures of them are made."""
+    camera = vcc.Camera(CAMERAS[name], SENSOR)
+    core = compile_rays(camera, FIELD.grid, How(samples=128, method="rays")).core
+    index, share = core.looked_up(np.arange(30), core.block(np.arange(30)))
+    lit = share.reshape(-1) > 0
+    assert lit.mean() >= LIT[name]
+    places: list[np.ndarray] = []
+    sent_forward(camera, FIELD.frame(index.reshape(-1, 4)), places)
+    path = Path(camera, FIELD.grid, core.motion, 128)
+    for leg, (low, high) in zip(path.legs, aimed(path).regions, strict=True):
+        met = places[len(path.legs) - 1 - leg.number][lit]
+        np.testing.assert_array_less(low - 1e-9, met.min(axis=0))
+        np.testing.assert_array_less(met.max(axis=0), high + 1e-9)
+        if name in ("masks", "thick lens", "cells off the middle of their sheet"):
+            # rays of all pixels, drawn at random, nearly fill the rectangle around a disc's light
+            np.testing.assert_array_less(high - low, 1.12 * np.ptp(met, axis=0))
 
 
 def test_what_a_diffuser_adds_to_slopes_is_spread_as_its_kernel():
