@@ -15,17 +15,11 @@ from vcc.engines import numba_cpu, reference
 from vcc.optics.scatter import Scatter
 from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.depth_rule import denser
+from vcc.plan.footprints.around import Sharpened, _check_raster, _smear, sharp_footprint
 from vcc.plan.footprints.cells import Detail, Geometry, SampleDivision, _misplaced, divide_samples, divide_views
-from vcc.plan.footprints.compile import (
-    _check_raster,
-    _cleaned,
-    _sharp_footprint,
-    _Sharpened,
-    _smear,
-    compiled,
-    used_taps,
-)
+from vcc.plan.footprints.compile import compiled, used_taps
 from vcc.plan.footprints.diffusers import Blurs
+from vcc.plan.footprints.landing import _cleaned
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision
@@ -250,19 +244,19 @@ def test_steps_across_are_rounding_where_a_whole_view_hardly_moves():
 
 
 def test_the_margin_of_tents_has_room_where_decisions_are_kept():
-    guard, tents = _smear(between(3.0, 2.0), 1, ANEW)
+    guard, tents = _smear((3.0, 2.0), ANEW)
     assert (guard, len(tents.down), len(tents.across)) == (4, 9, 7)
     assert tents.half_widths == (3.0, 2.0)
-    assert _smear(between(2.0, 1.0), 2, ANEW) == (0, None)
-    halved = _smear(between(6.0, 2.0), 2, ANEW)
+    assert _smear((1.0, 0.5), ANEW) == (0, None)
+    halved = _smear((3.0, 1.0), ANEW)
     assert (halved[0], halved[1].half_widths) == (4, (3.0, 0.0))
     decisions = Decisions()
-    guard, tents = _smear(between(3.0, 2.0), 1, decisions)
+    guard, tents = _smear((3.0, 2.0), decisions)
     assert (guard, len(tents.down), len(tents.across)) == (6, 11, 7)  # ⌈1.25·3 + ½⌉ = 5, ⌈1.25·2 + ½⌉ = 3
-    assert _smear(between(5.5, 3.5), 1, decisions)[1].half_widths == (5.5, 3.5)
+    assert _smear((5.5, 3.5), decisions)[1].half_widths == (5.5, 3.5)
     for gaps in ((5.6, 2.0), (3.0, 3.6)):
         with pytest.raises(vcc.InputError, match="gaps between views"):
-            _smear(between(*gaps), 1, decisions)
+            _smear(gaps, decisions)
 
 
 def test_rasters_are_as_large_as_memory_allows():
@@ -293,7 +287,7 @@ def test_taps_without_light_are_left_out_unless_they_may_be_lit_later():
     ],
 )
 def test_footprints_that_are_sharpened(step, parts, hard, footprint):
-    assert _sharp_footprint(step, SampleDivision(parts, 0.0, hard), ANEW) == footprint
+    assert sharp_footprint(step, SampleDivision(parts, 0.0, hard), ANEW) == footprint
 
 
 def test_aims_are_alike_where_they_aim_at_the_same_by_as_many_rays():
@@ -311,10 +305,10 @@ def test_pieces_are_divided_as_the_whole_is_along_the_axes_that_pixels_have(degr
     turn = np.round([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     train = vcc.Camera([vcc.FirstOrder(np.kron(np.eye(2), turn)), LENS], SENSOR)
     made = compiled(train, FIELD[:, :, 2:-1, 3:].grid, How(), Blurs(None, None))
-    assert made.in_path.geometry.beyond == beyond
-    assert made.in_path.geometry.samples == ((6, 8) if degrees == 0 else (8, 6))
-    assert made.in_path.geometry.views == (5, 6)
-    margin = made.in_path.geometry.margin
+    assert made.in_path.divided.geometry.beyond == beyond
+    assert made.in_path.divided.geometry.samples == ((6, 8) if degrees == 0 else (8, 6))
+    assert made.in_path.divided.geometry.views == (5, 6)
+    margin = made.in_path.divided.geometry.margin
     assert margin == 4 + max(made.in_path.between.gap_filled)
 
 
@@ -499,8 +493,8 @@ def test_compiled_rays_go_by_the_numbers_of_the_steps(elements):
     """What steps hand to compiled code gives the picture of the steps themselves; see tests/engines for more."""
     core = compile_rays(vcc.Camera([LENS, *elements], SENSOR), FIELD.grid, How(samples=16)).core
     values = FIELD.values
-    wanted = reference.rays(core, values, threads=1).values
-    found = numba_cpu.rays(core, values, threads=1).values
+    wanted = reference.run(core, values, threads=1).values
+    found = numba_cpu.run(core, values, threads=1).values
     np.testing.assert_allclose(found, wanted, atol=1e-5 * wanted.max())
 
 
@@ -555,6 +549,6 @@ def test_samples_too_wide_to_be_sharpened_are_interpolated_by_cubics():
             np.diag([size, size]),
             (1, 1),
         )
-        made = _Sharpened.of(core, "mean", ANEW)
+        made = Sharpened.of(core, "mean", ANEW)
         assert (made.core.interpolation == "cubic") is cubic
         assert (made.along is None) is cubic

@@ -20,8 +20,8 @@ from vcc.engines import reference
 from vcc.plan.correlation import correlated
 from vcc.plan.coverage import AskedLight, Missing, _cut
 from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.footprints.around import Sharpened
 from vcc.plan.footprints.cells import Geometry, SampleDivision, parts_of_sheared
-from vcc.plan.footprints.compile import _Sharpened
 from vcc.plan.footprints.detail import detail_lost, details_lost
 from vcc.plan.footprints.mask_textures import mask_as_met
 from vcc.plan.footprints.model import Footprints
@@ -592,11 +592,11 @@ def test_a_bright_sample_is_as_wide_as_what_nobody_gives_back(step, sample, refi
         (41, 41), interpolation, 1.0, np.zeros(1, int), np.zeros(1, int), one, 20 * one, 20 * one, step, (1, 1),
         refine=refine, opening=0.75,
     )  # fmt: skip
-    made = _Sharpened.of(core, sample, ANEW)
+    made = Sharpened.of(core, sample, ANEW)
     found, places = np.zeros((2, 2)), np.arange(41.0)
     for dx, dy in itertools.product(offsets, offsets):
         moved = replace(made.core, x=core.x + dx, y=core.y + dy)
-        raster = reference.footprints(moved, np.ones((1, 1, 1, 1)), threads=1).values
+        raster = reference.run(moved, np.ones((1, 1, 1, 1)), threads=1).values
         if made.along is not None:
             picture = AlongAxes(*made.along, "").apply(raster)[..., 0]
         else:
@@ -611,7 +611,7 @@ def test_a_bright_sample_is_as_wide_as_what_nobody_gives_back(step, sample, refi
     np.testing.assert_allclose(found, wanted, atol=0.12 * lost)
     reach = max(map(len, made.along)) // 2 if made.along is not None else max(made.plane.shape) // 2
     assert made.reach == reach > 0
-    assert _Sharpened(core).reach == 0
+    assert Sharpened(core).reach == 0
 
 
 def test_points_of_textures_are_alike_where_they_are_as_many_and_almost_as_close():
