@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.advice.view_gaps import ROUNDING, ViewGaps, distance_of
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.fields.grid import Grid
 from vcc.optics.deflections import CellDeflection, FacetDeflection
 from vcc.optics.train import Stage, Train
@@ -54,12 +54,14 @@ class Folded:
 
     # -- as far as matrices hold
 
-    @cached_property
+    @property
+    @cached
     def blocking(self) -> Stage | None:
         """The first stage behind which matrices do not hold."""
         return next((stage for stage in self.train.stages if ends_matrices(stage)), None)
 
-    @cached_property
+    @property
+    @cached
     def reached(self) -> tuple[Stage, ...]:
         """The stages whose ``arriving`` is exact: up to the one that blocks."""
         stages = self.train.stages
@@ -84,7 +86,8 @@ class Folded:
 
     # -- of what is seen
 
-    @cached_property
+    @property
+    @cached
     def looked_at(self) -> float:
         """1/Z of what is followed from view to view: what is in focus, or as near to that as the scene is."""
         by_place, by_slope = self.to_sensor.linear[:2, :2], self.sensor_from_slope
@@ -93,7 +96,8 @@ class Folded:
         low, high = (0.0, math.inf) if self.vergences is None else self.vergences
         return min(max(focus, low), high)
 
-    @cached_property
+    @property
+    @cached
     def gaps(self) -> ViewGaps | None:
         """Between neighbouring views' pictures on the sensor; None where something blocks."""
         if self.blocking is not None:
@@ -102,13 +106,15 @@ class Folded:
         per_pixel = np.diag([1 / horizontal, 1 / vertical])
         return ViewGaps(self.frame, per_pixel @ self.to_sensor.linear[:2], self.views_let_in)
 
-    @cached_property
+    @property
+    @cached
     def free_of_ghosts(self) -> tuple[float, float] | None:
         """(near, far) before the entrance plane between which no gap is seen, metres; None where there is none."""
         free = None if self.gaps is None else self.gaps.free_of_ghosts()
         return None if free is None or free[1] <= 0 else (1 / free[1], distance_of(max(free[0], 0.0)))
 
-    @cached_property
+    @property
+    @cached
     def stop(self) -> float | None:
         """Half the width at the entrance plane of what stops let in of a point in focus, metres; None for all."""
         widths = []

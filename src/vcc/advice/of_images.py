@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cached_property
 
 from vcc.advice.absurd_lengths import FAINT, MANY_MISSING, is_faint, light_share, metres_meant
 from vcc.advice.darkness import why_dark, why_darker
 from vcc.advice.no_focus import no_image
 from vcc.advice.noise import why_noisy
+from vcc.base.cached import cached
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
 from vcc.optics.train import Train
@@ -28,17 +28,20 @@ class Cautions:
     def __init__(self, train: Train, grid: Grid) -> None:
         self.train, self.grid = train, grid
 
-    @cached_property
+    @property
+    @cached
     def _lengths(self) -> str:
         """Lengths that no camera has."""
         return metres_meant(self.train, self.grid)
 
-    @cached_property
+    @property
+    @cached
     def _hopeless(self) -> bool:
         """Whether the views are so far from the sensor, or so small, that hardly any light arrives."""
         return light_share(self.train, self.grid) < FAINT
 
-    @cached_property
+    @property
+    @cached
     def _unfocused(self) -> str:
         return no_image(self.train, self.grid)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 from vcc.base import units
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.fields.grid import Grid
@@ -46,7 +46,8 @@ class Aperture:
                     f"{short(FARTHEST)}"
                 )
 
-    @cached_property
+    @property
+    @cached
     def metres(self) -> tuple[float, float, float]:
         """(z, right, down)."""
         right, down = (units.parse(each, "length", "decentre of the light field") for each in self.decentre)

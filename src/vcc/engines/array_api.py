@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from array_api_compat import array_namespace, device, is_torch_array
 from numpy.typing import NDArray
 
+from vcc.base.cached import cached
 from vcc.base.lookup import three_around
 from vcc.base.progress import Progress, tell
 from vcc.engines.bands import Bands
@@ -173,7 +173,8 @@ class _Run:
         shares = self.spread(across, core.x[:1, a], core.column_step, columns)
         return self.along_columns(Bands.of_taps(shares, across.count, np.ones(1), np.zeros(1, np.int64)), total)
 
-    @cached_property
+    @property
+    @cached
     def columns(self) -> list[Any]:
         """The samples of each column of views, (rows of views, t, s, channels)."""
         nv, nu, nt, ns = self.values.shape[:4]

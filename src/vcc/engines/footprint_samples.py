@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.cached import cached
 from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
@@ -47,7 +47,8 @@ class FineGrid:
         shares = down.shares.astype(np.float32), across.shares.astype(np.float32)
         return tables.FineSamples(down.first, shares[0], across.first, shares[1], pitch)
 
-    @cached_property
+    @property
+    @cached
     def matrices(self) -> tuple[NDArray[np.float64], ...]:
         """The division of rows and of columns as matrices, made once for all views."""
         assert self.divided_as is not None

@@ -12,12 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.lookup import smooth_back
 from vcc.base.progress import Progress, tell
@@ -111,7 +111,8 @@ class _Tap(Brief):
     k: Array
     l: Array
 
-    @cached_property
+    @property
+    @cached
     def transmissions(self) -> list[Array]:
         """What each mask lets pass."""
         return [mask.weights(self.b, self.a, self.k, self.l) for mask in self.core.masks]

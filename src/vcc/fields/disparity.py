@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
@@ -78,7 +79,8 @@ class DisparityMaps(Brief):
             f"{tuple(shape[2:4])} of the middle view"
         )
 
-    @cached_property
+    @property
+    @cached
     def extent(self) -> tuple[float, float]:
         """(lowest, highest) disparity, pixels per view along u, but for the outermost half per cent of each map.
 

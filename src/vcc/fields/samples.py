@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from os import PathLike
 from typing import Any, Protocol, Self, get_args
 
@@ -12,6 +12,7 @@ import numpy as np
 from array_api_compat import array_namespace, is_array_api_obj
 
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.base.showing import Shown
@@ -175,7 +176,8 @@ class InMemory(OnGrid):
         made._complete()
         return made
 
-    @cached_property
+    @property
+    @cached
     def grid(self) -> Grid:
         """The light field without its samples."""
         return Grid(

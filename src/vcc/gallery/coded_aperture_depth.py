@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.cached import cached
 from vcc.base.measures import decibels
 from vcc.gallery.blur_by_blocks import (
     EXPONENT,
@@ -84,7 +84,8 @@ class Truth:
             through = through * (1 - opacity)
         return cls(np.asarray(sharp), np.stack(shares), np.array(bench.scene.distances), depth)
 
-    @cached_property
+    @property
+    @cached
     def in_plane(self) -> Array:
         """The share of each block's window that shows a plane."""
         return np.stack([in_blocks(share, self.depth) for share in self.shares])

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.cached import cached
 from vcc.gallery import extended_depth
 from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
 from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Seen, Sizes
@@ -56,7 +56,8 @@ class RandomRings(Surface):
     rings: int = RINGS
     seed: int = SEED
 
-    @cached_property
+    @property
+    @cached
     def amounts(self) -> Array:
         """Of the rings from the middle outwards, evenly spread over ±1 and in random order."""
         even = (np.arange(self.rings) + 0.5) / self.rings * 2 - 1

@@ -6,7 +6,6 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from os import PathLike
 from typing import Any, Self, Unpack
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from vcc.advice.explain import Explanation, wrapped
 from vcc.base import checks
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress, tell
@@ -346,7 +346,8 @@ class _Work:
         frames = self._light.at(self._start + time)
         return [((camera, key), samples, share * through) for key, samples, share in frames]
 
-    @cached_property
+    @property
+    @cached
     def _dark(self) -> _Gathered:
         channels = next(iter(self._light.at(self._start)))[1]().grid.shape[4:]
         return _Gathered(np.zeros((*self._moving.camera.sensor.shape, *channels)), 0.0, {})

@@ -9,8 +9,9 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from html import escape
+
+from vcc.base.cached import cached
 
 LONGEST = 16_000
 """Letters of text in an exhibit; of a longer one the rest is left out, and that is said."""
@@ -69,7 +70,8 @@ class Exhibit:
     table: Table | None = None
     text: str = ""
 
-    @cached_property
+    @property
+    @cached
     def html(self) -> str:
         """All of it."""
         panels = "".join(_panel(each) for each in self.panels)

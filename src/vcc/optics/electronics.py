@@ -13,10 +13,10 @@ standard's)::
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, Final
 
 from vcc.base import checks
+from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 
@@ -132,7 +132,8 @@ class Electronics(Shown):
         """The number of channels that the parameters state; None if the same holds for any number."""
         return next(iter(self._channel_counts().values()), None)
 
-    @cached_property
+    @property
+    @cached
     def tile(self) -> tuple[tuple[int, ...], ...]:
         """The channel behind each filter of the tile, row by row; ``((0,),)`` without a colour filter."""
         if self.color_filter is None:

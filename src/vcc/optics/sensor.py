@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.optics.electronics import Electronics
@@ -92,7 +92,8 @@ class Sensor(Shown):
         """The (height, width) of all pixels together, metres."""
         return self.shape[0] * self.pitches[0], self.shape[1] * self.pitches[1]
 
-    @cached_property
+    @property
+    @cached
     def frame(self) -> Affine:
         """Maps (column, row, 1) to (x, y, 1) of the pixel's centre, metres."""
         rows, columns = self.shape

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property, cmp_to_key
+from functools import cmp_to_key
 from os import PathLike
 from typing import Any
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
@@ -51,12 +52,14 @@ class Stage(Brief):
             named = owned(self.faces.pattern, self.element.label)
             object.__setattr__(self, "faces", replace(self.faces, transmission=named))
 
-    @cached_property
+    @property
+    @cached
     def centred(self) -> Affine | None:
         """The affine deflection about the element's own middle, on rays of the camera."""
         return None if self.faces.affine is None else about(self.element.decentre, self.faces.affine)
 
-    @cached_property
+    @property
+    @cached
     def leaving(self) -> Affine:
         """Rays from the entrance plane to just behind this stage, folded as in ``arriving``."""
         return self.arriving if self.centred is None else self.centred @ self.arriving
@@ -214,7 +217,8 @@ class Train(Value, Shown):
         object.__setattr__(self, "elements", ordered)
         object.__setattr__(self, "sensor", sensor)
 
-    @cached_property
+    @property
+    @cached
     def _path(self) -> tuple[tuple[Stage, ...], Affine]:
         stages: list[Stage] = []
         approach, here, leaving = Affine.identity(), 0.0, Affine.identity()

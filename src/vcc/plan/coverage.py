@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
@@ -108,7 +108,8 @@ class AskedLight(Brief):
     def _stop(self) -> str:
         return self.aimed.aim.words if self.aimed is not None else ""
 
-    @cached_property
+    @property
+    @cached
     def missing(self) -> Missing:
         """What of it the light field lacks."""
         if self.aimed is None or self._bounds_are_held():
@@ -143,7 +144,8 @@ class AskedLight(Brief):
         amounts = np.stack([asked, viewed, held])
         return [Missing.of(amounts @ each.values.ravel(), self._stop) for each in cells]
 
-    @cached_property
+    @property
+    @cached
     def _core(self) -> Rays:
         """Rays from all over the sensor, which is one pixel to them, to what bounds the light."""
         assert self.aimed is not None
@@ -168,19 +170,22 @@ class AskedLight(Brief):
             points=table(0, path.scatters, self.aimed.aim.on_disc),
         )
 
-    @cached_property
+    @property
+    @cached
     def _traced(self) -> tuple[Array, Array]:
         """Indices (i, j, k, l) of the light field that rays come from, (n, 4), and what passes of each, (n,)."""
         index, share = self._core.looked_up(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
         return index.reshape(-1, 4), share.reshape(-1)
 
-    @cached_property
+    @property
+    @cached
     def _rays(self) -> Array:
         """The rays on the sensor, (n, 4) of (x, y, s, t)."""
         rays, _ = self._core.aimed(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
         return np.stack([each.ravel() for each in np.broadcast_arrays(rays.x, rays.y, rays.s, rays.t)], axis=-1)
 
-    @cached_property
+    @property
+    @cached
     def _held(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which rays fall into the grid of views, and which into the views' pictures."""
         index, size = self._traced[0], self.path.size

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.camera import Camera
@@ -173,7 +173,8 @@ class HeterodyneSetup:
                     f"{short(pattern.periods[axis] * opening / period)} or more, or stop the lens down"
                 )
 
-    @cached_property
+    @property
+    @cached
     def pinhole_solid_angle(self) -> float:
         """Of the calibration's pinhole, seen from the sensor: its area over |∂(x_s)/∂(slope)|²."""
         width, height = (PINHOLE_SHARE * period for period in self.geometry.aperture_period)

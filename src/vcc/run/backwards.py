@@ -12,13 +12,13 @@ import re
 from collections.abc import Collection, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import chain, groupby
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
@@ -187,7 +187,8 @@ class Backwards:
         """Of derivatives to samples."""
         return np.dtype(np.float64 if self.drive.able.double else np.float32)
 
-    @cached_property
+    @property
+    @cached
     def _blocks(self) -> list[Block]:
         """The blocks of which any view is looked at."""
         blocks = self.drive.blocks if self.drive.in_memory else self._cut()

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import late
+from vcc.base.cached import is_computed, preset
 from vcc.base.workers import Workers
 from vcc.engines import abilities, chosen
 from vcc.fields.samples import Samples
@@ -118,8 +119,8 @@ def _together(one: Drive, other: Drive) -> bool:
 
 def _after(last: Drive, drive: Drive) -> Drive:
     """A plan on its way, with the samples that the last one has prepared where its own are the same."""
-    if drive.in_memory and _together(last, drive) and "prepared" in vars(last):
-        drive.prepared = last.prepared
+    if drive.in_memory and _together(last, drive) and is_computed(last, "prepared"):
+        preset(drive, prepared=last.prepared)
     return drive
 
 
@@ -148,7 +149,7 @@ def _made(batch: Sequence[Drive], pool: Workers, then: Callable[[int, Partial], 
         rasters = over_blocks(batch, first.reading_for(batch).blocks)
         return list(pool.map(then, range(len(batch)), rasters))
     for drive in batch:
-        drive.prepared = first.prepared  # once for all, for the way back, too
+        preset(drive, prepared=first.prepared)  # once for all, for the way back, too
     return made_of(first, [drive.core for drive in batch], first.prepared, pool, then)
 
 

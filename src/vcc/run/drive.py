@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import late
+from vcc.base.cached import cached, is_computed, preset
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
@@ -177,7 +178,8 @@ class Drive:
         """How many there are, 1 without a channel axis."""
         return self.samples.grid.channels or 1
 
-    @cached_property
+    @property
+    @cached
     def need(self) -> Need:
         """What blocks take of memory."""
         threads = self.threads if self.crew is None else self.sent.how.workers
@@ -189,7 +191,8 @@ class Drive:
             need = replace(need, bands=self.plan.core.bands)
         return need if self.crew is None else need.with_sums()
 
-    @cached_property
+    @property
+    @cached
     def sent(self) -> Sent:
         """What goes to those that run the blocks elsewhere."""
         assert isinstance(self.given, Carried)
@@ -200,7 +203,8 @@ class Drive:
         )
         return Sent.of(self.plan, self.given, how)
 
-    @cached_property
+    @property
+    @cached
     def blocks(self) -> Blocks:
         """The blocks that the light field is cut into.
 
@@ -293,29 +297,33 @@ class Drive:
     def _run(self, core: Any, values: Any, beside: int, progress: Progress | None = None) -> Partial:
         return self.engine.run(core, values, beside=int(beside > 0), threads=self.threads, progress=progress)
 
-    @cached_property
+    @property
+    @cached
     def taken(self) -> Any:
         """What the core is run on where all samples are in memory: `prepared`, which others may have made already,
         or what rays prepare where they look at it."""
-        if self.plan.by_rays and "prepared" not in vars(self):
+        if self.plan.by_rays and not is_computed(self, "prepared"):
             whole = self.samples.whole()
             found = self.engine.prepared(self.plan.before, whole, self.threads, self.core)
             if not isinstance(found, type(whole)):
                 return found
-            self.prepared = found
+            preset(self, prepared=found)
         return self.prepared
 
-    @cached_property
+    @property
+    @cached
     def prepared(self) -> Any:
         """All samples in memory as the core takes them, the same for each round of rays."""
         return self.engine.prepared(self.plan.before, self.samples.whole(), self.threads)
 
-    @cached_property
+    @property
+    @cached
     def used(self) -> NDArray[np.bool_]:
         """Which views are looked at, (v, u)."""
         return self.plan.used_views(self.samples.grid.shape)
 
-    @cached_property
+    @property
+    @cached
     def shared(self) -> Any:
         """What plans that are run together have in common: which samples they look at, and what is done with these
         before; None where that is another thing for each plan, or a matter of several rounds."""
@@ -339,14 +347,15 @@ class Drive:
         if len(drives) == 1:
             return self
         made = copy(self)
-        made.used, made.limit = np.logical_or.reduce([drive.used for drive in drives]), self.limit * SHARED
-        made.__dict__.pop("blocks", None)
+        made.limit = self.limit * SHARED
+        used = np.logical_or.reduce([drive.used for drive in drives])
+        preset(made, used=used, blocks=cut_evenly(used, self.samples.grid, self.need, made.limit))
         return made
 
     def looking_as(self, plan: Plan) -> Drive:
         """The same with all views read that another plan looks at."""
         made = copy(self)
-        made.used = plan.used_views(self.samples.grid.shape)
+        preset(made, used=plan.used_views(self.samples.grid.shape))
         return made
 
     def used_in(self, block: Block) -> int:

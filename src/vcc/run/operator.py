@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import late
+from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.fields.disparity import Disparities
@@ -112,7 +112,8 @@ class Operator:
         """(v, u, t, s) or (v, u, t, s, channels)."""
         return self.light_field.grid.shape
 
-    @cached_property
+    @property
+    @cached
     def dtype(self) -> np.dtype[Any]:
         """Of what is given back: float32, or float64 by ``engine="reference"``."""
         return np.dtype(np.float64 if self._drive(self.light_field).able.double else np.float32)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import abc
 import math
 from dataclasses import dataclass, field, fields
-from functools import cached_property
 from numbers import Real
 from typing import Any, ClassVar
 
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.describe import kind_in_words
 from vcc.base.errors import InputError
 from vcc.base.units import short
@@ -45,7 +45,8 @@ class Sheet(Surface):
     def size(self) -> tuple[float, float]:
         """(width, height) of the sheet, metres."""
 
-    @cached_property
+    @property
+    @cached
     def _spline(self) -> Any:
         from scipy.interpolate import RectBivariateSpline
 
@@ -60,7 +61,8 @@ class Sheet(Surface):
         ]
         return RectBivariateSpline(y, x, path, bbox=bounds, kx=3, ky=3, s=0)
 
-    @cached_property
+    @property
+    @cached
     def _gradient(self) -> tuple[Any, Any]:
         """Splines of (∂OPL/∂x, ∂OPL/∂y)."""
         return self._spline.partial_derivative(0, 1), self._spline.partial_derivative(1, 0)
@@ -70,7 +72,8 @@ class Sheet(Surface):
         """Nothing where the sheet is flat."""
         return Affine.identity() if self._flat else None
 
-    @cached_property
+    @property
+    @cached
     def _flat(self) -> bool:
         return not np.ptp(self._samples()[2])
 

@@ -12,7 +12,6 @@ import abc
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.describe import instead_of_name, kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
@@ -441,7 +441,8 @@ class Cells(Value, Pattern):
         place = self._place
         return y * place.matrix[1, 1] + place.offset[1] + 0.5, x * place.matrix[0, 0] + place.offset[0] + 0.5
 
-    @cached_property
+    @property
+    @cached
     def _place(self) -> Affine:
         """Maps (x, y, 1) to (column, row, 1) of cells."""
         return self.frame.inverse()

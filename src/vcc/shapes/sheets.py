@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property, partial, reduce
+from functools import partial, reduce
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
@@ -143,7 +144,8 @@ class Tiles(Brief, Pattern):
             content = at(bottom, right) - at(bottom, left) - at(top, right) + at(top, left)
         return np.asarray(np.clip(content / (width * height), 0.0, None))
 
-    @cached_property
+    @property
+    @cached
     def _integral(self) -> Array:
         """The integral over (−∞, x] × (−∞, y] at the borders, m²."""
         total = np.zeros((len(self.rows), len(self.columns)))
@@ -237,7 +239,8 @@ class Product(Pattern):
             return np.asarray(np.mean(np.broadcast_arrays(*inside), axis=0))
         return found
 
-    @cached_property
+    @property
+    @cached
     def factors(self) -> tuple[Pattern, ...]:
         """The patterns, all that are made of rectangles multiplied to one, and what is clear left out."""
         # What is open or opaque is the same twice: two equal rims in one plane are one.

@@ -8,7 +8,6 @@ import platform
 import warnings
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.errors import CacheWarning, InputError, ResultWarning
 from vcc.base.progress import Progress, tell
 from vcc.base.reading import (
@@ -74,7 +74,8 @@ class StoredLightField(OnGrid):
     array: Any
     held: Held | None = None
 
-    @cached_property
+    @property
+    @cached
     def grid(self) -> Grid:
         """The light field without its samples: cameras compile it, and a piece of it costs nothing."""
         return Grid(
@@ -291,7 +292,8 @@ class StoredLightField(OnGrid):
             )
         return samples
 
-    @cached_property
+    @property
+    @cached
     def _chunked(self) -> Chunked | None:
         """How the files of views are cut into chunks."""
         return Chunked.of(self.array)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.camera import Camera
@@ -199,7 +199,8 @@ class Cameras(Brief, Sequence[Camera]):
         """
         _ = self.sensors
 
-    @cached_property
+    @property
+    @cached
     def sensors(self) -> tuple[Sensor, ...]:
         """The sensors of all cameras; those that stay as they are are one thing."""
         found = []
@@ -226,7 +227,8 @@ class Cameras(Brief, Sequence[Camera]):
 
         return sorted(range(len(self)), key=others)
 
-    @cached_property
+    @property
+    @cached
     def _cameras(self) -> dict[int, Camera]:
         return {}
 
@@ -249,7 +251,8 @@ class Cameras(Brief, Sequence[Camera]):
             self._parameters[key] = place(base, name, value)
         return self._parameters[key]
 
-    @cached_property
+    @property
+    @cached
     def _parameters(self) -> dict[Any, Parameter]:
         return {}
 

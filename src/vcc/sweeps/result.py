@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from types import TracebackType
 from typing import Any, Self
 
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.camera import Camera
@@ -111,7 +111,8 @@ class Sweep(Shown):
         made: Camera = self.cameras[int(np.ravel_multi_index(within, self.shape))]
         return made
 
-    @cached_property
+    @property
+    @cached
     def table(self) -> Table:
         """A row for each camera: its parameters, and what is told of its picture."""
         count, columns = len(self), {}

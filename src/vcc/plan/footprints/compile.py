@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.values import content
 from vcc.fields.grid import Grid
@@ -206,22 +207,26 @@ class _Stages:
         self.grid = grid if blurs.views is None else grid.grown(*(n // 2 for n in blurs.views.shape))
         self.sharp = how.interpolation == "sharp"
 
-    @cached_property
+    @property
+    @cached
     def landing(self) -> Landing:
         """Where samples fall on the sensor."""
         return Landing.of(self.train, self.grid, self.decisions)
 
-    @cached_property
+    @property
+    @cached
     def between(self) -> BetweenViews:
         """What is between views."""
         return between_views_of(self.grid, self.landing.frame, self.landing.pixels, self.how, self.decisions)
 
-    @cached_property
+    @property
+    @cached
     def absorbing(self) -> Absorbing:
         """Masks, by where samples meet them."""
         return Absorbing.of(self.train, self.landing, self.between.motion, self.decisions)
 
-    @cached_property
+    @property
+    @cached
     def divided(self) -> Divided:
         """How cells of views and samples are divided."""
         grid, how, landing = self.grid, self.how, self.landing
@@ -250,7 +255,8 @@ class _Stages:
         )
         return Divided(geometry, cells, samples)
 
-    @cached_property
+    @property
+    @cached
     def open_taps(self) -> OpenTaps:
         """Parts of views that masks at the views leave light."""
         rows, columns = ((before == 0, after == 0) for before, after in self.grid.beyond[:2])
@@ -267,7 +273,8 @@ class _Stages:
         kept = np.ix_(*used)
         return OpenTaps(aperture, kept, taps.some(*used), weights[kept], parts.middle[kept])
 
-    @cached_property
+    @property
+    @cached
     def masks_as_met(self) -> tuple[tuple[MaskLookup, Textured], ...]:
         """Masks in mid-path as samples meet them, and how their textures were made."""
         taps, divided = self.open_taps.taps, self.divided
@@ -281,7 +288,8 @@ class _Stages:
 
         return tuple(met(n, plane) for n, plane in enumerate(self.absorbing.in_path))
 
-    @cached_property
+    @property
+    @cached
     def core(self) -> Footprints:
         """The footprints, before what is done around them."""
         landing, taps, samples = self.landing, self.open_taps.taps, self.divided.samples
@@ -303,7 +311,8 @@ class _Stages:
             opening=math.sqrt(self.sensor.fill_factor),
         )
 
-    @cached_property
+    @property
+    @cached
     def around(self) -> Around:
         """What is done before and after them."""
         down, across = (gap / self.divided.cells.parts for gap in self.between.gap_filled)

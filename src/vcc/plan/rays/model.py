@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.plan.rays.points import DIGITS, TABLE, hashed
@@ -99,7 +99,8 @@ class Rays(Value):
         """With so many rays a pixel, to be taken beside as many that there are."""
         return replace(self, samples=samples)
 
-    @cached_property
+    @property
+    @cached
     def reach(self) -> Reach | None:
         """How far rays reach, where all that they meet is affine and x and y do not mix; else None."""
         matrix = index_from_sensor(self.aim, self.steps, self.index_from_ray, self.motion)

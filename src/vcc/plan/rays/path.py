@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
 from vcc.optics.scatter import Scatter
@@ -62,7 +62,8 @@ class Path(Brief):
     samples: int
     decisions: Decisions = ANEW
 
-    @cached_property
+    @property
+    @cached
     def legs(self) -> tuple[Leg, ...]:
         """The stages as rays meet them, the last one of the train first."""
         stages, stops = self.train.stages, _stops(self.train.stages, self.decisions)
@@ -75,28 +76,33 @@ class Path(Brief):
             column += 0 if stage.faces.spread is None else columns_of(stage.faces.spread)
         return tuple(legs)
 
-    @cached_property
+    @property
+    @cached
     def scatters(self) -> tuple[Scatter, ...]:
         """All that scatters rays, in the order in which they meet it."""
         met = (stage.faces.spread for stage in reversed(self.train.stages))
         return tuple(spread for spread in met if spread is not None)
 
-    @cached_property
+    @property
+    @cached
     def _entrance_from_sensor(self) -> Affine:
         return self.train.arriving_at_sensor.inverse()
 
-    @cached_property
+    @property
+    @cached
     def entrance_from_last(self) -> Affine:
         """Rays in the entrance plane from rays just behind the stage that is nearest to it."""
         stages = self.train.stages
         return _undone(stages[0]) if stages else self.train.approach_to_sensor.inverse()
 
-    @cached_property
+    @property
+    @cached
     def index_from_entrance(self) -> Affine:
         """Indices (i, j, k, l) of the light field from rays in the entrance plane."""
         return self.grid.frame.inverse()
 
-    @cached_property
+    @property
+    @cached
     def index_from_sensor(self) -> Affine:
         """Indices (i, j, k, l) of the light field from rays on the sensor, through affine optics alone."""
         return self.index_from_entrance @ self._entrance_from_sensor
@@ -131,7 +137,8 @@ class Path(Brief):
         faded = np.concatenate([np.zeros(2), 0.5 + np.abs(self.motion).sum(axis=1)])
         return np.asarray(self.size / 2 + faded)
 
-    @cached_property
+    @property
+    @cached
     def stops_bound(self) -> bool:
         """Whether stops bound the slopes of rays, so that they say which light is wanted, not the grid of views.
 
