@@ -13,6 +13,7 @@ import pytest
 
 import vcc
 from tests.run.test_executors import FOCUS, in_blocks, light_field  # noqa: F401  # fixtures
+from vcc.base.cached import preset
 from vcc.base.units import mm
 from vcc.camera import captured_together
 from vcc.plan.how import How
@@ -100,7 +101,7 @@ def test_where_there_is_not_even_room_for_whole_views_cameras_come_one_by_one(st
     need = replace(drive.Drive(plan, stored, How(threads=1)).need, raster=500)
     for within, most in ((need.least_for_views, True), (need.least_for_views - 1, False)):
         made = drive.Drive(plan, stored, How(threads=1, memory_limit=2 * within))
-        made.need = need
+        preset(made, need=need)
         assert made.most_at_once == (int(within / 2000) - 1 if most else 1)
     assert int(need.least_for_views / 2000) > 10
     # Where sums leave no room for threads there is one camera at least.
