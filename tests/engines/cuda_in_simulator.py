@@ -14,6 +14,7 @@ import pytest
 import torch
 from numba import cuda
 from numba.cuda.simulator.cudadrv.devicearray import FakeCUDAArray
+from numba.cuda.simulator.kernel import FakeCUDAKernel
 
 import vcc
 from benchmarks import gpu
@@ -23,7 +24,7 @@ from tests.engines.test_ray_agreement import camera as elements_before
 from tests.engines.test_ray_agreement import field as field_of_rays
 from vcc.base.units import mm
 from vcc.engines import cuda as engine
-from vcc.engines import cuda_back, cuda_footprints, cuda_tables, reference
+from vcc.engines import cuda_arrays, cuda_back, cuda_footprints, cuda_tables, reference
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.how import How
 from vcc.run.drive import Drive
@@ -235,6 +236,7 @@ class Elsewhere:
     """An array on the GPU, of another library: what it shows is the CUDA array interface."""
 
     requires_grad = False
+    device = SimpleNamespace(id=0)
 
     def __init__(self, array: np.ndarray) -> None:
         self.array, self.shape, self.dtype, self.ndim = array, array.shape, array.dtype, array.ndim
@@ -254,10 +256,16 @@ class Elsewhere:
         return Elsewhere(self.array[index])
 
 
+THEIRS = 77
+"""The stream that another library works in."""
+
+
 @pytest.fixture
 def _another_library(monkeypatch):
     """The arrays are CuPy's, by name, and the simulator takes them as they lie (it takes none itself)."""
-    of_cupy = SimpleNamespace(asarray=lambda there: Elsewhere(there._ary), ndarray=Elsewhere)
+    streams = SimpleNamespace(get_current_stream=lambda: SimpleNamespace(ptr=THEIRS))
+    of_cupy = SimpleNamespace(asarray=lambda there: Elsewhere(there._ary), ndarray=Elsewhere, cuda=streams)
+    monkeypatch.setattr(cuda, "external_stream", lambda number: number)
     monkeypatch.setattr(Elsewhere, "__module__", "cupy")
     monkeypatch.setitem(sys.modules, "cupy", of_cupy)
     monkeypatch.setattr(cuda, "as_cuda_array", lambda values: FakeCUDAArray(values.array), raising=False)
@@ -277,6 +285,66 @@ def test_arrays_that_are_on_the_gpu_are_taken_and_given_as_they_are():
     core, values = CORES["two masks"]
     found = engine.back(core, Elsewhere(values), np.ones((*core.raster_shape, 3)), threads=1)
     assert isinstance(found.samples, Elsewhere)
+
+
+@pytest.mark.usefixtures("_another_library")
+def test_kernels_wait_for_the_stream_of_their_library_which_waits_for_them(monkeypatch):
+    """What PyTorch and CuPy start in a stream of their own is not ordered with the default stream by itself."""
+    said = []
+
+    class Event:
+        def record(self, stream=0):
+            self.stream = stream
+
+        def wait(self, stream=0):
+            said.append((stream, "waits for", self.stream))
+
+    started = FakeCUDAKernel.__call__
+
+    def start(kernel, *arguments):
+        said.append("a kernel")
+        return started(kernel, *arguments)
+
+    monkeypatch.setattr(cuda, "event", Event)
+    monkeypatch.setattr(FakeCUDAKernel, "__call__", start)
+    core, values = CORES["two masks"]
+    rays = small(elements_before("cubic plate")).compile(field(values), method="rays", samples=4).core
+    weights = np.ones((*core.raster_shape, 3))
+    for work in (
+        lambda: engine.run(core, Elsewhere(values), threads=1),
+        lambda: engine.run(rays, Elsewhere(values), threads=1),
+        lambda: engine.back(core, Elsewhere(values), weights, wanted=["weights"], threads=1),
+    ):
+        work()
+        assert (said[0], said[-1]) == ((0, "waits for", THEIRS), (THEIRS, "waits for", 0))
+        assert set(said[1:-1]) == {"a kernel"}
+        said.clear()
+
+
+def test_places_of_pinned_memory_are_kept_from_run_to_run(monkeypatch):
+    made = []
+    pinned = cuda.pinned_array
+    monkeypatch.setattr(cuda, "pinned_array", lambda *given: made.append(given) or pinned(*given))
+    monkeypatch.setattr(cuda_footprints, "_kept", {})
+    monkeypatch.setattr(cuda_footprints, "SENT_AT_ONCE", 1)
+    core, values = CORES["three channels"]
+    for light, threads in ((values, 1), (values, 3), (values.astype(np.uint8), 1)):
+        engine.run(core, light, threads=threads)
+    assert len(made) == 2
+
+
+def test_tables_are_those_of_the_gpu_in_use(monkeypatch):
+    core, _ = CORES["two masks"]
+    here = cuda_tables.tables_of(core)
+    monkeypatch.setattr(cuda_arrays, "this_gpu", lambda: 1)
+    assert cuda_tables.tables_of(core) is not here
+
+
+def test_small_launches_are_as_many_blocks_as_numba_does_not_warn_of():
+    for places in ((1, 1, 1), (3, 2, 5), (1000, 70000, 70000), (1, 127, 1)):
+        x, y, z = cuda_arrays._blocks(*places)
+        assert x * y * z >= 128
+        assert (x >= places[0], y <= 65535, z <= 65535) == (True, True, True)
 
 
 @pytest.mark.usefixtures("_another_library")

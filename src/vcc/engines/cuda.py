@@ -42,9 +42,10 @@ def run(
     core: Footprints | Rays, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
 ) -> Partial:
     """The raster of samples (v, u, t, s[, channels]), float32; see `vcc.plan.protocol.Engine`."""
-    if isinstance(core, Rays):
-        return cuda_rays.traced(core, values, beside, progress)
-    return Partial(cuda_footprints.raster_of(core, values, progress))
+    with cuda_arrays.in_turn_with(values):
+        if isinstance(core, Rays):
+            return cuda_rays.traced(core, values, beside, progress)
+        return Partial(cuda_footprints.raster_of(core, values, progress, threads))
 
 
 def back(
@@ -69,11 +70,12 @@ def back(
     if isinstance(core, Rays):
         raise InputError("engine 'cuda' does not go backwards through rays: use engine='numba', with NumPy arrays")
     cuda_back.check_known(core, wanted)
-    return Gradient.of(
-        partial(cuda_back.samples_back, core, values, raster) if samples else None,
-        partial(cuda_back.numbers_back, core, values, raster, wanted) if wanted else None,
-        progress,
-    )
+    with cuda_arrays.in_turn_with(values):
+        return Gradient.of(
+            partial(cuda_back.samples_back, core, values, raster) if samples else None,
+            partial(cuda_back.numbers_back, core, values, raster, wanted, threads=threads) if wanted else None,
+            progress,
+        )
 
 
 def prepared(

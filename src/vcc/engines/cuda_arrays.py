@@ -1,5 +1,8 @@
 """Arrays on the GPU: how they get there and back, and how kernels are started on them.
 
+The one module that imports CUDA for Python: others take ``cuda`` and the types of numbers from here, so that a
+successor of numba-cuda is a matter of one line.
+
 Samples come as NumPy arrays, which are copied, or as arrays that are on the GPU already (PyTorch's, CuPy's,
 Numba's: all that have the CUDA array interface), which are taken where they are. What is made of them goes back to
 the library that they came from.
@@ -11,13 +14,19 @@ import importlib.util
 import math
 import sys
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import fields
 from threading import Lock
 from typing import Any
 
 import numpy as np
-from numba import cuda
+from numba import cuda as cuda
+from numba import float32 as float32
+from numba import float64 as float64
+from numba import int32 as int32
+from numba import int64 as int64
+from numba import uint32 as uint32
 from numba.core import config
 from numpy.typing import NDArray
 
@@ -27,8 +36,13 @@ THREADS = 128
 """Of a block, side by side along memory: four warps, each of which reads one piece of memory. Small blocks leave
 few multiprocessors without work at a launch's end, and no kernel here shares anything between the threads of a
 block."""
+FEWEST_BLOCKS = 128
+"""Of a launch. Numba warns of fewer, since most of a GPU is idle then; what is small here is meant to be small,
+and blocks without work end at once."""
 KEPT = 4
-"""Plans whose tables stay on the GPU: those that were used last."""
+"""Plans whose tables stay on each GPU: those that were used last."""
+DEFAULT_STREAM = 0
+"""In which kernels run on samples that are on the GPU already."""
 MOST_BLOCKS = 65535
 """Along the second and the third axis of a launch; what is beyond is done by the same threads, later."""
 SIMULATED = bool(config.ENABLE_CUDASIM)
@@ -72,11 +86,63 @@ def launch(kernel: Any, threads: tuple[int, ...], stream: Any, *arguments: Any) 
         return
     # In the simulator a thread of Python stands for each of the GPU's: a few do all places, in two blocks.
     wide = 2 if SIMULATED else THREADS
-    blocks = (2, 1, min(z, 2)) if SIMULATED else (math.ceil(x / wide), min(y, MOST_BLOCKS), min(z, MOST_BLOCKS))
-    quiet, config.CUDA_LOW_OCCUPANCY_WARNINGS = config.CUDA_LOW_OCCUPANCY_WARNINGS, 0  # small pictures are small
-    configured = kernel[blocks, (wide, 1, 1), stream]
-    config.CUDA_LOW_OCCUPANCY_WARNINGS = quiet
-    configured(*arguments)
+    blocks = (2, 1, min(z, 2)) if SIMULATED else _blocks(math.ceil(x / wide), y, z)
+    kernel[blocks, (wide, 1, 1), stream](*arguments)
+
+
+def _blocks(x: int, y: int, z: int) -> tuple[int, int, int]:
+    y, z = min(y, MOST_BLOCKS), min(z, MOST_BLOCKS)
+    return max(x, math.ceil(FEWEST_BLOCKS / (y * z))), y, z
+
+
+@contextmanager
+def in_turn_with(values: Any) -> Iterator[None]:
+    """Work on the GPU on which samples lie: what their library has started before comes first, and what it starts
+    afterwards waits for this.
+
+    PyTorch and CuPy start their work in a current stream of their own, which neither waits for the default stream
+    nor is waited for by it.
+
+    Args:
+        values: samples, of any library.
+
+    Raises:
+        InputError: what `is_on_gpu` refuses.
+    """
+    library = _library(values) if is_on_gpu(values) else ""
+    if library == "torch":
+        number = values.device.index
+        theirs = sys.modules["torch"].cuda.current_stream(values.device).cuda_stream
+    elif library == "cupy":
+        number, theirs = values.device.id, sys.modules["cupy"].cuda.get_current_stream().ptr
+    else:
+        yield
+        return
+    with cuda.gpus[number]:
+        stream = cuda.external_stream(theirs) if theirs else DEFAULT_STREAM
+        wait_for(stream, DEFAULT_STREAM)
+        try:
+            yield
+        finally:
+            wait_for(DEFAULT_STREAM, stream)
+
+
+def wait_for(one: Any, other: Any) -> None:
+    """What is started in another stream from now on waits for what was started in one."""
+    if one is not other:
+        reached = cuda.event()
+        reached.record(one)
+        reached.wait(other)
+
+
+def _library(values: Any) -> str:
+    """The package that an array comes from."""
+    return type(values).__module__.split(".")[0]
+
+
+def this_gpu() -> int:
+    """The number of the GPU that kernels run on now."""
+    return 0 if SIMULATED else int(cuda.get_current_device().id)
 
 
 def sent(array: NDArray[Any], stream: Any = 0) -> Any:
@@ -185,7 +251,7 @@ def given_back(array: Any, like: Any) -> Any:
         array: on the GPU.
         like: the samples.
     """
-    library = type(like).__module__.split(".")[0]
+    library = _library(like)
     if library == "torch":
         return sys.modules["torch"].as_tensor(array, device=like.device)
     if library == "cupy":
@@ -200,7 +266,7 @@ def device(function: Any) -> Any:
 
 
 class LastUsed:
-    """What was made of the plans' cores that were used last.
+    """What was made, on each GPU, of the plans' cores that were used last.
 
     A core's arrays are never written to: cores that share all of them are alike, but for what a sample stands for.
 
@@ -210,17 +276,18 @@ class LastUsed:
 
     def __init__(self, make: Callable[[Any], Any]) -> None:
         self.make = make
-        self._kept: deque[tuple[Any, Any]] = deque(maxlen=KEPT)
+        self._kept: dict[int, deque[tuple[Any, Any]]] = {}
         self._lock = Lock()
 
     def of(self, core: Any) -> Any:
-        """What is there of a core, or is made now."""
+        """What is on this GPU of a core, or is made now."""
         with self._lock:
-            for known, made in self._kept:
+            here = self._kept.setdefault(this_gpu(), deque(maxlen=KEPT))
+            for known, made in here:
                 if _alike(known, core):
                     return made
             made = self.make(core)
-            self._kept.append((core, made))
+            here.append((core, made))
             return made
 
 

@@ -8,13 +8,12 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-from numba import cuda
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.engines import cuda_back_kernels as kernels
-from vcc.engines.cuda_arrays import brought, given_back, is_on_gpu, launch, sent, zeros
+from vcc.engines.cuda_arrays import brought, cuda, given_back, is_on_gpu, launch, sent, zeros
 from vcc.engines.cuda_footprint_kernels import Source
 from vcc.engines.cuda_footprints import ROOM, Piece, Pieces, divided
 from vcc.engines.cuda_tables import Tables, mask_rows, tables_of
@@ -90,6 +89,7 @@ def numbers_back(
     raster: NDArray[np.floating],
     wanted: Collection[str],
     progress: Progress | None = None,
+    threads: int = 1,
 ) -> dict[str, Array]:
     """The derivative of ⟨raster, the raster of the samples⟩ to some of the core's numbers, float64.
 
@@ -99,6 +99,7 @@ def numbers_back(
         raster: weights of the raster's values, (rows, columns, channels).
         wanted: names of masks' textures, ``weights`` and ``scale``.
         progress: called with (done, total) in view taps.
+        threads: that fill pieces of samples in main memory.
     """
     tables = tables_of(core)
     back = _Back(tables, raster)
@@ -106,7 +107,8 @@ def numbers_back(
     of_taps = np.zeros(core.weights.shape) if {"weights", "scale"} & set(wanted) else None
     textures = {n: zeros((PARTS, *core.masks[n].texture.shape)) for n in masks}
     line = tables.fine.rows * tables.fine.columns
-    with tables.lock, Pieces(tables, values, 4 * len(core.view_rows) * line, opened=of_taps is not None) as pieces:
+    opened, more = of_taps is not None, 4 * len(core.view_rows) * line
+    with tables.lock, Pieces(tables, values, more, opened, threads) as pieces:
         for done, piece in enumerate(pieces):
             tell(progress, done, len(core.view_columns))
             source = back.source(piece, of_taps is not None)

@@ -12,9 +12,9 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cuda, float32, float64
 from numpy.typing import NDArray
 
+from vcc.engines.cuda_arrays import cuda, float32, float64
 from vcc.engines.cuda_footprint_kernels import around, mask_at, passed
 from vcc.engines.numba_kernels import farthest, share_at
 

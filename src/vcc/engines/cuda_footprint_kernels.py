@@ -14,9 +14,9 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cuda, float32, int32, uint32
 from numpy.typing import NDArray
 
+from vcc.engines.cuda_arrays import cuda, float32, int32, uint32
 from vcc.engines.numba_kernels import farthest, share_at
 from vcc.engines.splines import dark_outside, three_around
 
@@ -74,6 +74,20 @@ class MaskRows(NamedTuple):
     begin: NDArray[np.int32]
     near: NDArray[np.int32]
     off: NDArray[np.float32]
+
+
+class MaskGroups(NamedTuple):
+    """View taps that look a mask up in the same columns, so that they share its lines.
+
+    Args:
+        mask: (groups,) int32, its number.
+        column: (groups,) float64, of its texture at the first column of samples.
+        begin: (groups,) int64, where the group's lines begin.
+    """
+
+    mask: NDArray[np.int32]
+    column: NDArray[np.float64]
+    begin: NDArray[np.int64]
 
 
 class Places(NamedTuple):
@@ -197,27 +211,31 @@ def mask_places(row, step, rows, near, off):  # type: ignore[no-untyped-def]
 
 
 @cuda.jit
-def mask_lines(textures, m, rows, columns, column, step, width, begin, lines):  # type: ignore[no-untyped-def]
-    """Lines from ``begin`` on: rows of a mask's texture at column + step · k, by quadratic B-splines, dark
-    outside.
+def mask_lines(masks, groups, refine, width, lines):  # type: ignore[no-untyped-def]
+    """Rows of masks' textures at the columns of samples, by quadratic B-splines, dark outside.
 
-    textures: (masks, rows, columns), of which this one fills so many. lines, width: see `MaskRows`.
+    masks: `vcc.engines.footprint_tables.Textures`. groups: `MaskGroups`. lines, width: see `MaskRows`.
     """
-    x, y = cuda.grid(2)
-    wide, high = cuda.gridsize(2)
-    for line in range(y, rows + 2 * DARK, high):
-        r = line - DARK
-        for k in range(x, width, wide):
-            c, before, at, after = three_around(min(max(column + step * k, -2.0), columns + 1.0))
-            found = float32(0)
-            if 0 <= r < rows:
-                if 0 < c <= columns:
-                    found += before * textures[m, r, c - 1]
-                if 0 <= c < columns:
-                    found += at * textures[m, r, c]
-                if -1 <= c < columns - 1:
-                    found += after * textures[m, r, c + 1]
-            lines[(begin + line) * width + k] = found
+    x, y, z = cuda.grid(3)
+    wide, high, deep = cuda.gridsize(3)
+    textures, size, step = masks
+    for group in range(z, groups.mask.size, deep):
+        m = groups.mask[group]
+        rows, columns, along = size[m, 0], size[m, 1], step[m, 0, 0] / refine
+        for line in range(y, rows + 2 * DARK, high):
+            r = line - DARK
+            for k in range(x, width, wide):
+                column = groups.column[group] + along * k
+                c, before, at, after = three_around(min(max(column, -2.0), columns + 1.0))
+                found = float32(0)
+                if 0 <= r < rows:
+                    if 0 < c <= columns:
+                        found += before * textures[m, r, c - 1]
+                    if 0 <= c < columns:
+                        found += at * textures[m, r, c]
+                    if -1 <= c < columns - 1:
+                        found += after * textures[m, r, c + 1]
+                lines[(groups.begin[group] + line) * width + k] = found
 
 
 @cache

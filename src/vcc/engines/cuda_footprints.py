@@ -13,13 +13,24 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import cuda
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.progress import Progress, tell
+from vcc.base.workers import Workers
 from vcc.engines import cuda_footprint_kernels as kernels
-from vcc.engines.cuda_arrays import arranged, given_back, is_on_gpu, launch, sent, taken, zeros
+from vcc.engines.cuda_arrays import (
+    arranged,
+    cuda,
+    given_back,
+    is_on_gpu,
+    launch,
+    sent,
+    taken,
+    this_gpu,
+    wait_for,
+    zeros,
+)
 from vcc.engines.cuda_tables import Tables, mask_rows, tables_of
 from vcc.plan.footprints.model import Footprints
 
@@ -29,17 +40,22 @@ SENT_AT_ONCE = 2**25
 """Bytes of samples that are sent to the GPU at once: enough for the full speed of the way there."""
 
 
-def raster_on_gpu(core: Footprints, values: Any, progress: Progress | None = None) -> Any:
+COPYING = 4
+"""Threads that fill a piece of pinned memory, at most: more are no faster than memory."""
+
+
+def raster_on_gpu(core: Footprints, values: Any, progress: Progress | None = None, threads: int = 1) -> Any:
     """The raster (rows, columns, channels) of samples, float32, on the GPU.
 
     Args:
         core: the footprints.
         values: samples (v, u, t, s[, channels]), of NumPy or on the GPU.
         progress: called with (done, total) in view taps.
+        threads: that fill pieces of samples in main memory.
     """
     channels = values.shape[4] if len(values.shape) == 5 else 1
     tables, done = tables_of(core), 0
-    reading = Pieces(tables, values)
+    reading = Pieces(tables, values, threads=threads)
     run = _Run(tables, core.scale, channels, reading.stream)
     with tables.lock, reading as pieces:
         for piece in pieces:
@@ -50,9 +66,9 @@ def raster_on_gpu(core: Footprints, values: Any, progress: Progress | None = Non
     return run.raster
 
 
-def raster_of(core: Footprints, values: Any, progress: Progress | None = None) -> Any:
+def raster_of(core: Footprints, values: Any, progress: Progress | None = None, threads: int = 1) -> Any:
     """The same in the library of the samples."""
-    return given_back(raster_on_gpu(core, values, progress), values)
+    return given_back(raster_on_gpu(core, values, progress, threads), values)
 
 
 # --- samples, piece by piece ---
@@ -83,9 +99,10 @@ class Pieces:
         values: (v, u, t, s[, channels]).
         more: bytes of the GPU's memory that a column of view taps takes beside those of the tables.
         opened: whether columns count in which no tap lets light through.
+        threads: that copy samples to pinned memory.
     """
 
-    def __init__(self, tables: Tables, values: Any, more: int = 0, opened: bool = False) -> None:
+    def __init__(self, tables: Tables, values: Any, more: int = 0, opened: bool = False, threads: int = 1) -> None:
         self.tables, self.core, self.values = tables, tables.core, values
         self.on_gpu = is_on_gpu(values)
         column = 0 if self.on_gpu else values[:, :1].nbytes
@@ -94,16 +111,23 @@ class Pieces:
         at_once = min(ROOM // max(each, 1), SENT_AT_ONCE // column if column else ROOM)
         self.columns = int(max(at_once, 1))
         self.stream: Any = 0 if self.on_gpu else cuda.stream()
+        self.threads = min(threads, COPYING)
 
     def __enter__(self) -> Iterator[Piece]:
         total = len(self.core.view_columns)
         spans = [(a, min(a + self.columns, total)) for a in range(0, total, self.columns)]
         used = [(a, b) for a, b in spans if self.used[a:b].any()]
-        return self._there(used) if self.on_gpu else self._sent(used)
+        if self.on_gpu:
+            return self._there(used)
+        self.places, self.pool, self.copying = _free_places(), Workers(self.threads), cuda.stream()
+        return self._sent(used)
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, *error: Any) -> None:
         if not self.on_gpu:
+            self.pool.__exit__(*error)
+            self.copying.synchronize()
             self.stream.synchronize()
+            _keep(self.places)
 
     def _there(self, spans: list[tuple[int, int]]) -> Iterator[Piece]:
         values = arranged(taken(self.values))
@@ -111,13 +135,13 @@ class Pieces:
             yield Piece(self._source(values, 0, ()), start, stop, self.stream)
 
     def _sent(self, spans: list[tuple[int, int]]) -> Iterator[Piece]:
-        copying, places = cuda.stream(), (_Place(), _Place())
         for n, (start, stop) in enumerate(spans):
-            place = places[n % 2]
+            place = self.places[n % 2]
             columns = self.core.view_columns[start:stop]
             first = int(columns.min())
             part = self.values[:, first : int(columns.max()) + 1]
-            values = place.filled(part if self.values.ndim == 5 else part[..., None], copying, self.stream)
+            part = part if self.values.ndim == 5 else part[..., None]
+            values = place.filled(part, self.pool, self.copying, self.stream)
             yield Piece(self._source(values, first, (start, stop)), start, stop, self.stream)
             place.left(self.stream)
 
@@ -142,22 +166,43 @@ class _Place:
         self.there: Any = None
         self.free = cuda.event()
 
-    def filled(self, part: NDArray[Any], copying: Any, working: Any) -> Any:
-        """A piece of samples on the GPU, once kernels that are started in ``working`` from now on see it."""
+    def filled(self, part: NDArray[Any], pool: Workers, copying: Any, working: Any) -> Any:
+        """A piece of samples on the GPU, once kernels that are started in ``working`` from now on see it.
+
+        Args:
+            part: samples (v, u, t, s, channels) in main memory.
+            pool: whose threads copy them.
+            copying: the stream in which they are sent.
+            working: that in which they are summed.
+        """
         kind = np.dtype(np.float32) if part.dtype == np.float16 else part.dtype
+        size = part.size * kind.itemsize
         self.free.synchronize()  # what was here before is summed
-        if self.pinned.shape != part.shape or self.pinned.dtype != kind:
-            self.pinned, self.there = cuda.pinned_array(part.shape, kind), cuda.device_array(part.shape, kind)
-        self.pinned[...] = part
-        self.there.copy_to_device(self.pinned, stream=copying)
-        copied = cuda.event()
-        copied.record(copying)
-        copied.wait(working)
-        return self.there
+        if self.pinned.size < size:
+            self.pinned, self.there = cuda.pinned_array(size, np.uint8), cuda.device_array(size, np.uint8)
+        pinned = self.pinned[:size].view(kind).reshape(part.shape)
+        list(pool.map(lambda v: np.copyto(pinned[v], part[v]), range(len(part))))
+        there = self.there[:size]
+        there.copy_to_device(self.pinned[:size], stream=copying)
+        wait_for(copying, working)
+        return there.view(kind).reshape(part.shape)
 
     def left(self, working: Any) -> None:
         """All kernels that look here are started."""
         self.free.record(working)
+
+
+_kept: dict[int, tuple[_Place, _Place]] = {}
+"""Two places on each GPU, from run to run: to pin memory takes longer than to send what fits into it."""
+
+
+def _free_places() -> tuple[_Place, _Place]:
+    return _kept.pop(this_gpu(), None) or (_Place(), _Place())
+
+
+def _keep(places: tuple[_Place, _Place]) -> None:
+    """They are free again; of several pairs, from runs at one time, one is kept."""
+    _kept[this_gpu()] = places
 
 
 # --- the run ---

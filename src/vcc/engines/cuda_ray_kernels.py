@@ -11,10 +11,9 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import cuda, float32, float64, int64
 
 from vcc.engines import ray_kernels as shared
-from vcc.engines.cuda_arrays import device
+from vcc.engines.cuda_arrays import cuda, device, float32, float64, int64
 from vcc.engines.ray_tables import Drawn, Packet, Samples
 
 FLUSHED = 256
@@ -130,17 +129,19 @@ def look_up(field, samples, rays, found):  # type: ignore[no-untyped-def]
 
 
 @cuda.jit
-def put_together(pictures, tallies, rows):  # type: ignore[no-untyped-def]
-    """Of the two halves their sum and twice their difference; rows[r]: how many rays a row of pixels has."""
-    y = cuda.grid(1)
-    _, high, wide, channels = pictures.shape
-    for row in range(y, high, cuda.gridsize(1)):
+def put_together(halves):  # type: ignore[no-untyped-def]
+    """Of the two halves, (2, numbers), their sum and twice their difference."""
+    for n in range(cuda.grid(1), halves.shape[1], cuda.gridsize(1)):
+        one, two = halves[0, n], halves[1, n]
+        halves[0, n] = one + two
+        halves[1, n] = float32(2) * (one - two)
+
+
+@cuda.jit
+def count(tallies, of_columns):  # type: ignore[no-untyped-def]
+    """How many rays the pixels of a column have: neighbouring threads read neighbouring pixels."""
+    for column in range(cuda.grid(1), tallies.shape[1], cuda.gridsize(1)):
         total = int64(0)
-        for column in range(wide):
+        for row in range(tallies.shape[0]):
             total += tallies[row, column]
-        rows[row] = total
-        for column in range(wide):
-            for c in range(channels):
-                one, two = pictures[0, row, column, c], pictures[1, row, column, c]
-                pictures[0, row, column, c] = one + two
-                pictures[1, row, column, c] = float32(2) * (one - two)
+        of_columns[column] = total

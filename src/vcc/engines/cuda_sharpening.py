@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import cuda, float32, int32
 
-from vcc.engines.cuda_arrays import arranged, launch
+from vcc.engines.cuda_arrays import arranged, cuda, float32, int32, launch
 from vcc.plan.operators import KEPT_DIGITS, REACH, WEIGHT_DIGITS, SharpenViews
 
 LEFT = 2 * WEIGHT_DIGITS - KEPT_DIGITS

@@ -9,13 +9,12 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
-from numba import cuda
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.engines import cuda_footprint_kernels as kernels
 from vcc.engines import footprint_tables as tables
-from vcc.engines.cuda_arrays import LastUsed, launch, sent
+from vcc.engines.cuda_arrays import LastUsed, cuda, launch, sent
 from vcc.engines.footprint_samples import FineGrid, on_raster, taps_along, textures
 from vcc.plan.footprints.model import Footprints
 
@@ -153,20 +152,9 @@ def mask_rows(tables: Tables, columns: tuple[int, ...], stream: Any) -> kernels.
     near, off = tables.once("mask rows", lambda: _mask_places(tables))
     groups, total, begin = tables.once(("masks", columns), lambda: _mask_groups(tables, columns))
     lines = tables.room("lines", (max(total * width, 1),))
-    for m, place, at in groups:
-        high, wide = core.masks[m].texture.shape
-        given = (
-            tables.textures.values,
-            m,
-            high,
-            wide,
-            place,
-            core.masks[m].step[0, 0] / core.refine,
-            width,
-            at,
-            lines,
-        )
-        launch(kernels.mask_lines, (width, high + 2 * kernels.DARK), stream, *given)
+    high = max((len(mask.texture) for mask in core.masks), default=0) + 2 * kernels.DARK
+    places = width, high, groups.mask.size
+    launch(kernels.mask_lines, places, stream, tables.textures, groups, core.refine, width, lines)
     return kernels.MaskRows(lines, width, begin, near, off)
 
 
@@ -184,12 +172,11 @@ def _mask_places(tables: Tables) -> tuple[Any, Any]:
     return near, off
 
 
-def _mask_groups(tables: Tables, columns: tuple[int, ...]) -> tuple[list[tuple[int, float, int]], int, Any]:
+def _mask_groups(tables: Tables, columns: tuple[int, ...]) -> tuple[kernels.MaskGroups, int, Any]:
     """Which lines of masks columns of view taps need, how many that are, and `kernels.MaskRows.begin`.
 
-    Of each mask and place (mask, its column at the first sample, where its lines begin). Most taps of a column
-    look a
-    mask up in the same columns, those of cut cells elsewhere: lines are made once for all taps that agree.
+    Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: lines are made once for
+    all taps that agree.
     """
     core = tables.core
     begin = np.zeros((len(core.masks), *core.weights.shape), np.int32)
@@ -204,4 +191,6 @@ def _mask_groups(tables: Tables, columns: tuple[int, ...]) -> tuple[list[tuple[i
         for place in places:
             groups.append((m, float(place + mask.step[0, 0] * tables.fine.first_column), total))
             total += high
-    return groups, total, sent(begin)
+    kinds = np.int32, np.float64, np.int64
+    made = kernels.MaskGroups(*(sent(np.array([g[n] for g in groups], kind)) for n, kind in enumerate(kinds)))
+    return made, total, sent(begin)
