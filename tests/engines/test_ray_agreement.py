@@ -17,7 +17,7 @@ import torch
 import vcc
 from vcc.base.units import mm
 from vcc.optics import Element, Faces, Lattice
-from vcc.plan.rays.windows import CellWindows, Window
+from vcc.plan.rays.bounds.windows import CellWindows, Window
 from vcc.run.drive import drive
 from vcc.shapes import kernels, patterns, surfaces
 from vcc.shapes.lattice import CellApertures

@@ -19,8 +19,8 @@ from vcc.base.units import mm
 from vcc.engines import ray_numbers, reference
 from vcc.engines.reference_ray_numbers import ray_numbers_back
 from vcc.plan.numbers import numbers, with_numbers
+from vcc.plan.rays.bounds.windows import CellWindows
 from vcc.plan.rays.edges import EDGES
-from vcc.plan.rays.windows import CellWindows
 from vcc.shapes import kernels, patterns
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")

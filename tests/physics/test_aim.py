@@ -16,7 +16,7 @@ import pytest
 
 import vcc
 from vcc.base.units import mm
-from vcc.plan.rays.windows import Window
+from vcc.plan.rays.bounds.windows import Window
 from vcc.shapes.patterns import Cells, Circle
 
 

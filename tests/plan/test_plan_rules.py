@@ -31,11 +31,11 @@ from vcc.plan.footprints.shares import Taps, cumulative, share_slopes, shares, w
 from vcc.plan.how import How
 from vcc.plan.parallax_rule import index_motions
 from vcc.plan.rays.aim import _parted
-from vcc.plan.rays.cell_windows import Seen
+from vcc.plan.rays.bounds.cell_windows import Seen
+from vcc.plan.rays.bounds.slopes import Bound
+from vcc.plan.rays.bounds.windows import CellOpening, CellWindows, Sight, Stop, Window
 from vcc.plan.rays.points import columns_of, table
-from vcc.plan.rays.strips import Bound
 from vcc.plan.rays.textures import Sampled, made_fine_enough, means_around
-from vcc.plan.rays.windows import CellOpening, CellWindows, Sight, Stop, Window
 from vcc.shapes import kernels
 from vcc.shapes.lattice import Lattice
 from vcc.shapes.patterns import Circle, as_pattern

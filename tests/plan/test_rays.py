@@ -16,11 +16,11 @@ from vcc.optics import Element, Faces
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.rays import points, steps
+from vcc.plan.rays.bounds.windows import CellWindows, Window
 from vcc.plan.rays.compile import compile_rays
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.points import TABLE, hashed
 from vcc.plan.rays.steps import Bundle
-from vcc.plan.rays.windows import CellWindows, Window
 from vcc.run.drive import drive
 from vcc.shapes import kernels, surfaces
 from vcc.shapes.patterns import Circle, CosineSum

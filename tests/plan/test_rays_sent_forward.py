@@ -14,9 +14,9 @@ from vcc.base.units import mm
 from vcc.plan.decisions import Decisions
 from vcc.plan.how import How
 from vcc.plan.rays.aim import aimed
+from vcc.plan.rays.bounds.windows import CellWindows, Window
 from vcc.plan.rays.compile import compile_rays
 from vcc.plan.rays.path import Path
-from vcc.plan.rays.windows import CellWindows, Window
 
 RANDOM = np.random.default_rng(6)
 FIELD = vcc.LightField.from_views(

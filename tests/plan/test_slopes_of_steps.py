@@ -15,8 +15,8 @@ from vcc.plan.numbers import numbers, with_numbers
 from vcc.plan.rays import steps
 from vcc.plan.rays.aim_backwards import aim_back
 from vcc.plan.rays.backwards import back
+from vcc.plan.rays.bounds.windows import CellOpening, CellWindows, Sight, Stop, Window
 from vcc.plan.rays.steps import Bundle, Texture
-from vcc.plan.rays.windows import CellOpening, CellWindows, Sight, Stop, Window
 from vcc.shapes.lattice import Lattice
 
 RANDOM = np.random.default_rng(11)

@@ -12,8 +12,8 @@ import numpy as np
 from vcc.advice.noise import ENOUGH, remedy
 from vcc.fields.sampled import has_values, to_numpy
 from vcc.plan.protocol import Partial
+from vcc.plan.rays.bounds.windows import CellWindows
 from vcc.plan.rays.model import Rays
-from vcc.plan.rays.windows import CellWindows
 from vcc.run.drive import Drive, sampling_error
 
 PATCH = 32

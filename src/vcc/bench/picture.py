@@ -28,9 +28,9 @@ from vcc.plan.choice import compile_best
 from vcc.plan.decisions import WhileWanted
 from vcc.plan.model import Plan
 from vcc.plan.operators import SharpenViews
+from vcc.plan.rays.bounds.windows import CellWindows
 from vcc.plan.rays.compile import DEFAULT_SAMPLES
 from vcc.plan.rays.model import Rays
-from vcc.plan.rays.windows import CellWindows
 from vcc.recording import Recording, recorded
 from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure

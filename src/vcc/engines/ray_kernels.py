@@ -494,7 +494,7 @@ def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
 
 @_inner
 def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
-    """Slopes and weights of rays towards a window, making up for diffusers; see `vcc.plan.rays.windows.Window`."""
+    """Slopes and weights of rays towards a `vcc.plan.rays.bounds.windows.Window`, making up for diffusers."""
     points, start, n, flipped = drawn
     from_point, from_sensor, (f4, g4), solid_angle, disc, scatter = window
     x, y, s, t, share = rays

@@ -21,8 +21,8 @@ from vcc.engines import ray_tables as tables
 from vcc.engines.rays_compiled import TILE, given, light_field
 from vcc.plan.numbers import numbers
 from vcc.plan.rays import edges, steps
+from vcc.plan.rays.bounds.windows import CellWindows, Window
 from vcc.plan.rays.model import Rays
-from vcc.plan.rays.windows import CellWindows, Window
 
 Array = NDArray[np.float64]
 

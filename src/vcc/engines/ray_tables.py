@@ -98,7 +98,7 @@ class Points(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Where to aim through affine optics, see `vcc.plan.rays.windows.Window`.
+    """Where to aim through affine optics, see `vcc.plan.rays.bounds.windows.Window`.
 
     Args:
         from_point: 2×2, slopes from the window's point.
@@ -118,7 +118,7 @@ class Window(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Where to aim through the cells of an array: see `vcc.plan.rays.windows.CellWindows`, whose names these are.
+    """Where to aim through the cells of an array, by the names of `vcc.plan.rays.bounds.windows.CellWindows`.
 
     Args:
         layout: 0 square, 1 hexagonal.

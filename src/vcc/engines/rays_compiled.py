@@ -19,8 +19,8 @@ from vcc.engines.ray_patches import Patches, patches_of, rows_that_look
 from vcc.engines.sharpening_kernels import Parts, ToSharpen
 from vcc.engines.vector_gather import LANES
 from vcc.plan.protocol import Partial
+from vcc.plan.rays.bounds.windows import Aim, CellWindows, Window
 from vcc.plan.rays.model import Rays
-from vcc.plan.rays.windows import Aim, CellWindows, Window
 
 TILE = 32
 """Pixels a side that a thread works on at once: what they look up in the light field stays in its cache."""

@@ -22,9 +22,9 @@ from vcc.plan.numbers import numbers
 from vcc.plan.rays import edges
 from vcc.plan.rays.aim_backwards import aim_back
 from vcc.plan.rays.backwards import Numbers, back, moved_back
+from vcc.plan.rays.bounds.windows import CellWindows
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.steps import Bundle
-from vcc.plan.rays.windows import CellWindows
 
 Array = NDArray[np.float64]
 

@@ -20,11 +20,11 @@ from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.optics.train import Train
 from vcc.plan.rays.aim import Aimed, settled
+from vcc.plan.rays.bounds.windows import Aim, Window
 from vcc.plan.rays.compile import steps_met
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.path import Path, mixes_axes
 from vcc.plan.rays.points import table
-from vcc.plan.rays.windows import Aim, Window
 from vcc.shapes.patterns import Cells
 
 Array = NDArray[np.float64]

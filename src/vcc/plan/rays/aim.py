@@ -1,8 +1,8 @@
 """Where rays are aimed on their way back from the sensor: at the smallest window that light can come through.
 
-Rays are bound by strips (`vcc.plan.rays.strips`), whose width depends on how far rays stray
-(`vcc.plan.rays.slack`), and that on where they meet what bends them, so on the aim: it is sought in rounds. Before
-lens arrays each cell may have a window of its own (`vcc.plan.rays.cell_windows`).
+Rays are bound by strips of slopes, whose width depends on how far rays stray, and that on where they meet what
+bends them, so on the aim: it is sought in rounds. Before lens arrays each cell may have a window of its own. All
+bounds are in `vcc.plan.rays.bounds`.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.optics.deflections import CellDeflection, FacetDeflection
 from vcc.plan.decisions import ANEW, plan_again
-from vcc.plan.rays import cell_windows
+from vcc.plan.rays.bounds import cell_windows
+from vcc.plan.rays.bounds.deflections import DeflectionBounds, Slopes, largest_bend, regions_and_deflections
+from vcc.plan.rays.bounds.slopes import UNBOUNDED, window_of, windows, windows_by_strips
+from vcc.plan.rays.bounds.windows import Aim, CellWindows, Window
 from vcc.plan.rays.path import Leg, Path
-from vcc.plan.rays.slack import Slack, Slopes, largest_bend, strayed
-from vcc.plan.rays.strips import UNBOUNDED, window_of, windows, windows_by_strips
-from vcc.plan.rays.windows import Aim, CellWindows, Window
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ ROUNDS = 8
 ROOM = 1.1
 """By how much more what bends rays may bend them within decisions that are kept."""
 SETTLED = 0.01
-"""Share of the slack by which it changes where no more rounds are needed."""
+"""Share of the deflections' bounds by which they change where no more rounds are needed."""
 WORTH_NARROWING = 0.7
 """Share of the solid angle asked for below which a smaller one is aimed at; likewise for windows of cells."""
 NOWHERE = Window(np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(2), False, "nothing")
@@ -45,13 +45,13 @@ class Aimed(Brief):
     Args:
         aim: where to.
         regions: for each leg (low, high) between which rays that are aimed so meet its stage, metres.
-        slack: by how much rays can stray, by which it was found.
-        everything: whether of all bounds (`vcc.plan.rays.strips.bounds`).
+        deflections: by how much rays can stray, by which it was found.
+        everything: whether of all bounds (`vcc.plan.rays.bounds.slopes.bounds`).
     """
 
     aim: Aim
     regions: list[tuple[Array, Array]]
-    slack: Slack
+    deflections: DeflectionBounds
     everything: bool
 
 
@@ -60,7 +60,7 @@ class KeptAim:
     """What of an aim is decided; its numbers follow the optics.
 
     Args:
-        everything: see `vcc.plan.rays.strips.bounds`.
+        everything: see `vcc.plan.rays.bounds.slopes.bounds`.
         bends: by how much each leg's stage bends rays at most, with room; None: as it does now, however much.
         strips: the two that cut out the window; None where cells have windows of their own.
         towards: (number of the leg, words) of the bound that cells look at; None for a window.
@@ -106,8 +106,8 @@ def _kept(path: Path, taken: Aimed) -> KeptAim:
     if isinstance(aim, CellWindows):
         kept = KeptAim(taken.everything, bends, None, aim.towards, aim.reach, aim.halvings)
         for _ in range(2):  # the cells that are seen by all that can stray, and may bend others
-            _, slack = strayed(anew, aim, bends)
-            wider = cell_windows.cell_windows_towards(anew, slack.whole, kept.everything, *aim.towards)
+            _, deflections = regions_and_deflections(anew, aim, bends)
+            wider = cell_windows.cell_windows_towards(anew, deflections.whole, kept.everything, *aim.towards)
             if wider is not None:
                 return replace(kept, bends=bends, reach=wider.reach)
             bends = tuple(
@@ -116,7 +116,7 @@ def _kept(path: Path, taken: Aimed) -> KeptAim:
         return kept
     pair = next(
         pair
-        for pair, window in windows_by_strips(anew, taken.slack.unknown, taken.everything)
+        for pair, window in windows_by_strips(anew, taken.deflections.unknown, taken.everything)
         if window.words == aim.words and window.solid_angle == aim.solid_angle
     )
     return _as_much_as_it_likes(anew, KeptAim(taken.everything, bends, pair))
@@ -132,9 +132,9 @@ def _as_much_as_it_likes(path: Path, kept: KeptAim) -> KeptAim:
 
     def led_to(bends: tuple[Slopes, ...]) -> Array:
         """Where rays are aimed, and where they then meet each stage, in one row."""
-        _, slack = strayed(path, _chosen(path, Slack.none(path), kept), bends)
-        aim = window_of(path, slack.unknown, kept.everything, pair)
-        regions, _ = strayed(path, aim, bends)
+        _, deflections = regions_and_deflections(path, _chosen(path, DeflectionBounds.none(path), kept), bends)
+        aim = window_of(path, deflections.unknown, kept.everything, pair)
+        regions, _ = regions_and_deflections(path, aim, bends)
         return np.concatenate([aim.slope_from_point.ravel(), aim.offset, np.ravel(regions)])
 
     bends, here = list(kept.bends), led_to(kept.bends)
@@ -154,23 +154,23 @@ def _the_same_anywhere(leg: Leg) -> bool:
 def _as_kept(path: Path, kept: KeptAim) -> Aimed:
     """The aim that was decided, as the optics are now."""
     anew = replace(path, decisions=ANEW)
-    _, slack = strayed(path, _chosen(anew, Slack.none(path), kept), kept.bends)
+    _, deflections = regions_and_deflections(path, _chosen(anew, DeflectionBounds.none(path), kept), kept.bends)
     # Without what rays stray by, more cells may seem to be seen than are.
-    aim = _with_kept_reach(_chosen(path, slack, kept), kept)
-    regions, _ = strayed(path, aim, kept.bends)
+    aim = _with_kept_reach(_chosen(path, deflections, kept), kept)
+    regions, _ = regions_and_deflections(path, aim, kept.bends)
     for leg, region, most in zip(path.legs, regions, kept.bends, strict=True):
         now = largest_bend(leg, region)
         if now is not None and most is not None and (now[0] > most[0] or now[1] > most[1]):
             raise plan_again(f"how far rays stray (bent by {leg.stage.element.label})")
-    return Aimed(aim, regions, slack, kept.everything)
+    return Aimed(aim, regions, deflections, kept.everything)
 
 
-def _chosen(path: Path, slack: Slack, kept: KeptAim) -> Aim:
+def _chosen(path: Path, deflections: DeflectionBounds, kept: KeptAim) -> Aim:
     """The window, or the windows of cells, that were decided on."""
     if kept.strips is not None:
-        return window_of(path, slack.unknown, kept.everything, kept.strips)
+        return window_of(path, deflections.unknown, kept.everything, kept.strips)
     assert kept.towards is not None
-    cells = cell_windows.cell_windows_towards(path, slack.whole, kept.everything, *kept.towards)
+    cells = cell_windows.cell_windows_towards(path, deflections.whole, kept.everything, *kept.towards)
     if cells is None:
         raise plan_again("the cells that pixels see")
     return replace(cells, halvings=kept.halvings)
@@ -197,34 +197,34 @@ def found(path: Path) -> Aimed:
 
 
 def settled(path: Path, everything: bool, windows_only: bool = False) -> Aimed:
-    """The smallest aim, slack and all.
+    """The smallest aim, with the bounds of deflections by which it was found.
 
     Args:
         path: from the sensor.
-        everything: see `vcc.plan.rays.strips.bounds`.
+        everything: see `vcc.plan.rays.bounds.slopes.bounds`.
         windows_only: without windows of an array's cells.
 
     Raises:
         InputError: nothing bounds the rays.
     """
-    slack, before = Slack.none(path), math.inf
+    deflections, before = DeflectionBounds.none(path), math.inf
     if _strays_alike(path):
-        _, slack = strayed(path, NOWHERE)
+        _, deflections = regions_and_deflections(path, NOWHERE)
     for _ in range(ROUNDS):
-        aim = smallest(path, slack, everything, windows_only)
-        regions, further = strayed(path, aim)
-        if further.same(slack) and slack.size <= UNBOUNDED:
-            return Aimed(aim, regions, slack, everything)  # another round would find the same
-        slack = further
-        if abs(slack.size - before) <= SETTLED * before < math.inf:
+        aim = smallest(path, deflections, everything, windows_only)
+        regions, further = regions_and_deflections(path, aim)
+        if further.same(deflections) and deflections.size <= UNBOUNDED:
+            return Aimed(aim, regions, deflections, everything)  # another round would find the same
+        deflections = further
+        if abs(deflections.size - before) <= SETTLED * before < math.inf:
             break
-        if slack.size > UNBOUNDED:
+        if deflections.size > UNBOUNDED:
             _refuse(path)
-        before = slack.size
+        before = deflections.size
     else:
         _refuse(path)
-    aim = smallest(path, slack, everything, windows_only)  # once more, with all that rays can stray by
-    return Aimed(aim, strayed(path, aim)[0], slack, everything)
+    aim = smallest(path, deflections, everything, windows_only)  # once more, with all that rays can stray by
+    return Aimed(aim, regions_and_deflections(path, aim)[0], deflections, everything)
 
 
 def _strays_alike(path: Path) -> bool:
@@ -244,17 +244,17 @@ def _refuse(path: Path) -> NoReturn:
     raise InputError(f"no bound can be found for the rays through {', '.join(bending or scattering)}: {why}")
 
 
-def smallest(path: Path, slack: Slack, everything: bool, windows_only: bool = False) -> Aim:
+def smallest(path: Path, deflections: DeflectionBounds, everything: bool, windows_only: bool = False) -> Aim:
     """The aim that takes in the smallest solid angle, or parts it where elements are not smooth.
 
     Windows of cells are aimed at where they save rays, and where a pixel's rays are enough for all cells that
     it sees: what a pixel sees jumps from cell to cell, and is smooth in each.
     """
-    found = windows(path, slack.unknown, everything)
+    found = windows(path, deflections.unknown, everything)
     if not found:
         raise InputError("nothing bounds the rays of this camera: give a lens or a mask a size")
     best = min(found, key=lambda window: window.solid_angle)
-    cells = None if windows_only else cell_windows.cell_windows(path, slack.whole, everything)
+    cells = None if windows_only else cell_windows.cell_windows(path, deflections.whole, everything)
     return best if cells is None else _parted(path, best, *cells)
 
 

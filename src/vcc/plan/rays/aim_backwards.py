@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.plan.rays.backwards import Numbers, lattice_back
+from vcc.plan.rays.bounds.windows import SMALLEST_GAIN, Aim, CellOpening, CellWindows, Window
 from vcc.plan.rays.model import Cell
 from vcc.plan.rays.steps import Bundle
-from vcc.plan.rays.windows import SMALLEST_GAIN, Aim, CellOpening, CellWindows, Window
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,8 @@ from vcc.plan.operators import Before, DarkBorder, SharpenViews
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import steps
 from vcc.plan.rays.aim import Aimed, aimed
-from vcc.plan.rays.beam import footprint
+from vcc.plan.rays.bounds.extent import footprint
+from vcc.plan.rays.bounds.windows import Aim, Window
 from vcc.plan.rays.linear import by_cells, by_surface, by_widths
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.path import Leg, Path
@@ -38,7 +39,6 @@ from vcc.plan.rays.textures import (
     means_around,
     textured,
 )
-from vcc.plan.rays.windows import Aim, Window
 from vcc.shapes.lattice import CellApertures, CellBlock
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
 from vcc.shapes.sheets import Product

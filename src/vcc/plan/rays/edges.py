@@ -14,9 +14,9 @@ import numpy as np
 
 from vcc.base.errors import InputError
 from vcc.plan.rays import steps
+from vcc.plan.rays.bounds.windows import CellWindows, Window
 from vcc.plan.rays.model import Cell, Rays
 from vcc.plan.rays.steps import Bundle, Step
-from vcc.plan.rays.windows import CellWindows, Window
 
 EDGES: dict[type, tuple[str, ...]] = {
     steps.Disc: ("middle", "radius"),

@@ -23,10 +23,10 @@ from vcc.base.affine import Affine
 from vcc.base.cached import cached
 from vcc.base.values import Value
 from vcc.fields.grid import Block
+from vcc.plan.rays.bounds.windows import Aim, CellWindows, Window
 from vcc.plan.rays.points import DIGITS, TABLE, hashed
 from vcc.plan.rays.reach import Reach, index_from_sensor
 from vcc.plan.rays.steps import Bundle, Move, Packer, Step
-from vcc.plan.rays.windows import Aim, CellWindows, Window
 
 Array = NDArray[np.float64]
 Cell = tuple[NDArray[np.int64], NDArray[np.int64]]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
+from vcc.plan.rays.bounds.windows import Aim, Window
 from vcc.plan.rays.steps import Disc, Move, Rectangle, Step
-from vcc.plan.rays.windows import Aim, Window
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]

@@ -13,9 +13,9 @@ from vcc.base.affine import Affine
 from vcc.optics.deflections import CellDeflection
 from vcc.optics.sensor import Sensor
 from vcc.plan.decisions import Decisions
+from vcc.plan.rays.bounds.slopes import Bound, bounds
+from vcc.plan.rays.bounds.windows import CellOpening, CellWindows, Sight, Stop
 from vcc.plan.rays.path import Leg, Path, mixes_axes
-from vcc.plan.rays.strips import Bound, bounds
-from vcc.plan.rays.windows import CellOpening, CellWindows, Sight, Stop
 from vcc.shapes.lattice import CellApertures, Lattice
 from vcc.shapes.patterns import Bounded, Pattern
 
@@ -42,32 +42,32 @@ class Seen:
     cells: float
 
 
-def cell_windows(path: Path, slack: list[Array], everything: bool) -> tuple[CellWindows, Seen] | None:
+def cell_windows(path: Path, deflections: list[Array], everything: bool) -> tuple[CellWindows, Seen] | None:
     """The cells of the array nearest to the sensor, where something beyond it bounds what they see.
 
     And what comes through them.
 
     Args:
         path: from the sensor.
-        slack: how far rays can stray, by all that bends or scatters.
-        everything: see `vcc.plan.rays.strips.bounds`.
+        deflections: how far rays can stray, by all that bends or scatters.
+        everything: see `vcc.plan.rays.bounds.slopes.bounds`.
     """
     leg = _array(path)
     if leg is None:
         return None
-    found = _towards(path, leg, _beyond(path, leg, slack, everything))
+    found = _towards(path, leg, _beyond(path, leg, deflections, everything))
     known = [(windows, seen(windows, path.train.sensor)) for windows in found]
     return min(known, key=lambda each: each[1].solid_angle, default=None)
 
 
 def cell_windows_towards(
-    path: Path, slack: list[Array], everything: bool, number: int, words: str
+    path: Path, deflections: list[Array], everything: bool, number: int, words: str
 ) -> CellWindows | None:
     """The same towards one bound, whatever they are now.
 
     Args:
         path: from the sensor.
-        slack: see `cell_windows`.
+        deflections: see `cell_windows`.
         everything: likewise.
         number: of the bound's leg.
         words: of the bound, where the light field has two.
@@ -77,15 +77,15 @@ def cell_windows_towards(
         return None
     alike = [
         bound
-        for bound in _beyond(path, leg, slack, everything)
+        for bound in _beyond(path, leg, deflections, everything)
         if bound.number == number and (number < len(path.legs) or bound.words == words)
     ]
     return next(iter(_towards(path, leg, alike)), None)
 
 
-def _beyond(path: Path, leg: Leg, slack: list[Array], everything: bool) -> list[Bound]:
+def _beyond(path: Path, leg: Leg, deflections: list[Array], everything: bool) -> list[Bound]:
     """What bounds rays beyond an array, along both axes."""
-    found = [bound for bound in bounds(path, slack, everything) if bound.number > leg.number]
+    found = [bound for bound in bounds(path, deflections, everything) if bound.number > leg.number]
     return [bound for bound in found if np.isfinite(bound.half).all()]
 
 

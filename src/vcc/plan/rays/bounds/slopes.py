@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.rays.bounds.windows import Window
 from vcc.plan.rays.path import Leg, Path
-from vcc.plan.rays.windows import Window
 from vcc.shapes.patterns import Circle
 
 Array = NDArray[np.float64]
@@ -112,30 +112,30 @@ class Strip(Brief):
         return bool(self.half < UNBOUNDED * np.linalg.norm(self.from_sensor[2:]))
 
 
-def bounds(path: Path, slack: list[Array], everything: bool) -> list[Bound]:
+def bounds(path: Path, deflections: list[Array], everything: bool) -> list[Bound]:
     """What bounds the rays that a camera asks for, or all that bounds those that the light field holds.
 
     A camera asks for what its stops let through, and the grid of views where no stop bounds the light.
 
     Args:
         path: from the sensor.
-        slack: how far rays can stray, see `vcc.plan.rays.slack.Slack`.
+        deflections: how far rays can stray, see `vcc.plan.rays.bounds.deflections.DeflectionBounds`.
         everything: the views' pictures too, and the grid of views anyway.
     """
-    found = [_stop(leg, slack[leg.number], path.decisions) for leg in path.legs]
+    found = [_stop(leg, deflections[leg.number], path.decisions) for leg in path.legs]
     if everything or not path.stops_bound:
-        found.append(_of_light_field(path, slack, slice(0, 2), GRID_OF_VIEWS))
+        found.append(_of_light_field(path, deflections, slice(0, 2), GRID_OF_VIEWS))
     if everything:
-        found.append(pictures(path, slack))
+        found.append(pictures(path, deflections))
     return found
 
 
-def pictures(path: Path, slack: list[Array]) -> Bound:
+def pictures(path: Path, deflections: list[Array]) -> Bound:
     """The views' pictures."""
-    return _of_light_field(path, slack, slice(2, 4), PICTURES)
+    return _of_light_field(path, deflections, slice(2, 4), PICTURES)
 
 
-def _stop(leg: Leg, slack: Array, decisions: Decisions) -> Bound:
+def _stop(leg: Leg, deflections: Array, decisions: Decisions) -> Bound:
     pattern, (low, high) = leg.stage.faces.pattern, leg.stop
     half = np.asarray((high - low) / 2)
     circle = isinstance(pattern, Circle) and np.allclose(half, pattern.diameter / 2, rtol=1e-12, atol=0)
@@ -145,15 +145,15 @@ def _stop(leg: Leg, slack: Array, decisions: Decisions) -> Bound:
         axes=slice(0, 2),
         middle=np.add(low, high, out=np.zeros(2), where=np.isfinite(half)) / 2,  # of no meaning where unbounded
         half=half,
-        loose=np.abs(slack[:2]).sum(axis=1),
+        loose=np.abs(deflections[:2]).sum(axis=1),
         circle=decisions.hold(f"stop {leg.number} is round", bool(circle)),
         words=leg.stage.element.label,
         decisions=decisions,
     )
 
 
-def _of_light_field(path: Path, slack: list[Array], axes: slice, words: str) -> Bound:
-    loose = np.abs(path.index_from_entrance.linear[axes] @ slack[-1]).sum(axis=1)
+def _of_light_field(path: Path, deflections: list[Array], axes: slice, words: str) -> Bound:
+    loose = np.abs(path.index_from_entrance.linear[axes] @ deflections[-1]).sum(axis=1)
     return Bound(
         number=len(path.legs),
         from_sensor=path.index_from_sensor,
@@ -166,30 +166,30 @@ def _of_light_field(path: Path, slack: list[Array], axes: slice, words: str) -> 
     )
 
 
-def windows(path: Path, slack: list[Array], everything: bool) -> list[Window]:
+def windows(path: Path, deflections: list[Array], everything: bool) -> list[Window]:
     """The parallelograms, and discs, of slopes that pairs of strips cut out.
 
     Where the sensor shows each view as a point, what a camera asks for has no bound but the views' pictures.
 
     Args:
         path: from the sensor.
-        slack: how far rays can stray, but for what windows make up for.
+        deflections: how far rays can stray, but for what windows make up for.
         everything: see `bounds`.
     """
-    return [window for _, window in windows_by_strips(path, slack, everything)]
+    return [window for _, window in windows_by_strips(path, deflections, everything)]
 
 
-def windows_by_strips(path: Path, slack: list[Array], everything: bool) -> list[tuple[Pair, Window]]:
+def windows_by_strips(path: Path, deflections: list[Array], everything: bool) -> list[tuple[Pair, Window]]:
     """The same, each with the numbers of the two strips that cut it out, of those that `window_of` knows."""
-    strips = [strip for bound in bounds(path, slack, everything) for strip in bound.strips()]
+    strips = [strip for bound in bounds(path, deflections, everything) for strip in bound.strips()]
     found = list(_cut_out(path, strips))
-    return found or list(_cut_out(path, [*strips, *pictures(path, slack).strips()]))
+    return found or list(_cut_out(path, [*strips, *pictures(path, deflections).strips()]))
 
 
-def window_of(path: Path, slack: list[Array], everything: bool, pair: Pair) -> Window:
+def window_of(path: Path, deflections: list[Array], everything: bool, pair: Pair) -> Window:
     """The window that two strips cut out, whatever it is now, by the numbers that `windows_by_strips` gave."""
-    strips = [strip for bound in bounds(path, slack, everything) for strip in bound.strips()]
-    strips += pictures(path, slack).strips() if max(pair) >= len(strips) else []
+    strips = [strip for bound in bounds(path, deflections, everything) for strip in bound.strips()]
+    strips += pictures(path, deflections).strips() if max(pair) >= len(strips) else []
     return _window(path, (strips[pair[0]], strips[pair[1]]))
 
 

@@ -1,4 +1,4 @@
-"""Beams: bounds of the places and slopes of all rays that an aim asks for, on their way back from the sensor."""
+"""Bounds of the places and slopes of all rays that an aim asks for, on their way back from the sensor."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
+from vcc.plan.rays.bounds.windows import Aim, CellWindows
 from vcc.plan.rays.path import Leg, Path
-from vcc.plan.rays.windows import Aim, CellWindows
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Beam(Brief):
+class RayExtent(Brief):
     """All rays that are traced, in one plane: (x, y, s, t) = middle + basis · ξ + loose · η, all |ξ|, |η| ≤ 1.
 
     The four ξ are the places on the sensor and in the window aimed at; each η is what an array, a plate or a
@@ -35,7 +35,9 @@ class Beam(Brief):
     loose: Array
 
     @classmethod
-    def between(cls, sensor_middle: Array, sensor_half: Array, slopes: Array, slope_from_sensor: Array) -> Beam:
+    def between(
+        cls, sensor_middle: Array, sensor_half: Array, slopes: Array, slope_from_sensor: Array
+    ) -> RayExtent:
         """Rays from a rectangle on the sensor.
 
         Args:
@@ -52,16 +54,16 @@ class Beam(Brief):
         middle = np.concatenate([sensor_middle, slopes[:, 2] + slope_from_sensor @ sensor_middle])
         return cls(middle, basis, np.zeros((4, 0)))
 
-    def moved(self, before_from_behind: Affine) -> Beam:
+    def moved(self, before_from_behind: Affine) -> RayExtent:
         """The rays in another plane."""
-        linear = before_from_behind.linear
-        return Beam(linear @ self.middle + before_from_behind.offset, linear @ self.basis, linear @ self.loose)
+        linear, offset = before_from_behind.linear, before_from_behind.offset
+        return RayExtent(linear @ self.middle + offset, linear @ self.basis, linear @ self.loose)
 
-    def loosened(self, slopes: tuple[float, float]) -> Beam:
+    def loosened(self, slopes: tuple[float, float]) -> RayExtent:
         """The rays after something that changes slopes by up to (|δs|, |δt|)."""
         added = np.zeros((4, 2))
         added[2, 0], added[3, 1] = slopes
-        return Beam(self.middle, self.basis, np.concatenate([self.loose, added], axis=1))
+        return RayExtent(self.middle, self.basis, np.concatenate([self.loose, added], axis=1))
 
     @property
     def half(self) -> Array:
@@ -69,23 +71,24 @@ class Beam(Brief):
         return np.asarray(np.abs(self.basis).sum(axis=1) + np.abs(self.loose).sum(axis=1))
 
 
-def beam_towards(path: Path, aim: Aim, half: Array | None = None) -> Beam:
+def extent_towards(path: Path, aim: Aim, half: Array | None = None) -> RayExtent:
     """All rays that an aim asks for, at the sensor; from all of it, or a rectangle of half sizes (x, y)."""
     sensor = path.train.sensor
     middle = np.array(sensor.decentre)
     half = np.array(sensor.size[::-1]) / 2 if half is None else half
     if isinstance(aim, CellWindows):
         return _through_cells(aim, middle, half)
-    beam = Beam.between(middle, half, np.column_stack([aim.slope_from_point, aim.offset]), aim.slope_from_sensor)
+    slopes = np.column_stack([aim.slope_from_point, aim.offset])
+    extent = RayExtent.between(middle, half, slopes, aim.slope_from_sensor)
     uniform = [scatter for scatter in path.scatters if scatter.uniform]
     # Those beyond the window are not made up for: there are as many terms as diffusers before it.
     for scatter, (_, slope_from_scatter) in zip(uniform, aim.slope_from_scatter, strict=False):
         s, t = np.abs(slope_from_scatter) @ np.array(scatter.reach)
-        beam = beam.loosened((float(s), float(t)))
-    return beam
+        extent = extent.loosened((float(s), float(t)))
+    return extent
 
 
-def _through_cells(aim: CellWindows, middle: Array, half: Array) -> Beam:
+def _through_cells(aim: CellWindows, middle: Array, half: Array) -> RayExtent:
     """Rays through all the cells that are looked at: those around (stop − offset − factor·x) / beyond."""
     sight = aim.sight
     pitch = np.full(2, aim.cells.lattice.pitch)
@@ -94,7 +97,7 @@ def _through_cells(aim: CellWindows, middle: Array, half: Array) -> Beam:
     from_sensor = slope * (-sight.beyond_from_sensor / sight.beyond - sight.place_from_sensor)
     at_origin = slope * ((aim.stop.middle - sight.beyond_offset) / sight.beyond - sight.offset)
     slopes = np.column_stack([np.diag(slope * reach), at_origin])
-    return Beam.between(middle, half, slopes, np.diag(from_sensor))
+    return RayExtent.between(middle, half, slopes, np.diag(from_sensor))
 
 
 def footprint(path: Path, aim: Aim, leg: Leg) -> Array | None:
@@ -105,5 +108,5 @@ def footprint(path: Path, aim: Aim, leg: Leg) -> Array | None:
     nearer = path.legs[: leg.number]
     if isinstance(aim, CellWindows) or any(other.stage.faces.bending is not None for other in nearer):
         return None
-    beam = beam_towards(path, aim, path.pixel / 2).moved(leg.from_sensor)
-    return np.asarray(2 * np.abs(beam.basis[:2]).max(axis=1))
+    extent = extent_towards(path, aim, path.pixel / 2).moved(leg.from_sensor)
+    return np.asarray(2 * np.abs(extent.basis[:2]).max(axis=1))
