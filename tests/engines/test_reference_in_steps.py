@@ -6,6 +6,7 @@ the module's first lines state, written out sample by sample.
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -110,13 +111,25 @@ def test_rays_beside_those_of_the_first_round_have_derivatives_of_their_own():
     assert found[0] != pytest.approx(found[1], rel=1e-3)
 
 
-def test_memory_is_that_of_the_arrays_of_a_view():
-    """Of 4×5 samples divided into 8×10: three arrays by channels, shares to 7×9 pixels in two, and lines."""
-    core = core_of(CAMERAS["mask half-way"], field(samples((2, 2, 4, 5))), refine=1)
-    core = replace(core, raster_shape=(7, 9), samples=(4, 5), refine=2)
-    by_channels, shared, lines = 3 * 3 * 80, 2 * (80 + 7 * 8 + 9 * 10), 3 * 7 * 10
-    assert reference.memory(core, 3, 1) == 8 * (by_channels + shared + lines)
-    assert reference.memory(replace(core, refine=1), 1, 4) == 8 * (3 * 20 + 2 * (20 + 7 * 4 + 9 * 5) + 7 * 5)
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("name", ["plain", "masked", "divided", "sheared", "few pixels", "many pixels"])
+def test_stated_memory_covers_what_a_run_takes_and_not_much_more(name, channels):
+    mask = vcc.Mask(np.eye(9), width=6 * mm, z=45 * mm)
+    shape = {"few pixels": (10, 12), "many pixels": (200, 240)}.get(name, (60, 80))
+    elements = [vcc.Lens(50 * mm, diameter=9 * mm)] + ([] if name in ("plain", "many pixels") else [mask])
+    given = turned(field(samples((2, 2, 90, 120, channels))), 0.3 if name == "sheared" else 0.0)
+    camera = vcc.Camera(elements, vcc.Sensor(51 * mm, shape, 49 * mm * 2e-3 * 120 / shape[1]))
+    core = camera.compile(given, method="footprints", refine=3 if name == "divided" else 1).core
+    assert (core.refine > 1) == (name == "divided")
+    light = light_of(core, channels).astype(np.float32)
+    tracemalloc.start()
+    raster = reference.run(core, light, threads=1).values
+    taken = tracemalloc.get_traced_memory()[1] - raster.nbytes
+    tracemalloc.stop()
+    assert 0.5 < taken / reference.memory(core, channels, 1) < 1
+
+
+def test_stated_memory_of_rays():
     by_rays = CAMERAS["mask half-way"].compile(field(samples(SMALL)), method="rays", samples=4).core
     assert reference.memory(by_rays, 3, 1) == reference.memory_of_rays(by_rays) > 0
 

@@ -8,7 +8,6 @@ that is looked at, x(q) + shear · (y − y(q)), so that the shares still sum to
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Sequence
 from functools import partial
 from typing import Any
@@ -113,14 +112,18 @@ def finished(after: Sequence[operators.After], raster: Array, threads: int) -> A
 
 
 def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
-    """Bytes that a run takes beside the samples and the raster, estimated: mostly of numbers of 8 bytes."""
+    """Bytes that a run takes beside the samples and the raster: the most that was measured, rounded up."""
     if isinstance(core, Rays):
         return memory_of_rays(core)
-    # A view in double precision, divided, and times its weights; its shares, and lines of it added up.
-    rows, columns = core.samples
-    divided = core.refine * rows, core.refine * columns
-    shared = math.prod(divided) + core.raster_shape[0] * divided[0] + core.raster_shape[1] * divided[1]
-    return 24 * channels * math.prod(divided) + 16 * shared + 8 * channels * core.raster_shape[0] * divided[1]
+    rows, columns = (core.refine * count for count in core.samples)
+    high, wide = core.raster_shape
+    view = 16 * channels * rows * columns  # in double precision, and times its weights
+    lookup = 280 * rows * columns if core.masks else 0
+    if core.step[1, 0] == 0 == core.shear:
+        spreading = 112 * max(high * rows, wide * columns) + 8 * channels * high * columns
+    else:
+        spreading = 112 * rows * columns
+    return view + max(lookup, spreading)
 
 
 def _spread(core: Footprints, raster: Array, flux: Array, b: int, a: int, k: Array, l: Array) -> None:
