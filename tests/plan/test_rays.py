@@ -376,3 +376,15 @@ def test_a_plan_by_rays_does_not_wait_for_scipy_stats():
         "assert 'scipy.stats' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("diameter", [4 * mm, 6 * mm])
+def test_windows_through_cells_are_as_large_as_the_stop_where_only_the_array_bends(diameter):
+    """What the array itself bends is known cell by cell: to widen the stop by it would trace rays in vain."""
+    lens = vcc.Lens(50 * mm, diameter=diameter)
+    array = vcc.LensArray(pitch=0.5 * mm, focal_length=2 * mm, z=50 * mm)
+    camera = vcc.Camera([lens, array], vcc.Sensor(52 * mm, (20, 20), 0.05 * mm))
+    aim = camera.compile(field(), method="rays", samples=4).core.aim
+    assert isinstance(aim, CellWindows)
+    assert aim.stop.disc
+    np.testing.assert_allclose(aim.stop.half, diameter / 2, rtol=1e-9)
