@@ -332,6 +332,13 @@ def test_places_of_pinned_memory_are_kept_from_run_to_run(monkeypatch):
         engine.run(core, light, threads=threads)
     assert len(made) == 2
 
+    def interrupt(done, total):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        engine.run(core, values, threads=1, progress=interrupt)
+    assert not cuda_footprints._kept  # threads of a run that was broken off may still fill its places
+
 
 def test_tables_are_those_of_the_gpu_in_use(monkeypatch):
     core, _ = CORES["two masks"]

@@ -18,6 +18,7 @@ import pytest
 
 import vcc
 from tests.run.test_executors import CAMERAS, FOCUS, in_blocks, light_field, stored  # noqa: F401  # fixtures
+from tests.run.unread import Unread
 from vcc.run import executors
 from vcc.run.executors import Tree, Work, crew
 from vcc.units import mm
@@ -41,7 +42,7 @@ def client():
 
 
 @dataclass(frozen=True)
-class Deadly:
+class Deadly(Unread):
     """Samples whose reader is killed, once for each of some rows of views.
 
     Args:
@@ -50,18 +51,8 @@ class Deadly:
         folder: of marks: who was killed before is spared.
     """
 
-    samples: object
     rows: tuple[int, ...]
     folder: Path
-
-    grid = property(lambda self: self.samples.grid)
-    stored_bytes = 0
-
-    def whole(self):
-        return None
-
-    def check_complete(self):
-        pass
 
     def read(self, block):
         mark = self.folder / str(block.rows[0])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
-from typing import Any
 
 import array_api_strict
 import numpy as np
@@ -16,6 +15,7 @@ import pytest
 import torch
 
 import vcc
+from tests.run.unread import Unread
 from vcc.base.units import mm
 from vcc.camera import captured_together, each_captured
 from vcc.fields.grid import Block
@@ -269,19 +269,8 @@ def test_progress_counts_each_view_of_each_block(tmp_path, method, rounds):
 
 
 @dataclass(frozen=True)
-class Exhausted:
+class Exhausted(Unread):
     """Samples whose reading takes more memory than there is."""
-
-    samples: Any
-
-    grid = property(lambda self: self.samples.grid)
-    stored_bytes = 0
-
-    def whole(self):
-        return None
-
-    def check_complete(self):
-        pass
 
     def read(self, block):
         raise MemoryError

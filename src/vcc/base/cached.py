@@ -16,7 +16,9 @@ Value = TypeVar("Value")
 
 
 def cached(compute: Callable[[Owner], Value]) -> Callable[[Owner], Value]:
-    """Compute a property once for each object, and keep it with the object; written below ``@property``.
+    """Compute a property once for each object, and keep it with the object.
+
+    Written below ``@property``, by which type checkers and the pages of the API know it for one.
 
     Threads that ask for the same object's value at one time may each compute it; all that ask later get one of
     them.

@@ -31,6 +31,7 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.fields.sampled import library_of
 
 THREADS = 128
 """Of a block, side by side along memory: four warps, each of which reads one piece of memory. Small blocks leave
@@ -109,7 +110,7 @@ def in_turn_with(values: Any) -> Iterator[None]:
     Raises:
         InputError: what `is_on_gpu` refuses.
     """
-    library = _library(values) if is_on_gpu(values) else ""
+    library = library_of(values) if is_on_gpu(values) else ""
     if library == "torch":
         number = values.device.index
         theirs = sys.modules["torch"].cuda.current_stream(values.device).cuda_stream
@@ -129,15 +130,10 @@ def in_turn_with(values: Any) -> Iterator[None]:
 
 def wait_for(one: Any, other: Any) -> None:
     """What is started in another stream from now on waits for what was started in one."""
-    if one is not other:
+    if one != other:
         reached = cuda.event()
         reached.record(one)
         reached.wait(other)
-
-
-def _library(values: Any) -> str:
-    """The package that an array comes from."""
-    return type(values).__module__.split(".")[0]
 
 
 def this_gpu() -> int:
@@ -251,7 +247,7 @@ def given_back(array: Any, like: Any) -> Any:
         array: on the GPU.
         like: the samples.
     """
-    library = _library(like)
+    library = library_of(like)
     if library == "torch":
         return sys.modules["torch"].as_tensor(array, device=like.device)
     if library == "cupy":

@@ -20,6 +20,7 @@ from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
 from vcc.engines import cuda_footprint_kernels as kernels
 from vcc.engines.cuda_arrays import (
+    DEFAULT_STREAM,
     arranged,
     cuda,
     given_back,
@@ -110,7 +111,7 @@ class Pieces:
         each = more + tables.bytes_a_column(values.shape[4] if len(values.shape) == 5 else 1)
         at_once = min(ROOM // max(each, 1), SENT_AT_ONCE // column if column else ROOM)
         self.columns = int(max(at_once, 1))
-        self.stream: Any = 0 if self.on_gpu else cuda.stream()
+        self.stream: Any = DEFAULT_STREAM if self.on_gpu else cuda.stream()
         self.threads = min(threads, COPYING)
 
     def __enter__(self) -> Iterator[Piece]:
@@ -127,7 +128,8 @@ class Pieces:
             self.pool.__exit__(*error)
             self.copying.synchronize()
             self.stream.synchronize()
-            _keep(self.places)
+            if error[0] is None:  # else a thread may still be filling them
+                _keep(self.places)
 
     def _there(self, spans: list[tuple[int, int]]) -> Iterator[Piece]:
         values = arranged(taken(self.values))

@@ -108,6 +108,11 @@ def as_array(values: Any, dtype: DTypeLike | None = None, copy: bool | None = No
     return np.array(shared, dtype=dtype, copy=False)
 
 
+def library_of(values: Any) -> str:
+    """The name of the package that an array, or what computes with it, comes from: "numpy", "torch", …"""
+    return type(values).__module__.split(".")[0]
+
+
 def has_values(values: Any) -> bool:
     """Whether an array holds numbers that can be looked at: under a tracer there are a shape and a type only.
 

@@ -20,6 +20,7 @@ from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress, tell
 from vcc.base.remarks import Remarks
 from vcc.camera import Camera, captured_together
+from vcc.fields.sampled import library_of
 from vcc.fields.samples import Samples
 from vcc.image import Image
 from vcc.learn.parameters import place, replaced
@@ -392,7 +393,7 @@ def _gathered(image: Image, number: int) -> _Gathered:
     """A picture as it is added to others; its number tells its error from theirs."""
     if not isinstance(image.values, np.ndarray):
         raise InputError(
-            f"a moving camera takes samples of NumPy, not of {type(image.values).__module__.split('.')[0]}, "
+            f"a moving camera takes samples of NumPy, not of {library_of(image.values)}, "
             "whose gradients would end here: sum pictures of camera.capture yourself"
         )
     return _Gathered(image.values.astype(np.float64), image.missing_rays, {number: image.sampling_error})

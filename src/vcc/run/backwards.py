@@ -197,10 +197,8 @@ class Backwards:
     def _cut(self) -> Blocks:
         """Blocks of stored samples: with each, the derivative to it is in memory, and to what is made of it."""
         drive = self.drive
-        need, kept = (
-            drive.need,
-            self.plan.kept_as(drive.samples.grid.kind)[0],
-        )  # of which a view's bytes are counted
+        need = drive.need
+        kept = self.plan.kept_as(drive.samples.grid.kind)[0]  # of which a view's bytes are counted
         each = self._kind.itemsize / kept.itemsize
         times = (need.times if self._reads else 0.0) + each * (3 if self.plan.before else 1)
         fixed = need.fixed + 8 * math.prod(self.plan.core.raster_shape) * drive.channels

@@ -146,7 +146,7 @@ def _made(batch: Sequence[Drive], pool: Workers, then: Callable[[int, Partial], 
     if len(batch) == 1:
         return [then(0, first.rounds())]
     if not first.in_memory:
-        rasters = over_blocks(batch, first.reading_for(batch).blocks)
+        rasters = over_blocks(batch)
         return list(pool.map(then, range(len(batch)), rasters))
     for drive in batch:
         preset(drive, prepared=first.prepared)  # once for all, for the way back, too

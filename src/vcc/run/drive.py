@@ -466,18 +466,21 @@ class Drive:
 
 
 def over_blocks(
-    drives: Sequence[Drive], blocks: Iterable[Block], beside: int = 0, progress: Progress | None = None
+    drives: Sequence[Drive],
+    blocks: Iterable[Block] | None = None,
+    beside: int = 0,
+    progress: Progress | None = None,
 ) -> list[Partial]:
     """The rasters of plans that look at the same blocks, each of which is read once: sums in double precision.
 
     Args:
         drives: plans with the same `Drive.shared`, or one. The first says how blocks are read.
-        blocks: of the light field. Those of which no view is looked at are not read.
+        blocks: of the light field; None for all. Those of which no view is looked at are not read.
         beside: see `Drive.summed`; 0 for several.
         progress: called with (done, total).
     """
     reader = drives[0].reading_for(drives)
-    used = list(filter(reader.used_in, blocks))
+    used = list(filter(reader.used_in, reader.blocks if blocks is None else blocks))
     counted = Counted(progress, sum(map(reader.used_in, used)))
     trees = [Tree(sum(map(bool, map(drive.used_in, used))), _sum) for drive in drives]
     numbers = [count() for _ in drives]

@@ -20,6 +20,7 @@ from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.fields.disparity import Disparities
 from vcc.fields.grid import Block, Grid
+from vcc.fields.sampled import library_of
 from vcc.fields.samples import InMemory, Samples
 from vcc.plan.how import How
 from vcc.plan.model import Plan
@@ -182,7 +183,7 @@ class Operator:
 
     def _checked(self, what: str, given: Any, shape: tuple[int, ...]) -> NDArray[Any]:
         """Numbers of a shape, or several of them, in this type."""
-        if (library := type(given).__module__.split(".")[0]) not in ("numpy", "builtins"):
+        if (library := library_of(given)) not in ("numpy", "builtins"):
             raise InputError(
                 f"an operator takes arrays of NumPy, not of {library}: pass numpy.asarray({what}); "
                 "vcc.torch.CameraModule carries gradients"

@@ -12,6 +12,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.disparity import Disparities
 from vcc.fields.grid import Block, Grid
+from vcc.fields.sampled import library_of
 from vcc.fields.samples import Samples
 from vcc.plan.how import How
 from vcc.plan.model import Plan
@@ -32,7 +33,7 @@ def check_may_be_sent(samples: Samples) -> None:
     if not isinstance(whole, np.ndarray):
         raise InputError(
             f"executor= takes light fields in NumPy arrays or in stores, not in those of "
-            f"{type(whole).__module__.split('.')[0]}: leave it out, or pass "
+            f"{library_of(whole)}: leave it out, or pass "
             "light_field.replaced(numpy.asarray(values))"
         )
     size = math.prod(whole.shape) * whole.dtype.itemsize
