@@ -18,7 +18,7 @@ from vcc.plan.choice import compile_best
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.operators import SharpenViews
-from vcc.plan.rays.compile import compile_rays
+from vcc.plan.rays.compile import ByRays
 from vcc.run.drive import drive
 from vcc.store import save_store
 
@@ -43,7 +43,7 @@ CAMERA = vcc.Camera([LENS], vcc.Sensor(D, (6, 7), D * SLOPE))
 
 
 def plan_of(lf: vcc.LightField, **options) -> Plan:
-    return compile_rays(CAMERA, lf.grid, How(**options))
+    return ByRays(CAMERA, lf.grid, How(**options)).plan
 
 
 def sharpened(plan: Plan, values: np.ndarray, name: str):
@@ -148,7 +148,7 @@ def test_one_view_imaged_onto_pixels_of_its_own_size_gives_itself_back(sample):
 
 def record_upright(camera: vcc.Camera, lf: vcc.LightField, **options) -> np.ndarray:
     # A lens turns its picture by half a turn.
-    return drive(compile_rays(camera, lf.grid, How(**options)), lf).values[::-1, ::-1].astype(float)
+    return drive(ByRays(camera, lf.grid, How(**options)).plan, lf).values[::-1, ::-1].astype(float)
 
 
 def test_a_picture_of_an_even_scene_keeps_its_light():
@@ -165,7 +165,7 @@ def test_pictures_agree_between_engines_and_in_pieces(tmp_path, kind, channels):
     lf = field(values)
     array = vcc.LensArray(focal_length=2 * mm, pitch=1 * mm, z=D - 3 * mm)
     camera = vcc.Camera([LENS, array], vcc.Sensor(D, (12, 14), D * SLOPE))
-    plan = compile_rays(camera, lf.grid, How(samples=16))
+    plan = ByRays(camera, lf.grid, How(samples=16)).plan
     whole = drive(plan, lf)
     other = drive(plan, lf, How(engine="reference")).values
     assert np.abs(whole.values - other).max() <= 1e-5 * other.max()  # docs/how-it-works: engines agree to 1e-5

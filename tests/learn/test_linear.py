@@ -105,6 +105,6 @@ def test_a_mask_of_a_million_cells_is_learned_at_once():
     weights = {"core.masks[0].texture": np.ones(texture.shape)}
     change = np.random.default_rng(2).uniform(-0.1, 0.1, cells.shape)
     other = Chain(put(camera, {"code.pattern": cells + change}), field().grid, None, [])
-    other.decisions = chain.decisions
+    other.choices = chain.choices
     found = other.plan().numbers()["core.masks[0].texture"] - texture
     assert np.sum(chain.pull({}, weights)["code.pattern"] * change) == pytest.approx(found.sum(), rel=1e-9)

@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc.base.affine import Affine
 from vcc.base.units import mm
 from vcc.engines import numba_cpu, reference
 from vcc.optics.scatter import Scatter
-from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.depth_rule import denser
-from vcc.plan.footprints.around import Sharpened, _check_raster, _smear, sharp_footprint
+from vcc.plan.following import Follow
+from vcc.plan.footprints.around import Sharpened, _check_raster, choose_gaps, choose_sharp_footprint, filled
 from vcc.plan.footprints.cells import Detail, Geometry, SampleDivision, _misplaced, divide_samples, divide_views
-from vcc.plan.footprints.compile import compiled, used_taps
+from vcc.plan.footprints.compile import ByFootprints, choose_taps
 from vcc.plan.footprints.diffusers import Blurs
-from vcc.plan.footprints.landing import _cleaned
+from vcc.plan.footprints.landing import Landing, choose_landing
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision
@@ -29,8 +30,8 @@ from vcc.plan.how import How
 from vcc.plan.in_focus import share_in_focus
 from vcc.plan.parallax_rule import BetweenViews, index_motions
 from vcc.plan.protocol import Gradient, Partial
-from vcc.plan.rays.aim import KeptAim
-from vcc.plan.rays.compile import _motion, compile_rays
+from vcc.plan.rays.aim import AimChoices, StopChoices
+from vcc.plan.rays.compile import ByRays, _motion
 from vcc.plan.rays.steps import Unscatter
 from vcc.shapes.kernels import Gaussian, TopHat
 from vcc.shapes.patterns import Cells, Circle, CosineSum
@@ -231,32 +232,45 @@ def test_steps_across_are_rounding_where_a_whole_view_hardly_moves():
         for crossing, cleared in ((0.99e-6 / 9, True), (1.01e-6 / 9, False)):
             step = np.diag([1.3, -0.8])
             step[place] = crossing
-            for decisions in (ANEW, Decisions()):
-                made = _cleaned(step, (8, 9), decisions)
-                np.testing.assert_array_equal(made, np.diag([1.3, -0.8]) if cleared else step)
-                if decisions is not ANEW and cleared:
-                    grown = np.diag([1.3, -0.8])
-                    grown[place] = 1e-5
-                    with pytest.raises(vcc.InputError, match="rows of samples"):
-                        _cleaned(grown, (8, 9), decisions)
-    np.testing.assert_array_equal(_cleaned(np.diag([1e-12, -2e-12]), (8, 9), ANEW), np.diag([1e-7, -1e-7]))
-    np.testing.assert_array_equal(_cleaned(np.diag([1.1e-7, 0.9e-7]), (8, 9), ANEW), np.diag([1.1e-7, 1e-7]))
+            choices, made = landed(step)
+            np.testing.assert_array_equal(made, np.diag([1.3, -0.8]) if cleared else step)
+            if cleared:
+                grown = np.diag([1.3, -0.8])
+                grown[place] = 1e-5
+                with pytest.raises(vcc.InputError, match="rows of samples"):
+                    landed(grown, choices)
+    np.testing.assert_array_equal(landed(np.diag([1e-12, -2e-12]))[1], np.diag([1e-7, -1e-7]))
+    np.testing.assert_array_equal(landed(np.diag([1.1e-7, 0.9e-7]))[1], np.diag([1.1e-7, 1e-7]))
 
 
-def test_the_margin_of_tents_has_room_where_decisions_are_kept():
-    guard, tents = _smear((3.0, 2.0), ANEW)
+def landed(step, choices=None):
+    """Steps (2×2) of a view of 8×9 samples as they are taken, pixels of 1 m and axes as they are."""
+    grid = vcc.LightField.from_views(np.ones((1, 1, 8, 9), np.float32), 1.0, 1.0).grid
+    frame = grid.frame.matrix.copy()
+    frame[:2, 2:4] = step
+    moved = replace(grid, frame=Affine(frame))
+    camera = vcc.Camera([], vcc.Sensor(0.0, (8, 9), 1.0))
+    choices = choices or choose_landing(camera, moved)
+    return choices, Landing.of(camera, moved, choices).step
+
+
+def test_the_margin_of_tents_has_room_where_they_follow_a_camera():
+    def tented(gaps, choices=None):
+        return filled(gaps, choices or choose_gaps(gaps), (9, 9))
+
+    guard, tents = tented((3.0, 2.0))
     assert (guard, len(tents.down), len(tents.across)) == (4, 9, 7)
     assert tents.half_widths == (3.0, 2.0)
-    assert _smear((1.0, 0.5), ANEW) == (0, None)
-    halved = _smear((3.0, 1.0), ANEW)
+    assert tented((1.0, 0.5)) == (0, None)
+    halved = tented((3.0, 1.0))
     assert (halved[0], halved[1].half_widths) == (4, (3.0, 0.0))
-    decisions = Decisions()
-    guard, tents = _smear((3.0, 2.0), decisions)
+    choices = choose_gaps((3.0, 2.0), Follow())
+    guard, tents = tented((3.0, 2.0), choices)
     assert (guard, len(tents.down), len(tents.across)) == (6, 11, 7)  # ⌈1.25·3 + ½⌉ = 5, ⌈1.25·2 + ½⌉ = 3
-    assert _smear((5.5, 3.5), decisions)[1].half_widths == (5.5, 3.5)
+    assert tented((5.5, 3.5), choices)[1].half_widths == (5.5, 3.5)
     for gaps in ((5.6, 2.0), (3.0, 3.6)):
         with pytest.raises(vcc.InputError, match="gaps between views"):
-            _smear(gaps, decisions)
+            tented(gaps, choices)
 
 
 def test_rasters_are_as_large_as_memory_allows():
@@ -269,9 +283,9 @@ def test_rasters_are_as_large_as_memory_allows():
 def test_taps_without_light_are_left_out_unless_they_may_be_lit_later():
     weights = np.zeros((4, 5))
     weights[1, 2] = weights[3, 2] = weights[3, 4] = 1
-    assert [each.tolist() for each in used_taps(weights)] == [[1, 3], [2, 4]]
-    assert [each.tolist() for each in used_taps(0 * weights)] == [[0], [0]]
-    assert [each.tolist() for each in used_taps(weights, Decisions())] == [[0, 1, 2, 3], [0, 1, 2, 3, 4]]
+    assert [each.tolist() for each in choose_taps(weights)] == [[1, 3], [2, 4]]
+    assert [each.tolist() for each in choose_taps(0 * weights)] == [[0], [0]]
+    assert [each.tolist() for each in choose_taps(weights, Follow())] == [[0, 1, 2, 3], [0, 1, 2, 3, 4]]
 
 
 @pytest.mark.parametrize(
@@ -287,11 +301,11 @@ def test_taps_without_light_are_left_out_unless_they_may_be_lit_later():
     ],
 )
 def test_footprints_that_are_sharpened(step, parts, hard, footprint):
-    assert sharp_footprint(step, SampleDivision(parts, 0.0, hard), ANEW) == footprint
+    assert choose_sharp_footprint(step, SampleDivision(parts, 0.0, hard)) == footprint
 
 
 def test_aims_are_alike_where_they_aim_at_the_same_by_as_many_rays():
-    one = KeptAim(True, ((0.1, 0.2),), (0, 1), None, (1, 2), 3)
+    one = AimChoices(StopChoices((), (), None, None), (), True, ((0.1, 0.2),), (0, 1), None, (1, 2), 3)
     assert one.like(replace(one, bends=(None,), towards=(1, "a")))
     for other in ({"everything": False}, {"strips": (0, 2)}, {"reach": (2, 2)}, {"halvings": 2}):
         assert not one.like(replace(one, **other))
@@ -304,12 +318,12 @@ def test_pieces_are_divided_as_the_whole_is_along_the_axes_that_pixels_have(degr
     angle = math.radians(degrees)
     turn = np.round([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     train = vcc.Camera([vcc.FirstOrder(np.kron(np.eye(2), turn)), LENS], SENSOR)
-    made = compiled(train, FIELD[:, :, 2:-1, 3:].grid, How(), Blurs(None, None))
-    assert made.in_path.divided.geometry.beyond == beyond
-    assert made.in_path.divided.geometry.samples == ((6, 8) if degrees == 0 else (8, 6))
-    assert made.in_path.divided.geometry.views == (5, 6)
-    margin = made.in_path.divided.geometry.margin
-    assert margin == 4 + max(made.in_path.between.gap_filled)
+    made = ByFootprints(train, FIELD[:, :, 2:-1, 3:].grid, How(), Blurs(None, None))
+    assert made.geometry.beyond == beyond
+    assert made.geometry.samples == ((6, 8) if degrees == 0 else (8, 6))
+    assert made.geometry.views == (5, 6)
+    margin = made.geometry.margin
+    assert margin == 4 + max(made.between.gap_filled)
 
 
 # --- sums that add up ---
@@ -377,10 +391,10 @@ class Frosted(vcc.Element):
         )
 
 
-@pytest.mark.parametrize("decisions", [ANEW, Decisions()])
-def test_kernels_that_vary_by_functions_become_textures(decisions):
+@pytest.mark.parametrize("follow", [None, Follow()])
+def test_kernels_that_vary_by_functions_become_textures(follow):
     camera = vcc.Camera([LENS, Frosted(z=20 * mm, decentre=(0.3 * mm, -0.2 * mm))], SENSOR)
-    core = compile_rays(camera, FIELD.grid, How(method="rays"), decisions=decisions).core
+    core = ByRays(camera, FIELD.grid, How(method="rays"), follow=follow).plan.core
     (step,) = (step for step in core.steps if isinstance(step, Unscatter))
     x, y = RANDOM.uniform(-1 * mm, 1 * mm, (2, 50))
     first, last = np.moveaxis(step.cumulative(x + 0.3 * mm, y - 0.2 * mm), -1, 0)
@@ -389,7 +403,7 @@ def test_kernels_that_vary_by_functions_become_textures(decisions):
     np.testing.assert_allclose(step.width(x + 0.3 * mm, y - 0.2 * mm)[..., 0], 1 + 100 * y, atol=1e-6)
     assert (step.kernels, step.pick, step.column) == (2, 8, 4)
     assert core.points.shape[1] == 9
-    assert compile_rays(camera, FIELD.grid, How(method="rays")).grid_shape == (5, 6, 9, 11)
+    assert ByRays(camera, FIELD.grid, How(method="rays")).plan.grid_shape == (5, 6, 9, 11)
 
 
 def test_sheets_of_diffusers_are_looked_up_where_they_stand():
@@ -398,7 +412,7 @@ def test_sheets_of_diffusers_are_looked_up_where_they_stand():
     diffuser = vcc.CodedDiffuser(
         Gaussian(0.01), 6 * mm, widths=widths, height=6 * mm, z=20 * mm, decentre=(0.3 * mm, -0.2 * mm)
     )
-    core = compile_rays(vcc.Camera([LENS, diffuser], SENSOR), FIELD.grid, How()).core
+    core = ByRays(vcc.Camera([LENS, diffuser], SENSOR), FIELD.grid, How()).plan.core
     (step,) = (step for step in core.steps if isinstance(step, Unscatter))
     x, y = (np.arange(6) - 2.5) * mm + 0.3 * mm, (np.arange(4) - 1.5) * 1.5 * mm - 0.2 * mm
     found = step.width(*np.meshgrid(x, y))[..., 0]
@@ -491,7 +505,7 @@ def test_what_is_in_focus_takes_in_the_samples_beside_it():
 )  # fmt: skip
 def test_compiled_rays_go_by_the_numbers_of_the_steps(elements):
     """What steps hand to compiled code gives the picture of the steps themselves; see tests/engines for more."""
-    core = compile_rays(vcc.Camera([LENS, *elements], SENSOR), FIELD.grid, How(samples=16)).core
+    core = ByRays(vcc.Camera([LENS, *elements], SENSOR), FIELD.grid, How(samples=16)).plan.core
     values = FIELD.values
     wanted = reference.run(core, values, threads=1).values
     found = numba_cpu.run(core, values, threads=1).values
@@ -549,6 +563,6 @@ def test_samples_too_wide_to_be_sharpened_are_interpolated_by_cubics():
             np.diag([size, size]),
             (1, 1),
         )
-        made = Sharpened.of(core, "mean", ANEW)
+        made = Sharpened.of(core, "mean", Sharpened.choose(core, "mean"))
         assert (made.core.interpolation == "cubic") is cubic
         assert (made.along is None) is cubic

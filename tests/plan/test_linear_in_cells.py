@@ -14,8 +14,7 @@ import pytest
 import vcc
 from vcc import patterns, surfaces
 from vcc.base.units import mm
-from vcc.plan.choice import compile_best, mixture_of
-from vcc.plan.decisions import Decisions
+from vcc.plan.choice import compile_best, compute, decide, mixture_of
 from vcc.plan.footprints import against_sensor
 from vcc.plan.footprints.aperture import Aperture, OpenParts
 from vcc.plan.footprints.mixtures import Mixture
@@ -124,11 +123,10 @@ def holders(camera):
 def test_numbers_that_are_linear_in_what_elements_hold_say_so_by_their_transposes(name):
     """⟨w, d(numbers)⟩ = ⟨back(w), d(what is held)⟩, the left side by central differences of plans made again."""
     elements, options = CASES[name]
-    camera, how, decisions = vcc.Camera(elements, SENSOR), How(**options), Decisions()
-    with decisions.noting() as noted:
-        plan = compile_best(camera, FIELD.grid, how, decisions)
-    listed = list(noted)
-    told = 0
+    camera, how = vcc.Camera(elements, SENSOR), How(**options)
+    choices = decide(camera, FIELD.grid, how)
+    computed = compute(camera, FIELD.grid, how, choices)
+    plan, listed, told = computed.plan, computed.linears, 0
     for thing, field, made in holders(camera):
         held = getattr(thing, field)
         values = np.array(list(held.values())) if isinstance(held, dict) else np.array(held, dtype=np.float64)
@@ -137,7 +135,7 @@ def test_numbers_that_are_linear_in_what_elements_hold_say_so_by_their_transpose
         def plan_with(sign, values=values, change=change, held=held, made=made):
             moved = values + sign * change
             given = dict(zip(held, moved, strict=True)) if isinstance(held, dict) else moved
-            return compile_best(made(given), FIELD.grid, how, decisions).numbers()
+            return compute(made(given), FIELD.grid, how, choices).plan.numbers()
 
         low, high = plan_with(-1), plan_with(1)
         wanted = got = 0.0
@@ -234,7 +232,8 @@ def test_where_nothing_absorbs_all_cells_are_open():
 def test_what_is_open_of_cells_says_of_a_masks_cells_what_it_follows_from(number, step, finer):
     cells = PATTERNS[0]
     planes = [plane(pattern, step) for pattern in PATTERNS[:number]]
-    aperture = Aperture(planes, taps(finer), np.zeros((2, 2)), (8, 9), Decisions())
+    aperture = Aperture(planes, taps(finer), np.zeros((2, 2)), (8, 9))
+    aperture = replace(aperture, chosen=aperture.choices())
     shape = aperture.open_parts().weights.shape
     weights = OpenParts(RANDOM.standard_normal(shape), RANDOM.standard_normal((*shape, 2)))
     change = 1e-5 * RANDOM.uniform(-1, 1, cells.values.shape)
@@ -294,7 +293,7 @@ def test_a_mask_that_varies_within_pixels_weighs_the_light_there(fill):
 def test_masks_that_are_even_within_pixels_have_no_detail():
     sensor = vcc.Sensor(0.0, (3, 4), 0.2 * mm)
     even = Plane(Cells(RANDOM.random((3, 4)), 0.8 * mm), "mask", (0.0, 0.0), np.zeros((2, 4)), np.zeros(2))
-    assert against_sensor.detail(sensor, [even]) is None
+    assert not against_sensor.counts(against_sensor.detail(sensor, [even]))
     assert against_sensor.detail(sensor, []) is None
     assert against_sensor.transmission(sensor, []) is None
     both = against_sensor.transmission(sensor, [even, even])

@@ -9,8 +9,8 @@ import pytest
 
 import vcc
 from vcc.base.units import mm, um
-from vcc.plan.decisions import Decisions
-from vcc.plan.footprints.mask_textures import mask_as_met, texture_error
+from vcc.plan.following import Follow
+from vcc.plan.footprints.mask_textures import MaskMet, texture_error
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.shapes import patterns
@@ -40,7 +40,8 @@ def test_what_is_looked_up_errs_by_what_is_told_of_it(points):
     plane = Plane(patterns.CosineSum((period, math.inf)), "", (0, 0), np.diag([0, 0, step, 1e3])[2:], np.zeros(2))
     still = np.zeros((2, 2))
     taps = Taps.of((1, 1), CellDivision(1, False))
-    lookup, _ = mask_as_met(plane, taps, np.zeros((1, 1, 2)), still, (5, 400), 1, decisions=Decisions())
+    met = MaskMet.of(plane, taps, np.zeros((1, 1, 2)), still, (5, 400), 1)
+    lookup, _ = met.look_up(met.choices(Follow()))
     assert lookup.texture.dtype == np.float64
     assert lookup.step[0, 0] == pytest.approx(3)
     k = np.random.default_rng(0).uniform(10, 390, 4000)

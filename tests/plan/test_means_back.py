@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from vcc.base.units import mm
-from vcc.plan.decisions import Decisions
-from vcc.plan.footprints.means import Boxes, mean_over
+from vcc.plan.footprints.means import Boxes, choose_mean, mean_over
 from vcc.plan.footprints.means_back import mean_back
 from vcc.shapes.mean_back import holds
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, as_pattern
@@ -54,9 +53,10 @@ def test_it_is_the_transpose_of_the_mean(name, where, size):
     pattern = PATTERNS[name](cells)
     weights = generator.standard_normal(np.broadcast_shapes(x.shape, y.shape))
     changed = PATTERNS[name](Cells(values + change, 6 * mm, 5 * mm))
-    decisions = Decisions()
-    difference = mean_over(changed, x, y, *size, decisions) - mean_over(pattern, x, y, *size, decisions)
-    back = mean_back(pattern, Boxes(x, y, *size), decisions, weights, cells)
+    boxes = Boxes(x, y, *size)
+    chosen = choose_mean(pattern, boxes)
+    difference = mean_over(changed, boxes, chosen) - mean_over(pattern, boxes, chosen)
+    back = mean_back(pattern, boxes, chosen, weights, cells)
     assert back.shape == values.shape
     assert np.sum(weights * difference) == pytest.approx(np.sum(back * change), rel=1e-9, abs=1e-12)
 
@@ -64,7 +64,7 @@ def test_it_is_the_transpose_of_the_mean(name, where, size):
 def test_places_without_any_size_read_the_cell_that_holds_them():
     cells = Cells(np.random.default_rng(1).random((5, 6)), 6 * mm, 5 * mm)
     x, y = np.array([0.5, -1.5]) * mm, np.array([1.0, -2.0]) * mm
-    back = mean_back(cells, Boxes(x, y, 0.0, 0.0), Decisions(), np.array([2.0, 3.0]), cells)
+    back = mean_back(cells, Boxes(x, y, 0.0, 0.0), None, np.array([2.0, 3.0]), cells)
     wanted = np.zeros((5, 6))
     wanted[3, 3], wanted[0, 1] = 2, 3
     np.testing.assert_allclose(back, wanted, atol=1e-12)

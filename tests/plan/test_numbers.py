@@ -1,11 +1,13 @@
-"""The numbers of plans by name, and decisions that are taken once."""
+"""The numbers of plans by name, choices compared, and costly parts that are kept."""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 import vcc
 from vcc.plan.choice import compile_best
-from vcc.plan.decisions import Decisions
+from vcc.plan.following import Parts, choice, differences
 from vcc.plan.how import How
 from vcc.plan.numbers import numbers, with_numbers
 from vcc.units import mm, um
@@ -61,12 +63,43 @@ def test_names_that_do_not_exist_are_refused():
         with_numbers(plan().core, {"colour": 1.0})
 
 
-def test_decisions_are_taken_once_and_compared():
-    one, other = Decisions(), Decisions()
-    assert one.keep("taps", lambda: 3) == 3
-    assert one.keep("taps", lambda: 4) == 3
-    assert other.keep("taps", lambda: 4) == 4
-    assert one.keep("filter", lambda: np.ones(3)).size == 3
-    assert other.keep("filter", lambda: np.ones(3)).size == 3
-    assert one.differences(other) == ("taps",)
-    assert one.differences(one) == ()
+@dataclass(frozen=True, eq=False)
+class Inner:
+    size: float = choice("size", lambda one, other: abs(one - other) < 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Outer:
+    unsaid: int
+    taps: int = choice("taps")
+    filter: np.ndarray = choice("filter")
+    own: Inner = choice("")
+    masks: tuple[Inner, ...] = choice("mask")
+
+
+def test_choices_are_compared_in_words():
+    one = Outer(1, 3, np.ones(3), Inner(1.0), (Inner(1.0), Inner(2.0)))
+    assert differences(one, one) == ()
+    assert differences(one, replace(one, unsaid=2, own=Inner(1.4), filter=np.ones(3))) == ()
+    assert differences(one, replace(one, taps=4, filter=np.zeros(3))) == ("taps", "filter")
+    assert differences(one, replace(one, own=Inner(2.0))) == ("size",)
+    assert differences(one, replace(one, masks=(Inner(1.0), Inner(3.0)))) == ("mask 2, size",)
+    assert differences(one, replace(one, masks=(Inner(1.0),))) == ("mask",)
+
+
+def test_costly_parts_are_made_once_for_what_they_depend_on():
+    asked: list[int] = []
+
+    def part(number):
+        return parts.part("number", lambda: number, lambda: asked.append(number) or [number])
+
+    parts = Parts()
+    assert part(1) is not part(1)  # nobody keeps them
+    with parts.keeping():
+        kept = part(1)
+    assert part(1) is kept
+    assert part(2) is not part(2)
+    with parts.keeping():
+        part(2)
+    assert part(1) is not kept  # of the last plan that kept them
+    assert asked == [1, 1, 1, 2, 2, 2, 1]

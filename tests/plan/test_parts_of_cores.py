@@ -18,7 +18,7 @@ from vcc.fields.grid import Block
 from vcc.plan.footprints.model import Footprints, MaskLookup
 from vcc.plan.how import How
 from vcc.plan.numbers import numbers
-from vcc.plan.rays.compile import compile_rays
+from vcc.plan.rays.compile import ByRays
 from vcc.plan.rays.model import Rays
 from vcc.shapes.kernels import Gaussian
 
@@ -208,7 +208,7 @@ def grid_of(shape=(7, 7, 20, 24)):
 
 def rays_core(*elements, sensor=None, **options) -> Rays:
     sensor = sensor or vcc.Sensor(D + 0.3 * mm, (5, 6), D * 2e-3, decentre=(0.2 * mm, -0.1 * mm))
-    return compile_rays(vcc.Camera(elements, sensor), grid_of(), How(**options)).core
+    return ByRays(vcc.Camera(elements, sensor), grid_of(), How(**options)).plan.core
 
 
 CORES = {
@@ -298,13 +298,13 @@ def test_which_rays_fall_into_the_grid_of_views():
 def test_bands_of_views_are_wider_than_what_a_row_of_pixels_sees():
     """In focus a row of pixels of 2 samples sees these and those that look-ups and neighbouring views take."""
     sensor = vcc.Sensor(D, (40, 3), 2 * D * 2e-3)
-    core = compile_rays(vcc.Camera([LENS], sensor), grid_of((3, 3, 400, 6)), How()).core
+    core = ByRays(vcc.Camera([LENS], sensor), grid_of((3, 3, 400, 6)), How()).plan.core
     row = np.array([0, 39])
     low, high = core.reach.samples(1, row, row, 3)
     spread = float((high.max(axis=1) - low.min(axis=1)).max())
     assert 2 < spread < 4
     assert core.bands == int(400 / max(2 * spread, 8))
-    assert compile_rays(vcc.Camera([LENS], sensor), grid_of((3, 3, 9, 6)), How()).core.bands == 1
+    assert ByRays(vcc.Camera([LENS], sensor), grid_of((3, 3, 9, 6)), How()).plan.core.bands == 1
 
 
 def test_how_many_rays_there_are():

@@ -19,11 +19,11 @@ from vcc.base.units import mm
 from vcc.engines import reference
 from vcc.plan.correlation import correlated
 from vcc.plan.coverage import AskedLight, Missing, _cut
-from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.following import Follow
 from vcc.plan.footprints.around import Sharpened
 from vcc.plan.footprints.cells import Geometry, SampleDivision, parts_of_sheared
 from vcc.plan.footprints.detail import detail_lost, details_lost
-from vcc.plan.footprints.mask_textures import mask_as_met
+from vcc.plan.footprints.mask_textures import MaskMet
 from vcc.plan.footprints.means import _raster
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane, along_axes, cell_tiles, depends_on_view_only, tap_origin
@@ -459,8 +459,8 @@ def test_samples_look_up_the_mean_of_a_mask_over_what_they_cover(at_index, finer
     plane = plane_of(at_index, (-2.4, -1.6), as_pattern(hills))
     motion = np.array([[0.1, 0.0], [0.0, 0.2]])
     off = 0.05 * RANDOM.uniform(-1, 1, (*taps.shares.shape, 2))
-    decisions = Decisions() if kept else ANEW
-    lookup, made = mask_as_met(plane, taps, off, motion, (6, 7), 2, over_samples, decisions)
+    met = MaskMet.of(plane, taps, off, motion, (6, 7), 2, over_samples)
+    lookup, made = met.look_up(met.choices(Follow() if kept else None))
     assert lookup.texture.dtype == (np.float64 if kept else np.float32)
     k, l = RANDOM.uniform(0, 6, 5), RANDOM.uniform(0, 5, 4)
     for mesh, parts in taps.levels():
@@ -597,7 +597,7 @@ def test_a_bright_sample_is_as_wide_as_what_nobody_gives_back(step, sample, refi
         (41, 41), interpolation, 1.0, np.zeros(1, int), np.zeros(1, int), one, 20 * one, 20 * one, step, (1, 1),
         refine=refine, opening=0.75,
     )  # fmt: skip
-    made = Sharpened.of(core, sample, ANEW)
+    made = Sharpened.of(core, sample, Sharpened.choose(core, sample))
     found, places = np.zeros((2, 2)), np.arange(41.0)
     for dx, dy in itertools.product(offsets, offsets):
         moved = replace(made.core, x=core.x + dx, y=core.y + dy)

@@ -16,7 +16,6 @@ from vcc.base.affine import Affine
 from vcc.base.units import mm
 from vcc.optics.deflections import CellDeflection
 from vcc.plan.choice import compile_best
-from vcc.plan.decisions import ANEW
 from vcc.plan.depth_rule import Parallax, denser
 from vcc.plan.footprints.diffusers import (
     _on_lattice,
@@ -35,7 +34,7 @@ from vcc.plan.rays.bounds.cell_windows import Seen
 from vcc.plan.rays.bounds.slopes import Bound
 from vcc.plan.rays.bounds.windows import CellOpening, CellWindows, Sight, Stop, Window
 from vcc.plan.rays.points import columns_of, table
-from vcc.plan.rays.textures import Sampled, made_fine_enough, means_around
+from vcc.plan.rays.textures import Enough, Sampled, made_fine_enough, means_around
 from vcc.shapes import kernels
 from vcc.shapes.lattice import Lattice
 from vcc.shapes.patterns import Circle, as_pattern
@@ -187,7 +186,7 @@ def test_weights_of_kernels_are_as_wide_as_the_kernels(kernel, steps):
     slopes, shares_of = kernel.quadrature()
     places = slopes @ steps.T
     wanted = (shares_of[:, None, None] * places[:, :, None] * places[:, None, :]).sum(axis=0)
-    plain, sharp = (_on_lattice(kernel, steps, given_back, ANEW) for given_back in (False, True))
+    plain, sharp = (_on_lattice(kernel, steps, given_back) for given_back in (False, True))
     for weights, low, high in ((plain, 0.01, 0.2), (sharp, -0.05, 0.05)):
         assert weights.sum() == pytest.approx(1, abs=1e-6)
         assert all(n % 2 for n in weights.shape)
@@ -309,15 +308,15 @@ def test_textures_may_be_coarse_where_nobody_would_see_it():
     rough = sampled(lambda x, y: np.sin(9 * x) * np.cos(7 * y))
     assert made_fine_enough(rough, (5, 9, 17))[0].values.shape[0] == 17
     # points half as far apart as is enough, or as far
-    assert made_fine_enough(rough, (5, 9, 17), spacing_enough=np.array([0.5, 1.0]))[0].values.shape[0] == 5
-    assert made_fine_enough(rough, (5, 9, 17), spacing_enough=np.array([0.4, 1.0]))[0].values.shape[0] == 9
-    assert made_fine_enough(rough, (5, 9, 17), spacing_enough=np.array([0.5, 0.4]))[0].values.shape[0] == 17
+    assert made_fine_enough(rough, (5, 9, 17), Enough(np.array([0.5, 1.0])))[0].values.shape[0] == 5
+    assert made_fine_enough(rough, (5, 9, 17), Enough(np.array([0.4, 1.0])))[0].values.shape[0] == 9
+    assert made_fine_enough(rough, (5, 9, 17), Enough(np.array([0.5, 0.4])))[0].values.shape[0] == 17
     # of slopes that move rays by so little of a sample that it does not matter: 1e-3
     _, error = made_fine_enough(rough, (5,))
     rms = error * np.abs(made_fine_enough(rough, (5,))[0].values).max()
     for factor, points in ((0.99e-3 / rms, 5), (1.01e-3 / rms, 9)):
         moves = np.array([[0.0], [0.3], [factor], [0.0]]) * [[1], [factor], [1], [1]]
-        assert made_fine_enough(rough, (5, 9, 17), index_from_value=moves)[0].values.shape[0] == points
+        assert made_fine_enough(rough, (5, 9, 17), Enough(index_from_value=moves))[0].values.shape[0] == points
     dark = sampled(lambda x, y: 0 * x + 0 * y)
     assert made_fine_enough(dark, (5, 9))[1] == 0
 

@@ -17,7 +17,7 @@ from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.rays import points, steps
 from vcc.plan.rays.bounds.windows import CellWindows, Window
-from vcc.plan.rays.compile import compile_rays
+from vcc.plan.rays.compile import ByRays
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.points import TABLE, hashed
 from vcc.plan.rays.steps import Bundle
@@ -37,7 +37,7 @@ def field(shape=(7, 7, 9, 11), **options) -> vcc.LightField:
 
 def made_of(*elements: Element, sensor: vcc.Sensor | None = None, **options) -> Plan:
     sensor = sensor or vcc.Sensor(D, (7, 8), D * 2e-3)
-    return compile_rays(vcc.Camera(elements, sensor), field().grid, How(**options))
+    return ByRays(vcc.Camera(elements, sensor), field().grid, How(**options)).plan
 
 
 def plan_of(*elements: Element, sensor: vcc.Sensor | None = None, **options) -> Rays:

@@ -11,11 +11,11 @@ import pytest
 import vcc
 from vcc import patterns, surfaces
 from vcc.base.units import mm
-from vcc.plan.decisions import Decisions
+from vcc.plan.following import Follow
 from vcc.plan.how import How
-from vcc.plan.rays.aim import aimed
+from vcc.plan.rays.aim import found
 from vcc.plan.rays.bounds.windows import CellWindows, Window
-from vcc.plan.rays.compile import compile_rays
+from vcc.plan.rays.compile import ByRays
 from vcc.plan.rays.path import Path
 
 RANDOM = np.random.default_rng(6)
@@ -117,8 +117,8 @@ def sent_forward(camera, rays, places=None):
 @pytest.mark.parametrize("name", CAMERAS)
 def test_rays_come_to_their_pixels_and_weigh_what_elements_let_pass(name, kept):
     camera = vcc.Camera(CAMERAS[name], SENSOR)
-    options = {"decisions": Decisions()} if kept else {}
-    core = compile_rays(camera, FIELD.grid, How(samples=128, method="rays"), **options).core
+    options = {"follow": Follow()} if kept else {}
+    core = ByRays(camera, FIELD.grid, How(samples=128, method="rays"), **options).plan.core
     pixel = np.arange(30)
     index, share = core.looked_up(pixel, core.block(pixel))
     there, passed = sent_forward(camera, FIELD.frame(index.reshape(-1, 4)))
@@ -146,14 +146,14 @@ def test_rays_come_to_their_pixels_and_weigh_what_elements_let_pass(name, kept):
 def test_rays_are_aimed_no_wider_than_light_comes_and_meet_elements_where_that_is_foretold(name):
     """Places of rays on elements against the regions in which textures of them are made."""
     camera = vcc.Camera(CAMERAS[name], SENSOR)
-    core = compile_rays(camera, FIELD.grid, How(samples=128, method="rays")).core
+    core = ByRays(camera, FIELD.grid, How(samples=128, method="rays")).plan.core
     index, share = core.looked_up(np.arange(30), core.block(np.arange(30)))
     lit = share.reshape(-1) > 0
     assert lit.mean() >= LIT[name]
     places: list[np.ndarray] = []
     sent_forward(camera, FIELD.frame(index.reshape(-1, 4)), places)
     path = Path(camera, FIELD.grid, core.motion, 128)
-    for leg, (low, high) in zip(path.legs, aimed(path).regions, strict=True):
+    for leg, (low, high) in zip(path.legs, found(path).regions, strict=True):
         met = places[len(path.legs) - 1 - leg.number][lit]
         np.testing.assert_array_less(low - 1e-9, met.min(axis=0))
         np.testing.assert_array_less(met.max(axis=0), high + 1e-9)
@@ -172,7 +172,7 @@ def test_what_a_diffuser_adds_to_slopes_is_spread_as_its_kernel():
     sensor = vcc.Sensor(52 * mm, (5, 6), 10e-6)
     for elements in ([LENS, diffuser], [LENS, diffuser, vcc.Mask(patterns.CosineSum(9 * mm), z=30 * mm)]):
         camera = vcc.Camera(elements, sensor)
-        core = compile_rays(camera, FIELD.grid, How(samples=1024, method="rays")).core
+        core = ByRays(camera, FIELD.grid, How(samples=1024, method="rays")).plan.core
         pixel = np.arange(30)
         index, share = core.looked_up(pixel, core.block(pixel))
         assert (share > 0).all()

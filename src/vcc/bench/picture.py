@@ -25,7 +25,7 @@ from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
-from vcc.plan.decisions import WhileWanted
+from vcc.plan.following import NONE_KEPT, Parts
 from vcc.plan.model import Plan
 from vcc.plan.operators import SharpenViews
 from vcc.plan.rays.bounds.windows import CellWindows
@@ -231,7 +231,7 @@ def take(
     began = time.perf_counter()
     light_field = document.aperture.placed(light_field_of(field, document.views, fineness, progress))
     camera = train if fineness.pixels == 1 else coarser_sensor(train, fineness.pixels)
-    wanted = None if progress is None else WhileWanted(functools.partial(progress, 0, 1))
+    wanted = NONE_KEPT if progress is None else Parts(functools.partial(progress, 0, 1))
     plan = compile_best(camera, light_field.grid, None, wanted)
     if fineness.rays is not None and isinstance(plan.core, Rays):
         if isinstance(plan.core.aim, CellWindows):

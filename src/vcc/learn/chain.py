@@ -1,10 +1,10 @@
 """The way from values of parameters to the numbers of a plan, and from weights of these back to the parameters.
 
-A plan is made anew for each value of its parameters, by decisions that were taken once
-(`vcc.plan.decisions.Decisions`), so that its numbers are smooth functions of the parameters. The derivative to a
-parameter is the central difference of all numbers that follow it, in double precision. A plan takes milliseconds
-to make where what costs (textures) did not change. What numbers are linear in (the cells of a mask, heights of a
-plate) is learned by the transposes of these maps, all at once (`vcc.plan.decisions.Linear`).
+A plan is made anew for each value of its parameters, by choices that were made once (`vcc.plan.choice.decide`), so
+that its numbers are smooth functions of the parameters. The derivative to a parameter is the central difference of
+all numbers that follow it, in double precision. A plan takes milliseconds to make where what costs (textures) did
+not change. What numbers are linear in (the cells of a mask, heights of a plate) is learned by the transposes of
+these maps, all at once (`vcc.plan.following.Linear`).
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from vcc.fields.grid import Grid
 from vcc.learn.parameters import CONTENT, Parameter, parameter, put, read
 from vcc.learn.scales import scale
 from vcc.optics.train import Train
-from vcc.plan.choice import compile_best
-from vcc.plan.decisions import Decisions, Linear, plan_again
+from vcc.plan.choice import Choices, Computed, compute, decide
+from vcc.plan.following import Linear, Parts, differences, plan_again
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.rays.edges import edges_that_cut
@@ -44,7 +44,7 @@ class Chain:
     """A camera whose parameters change, before a light field.
 
     Args:
-        train: the camera as it is when learning begins; all is decided for it, once.
+        train: the camera as it is when learning begins; all is chosen for it, once.
         grid: of the light field.
         how: what was chosen of the computation; None takes the defaults.
         names: of the parameters (`vcc.learn.parameters`).
@@ -54,7 +54,7 @@ class Chain:
         grid: as given.
         how: as given.
         names: as given.
-        decisions: by which all plans are made. A mask or a rim whose z is among the names counts as one in
+        choices: by which all plans are made. A mask or a rim whose z is among the names counts as one in
             mid-path, at the views too, so that it may leave them.
 
     Raises:
@@ -65,7 +65,9 @@ class Chain:
     def __init__(self, train: Train, grid: Grid, how: How | None = None, names: Iterable[str] = ()) -> None:
         self.train, self.grid, self.how = train, grid, how or How()
         self.names = tuple(names)
-        self.decisions = self._undecided()
+        self._parts = Parts()
+        with self._parts.keeping():
+            self.choices = self._decided(train)
         self._steps = {name: STEP * scale(train, name) for name in self.names}
         self._made: _Made | None = None
         self._form: tuple[tuple[str, tuple[int, ...]], ...] | None = None
@@ -79,7 +81,7 @@ class Chain:
             values: by the names of parameters, SI units; those that are left out are the train's own.
 
         Raises:
-            InputError: values that an element does not take, or for which the decisions no longer hold.
+            InputError: values that an element does not take, or for which the choices no longer hold.
         """
         return self._at(values or {}).plan
 
@@ -141,25 +143,27 @@ class Chain:
         Args:
             values: as for `plan`.
         """
-        fresh = self._undecided()
-        compile_best(put(self.train, dict(values or {})), self.grid, self.how, fresh)
-        return self.decisions.differences(fresh)
+        return differences(self.choices, self._decided(put(self.train, dict(values or {}))))
 
     # --- plans and their differences
 
-    def _undecided(self) -> Decisions:
-        """Decisions that are not taken yet; what moves along the axis may leave the plane of the views."""
+    def _decided(self, train: Train) -> Choices:
+        """What is chosen of a plan; what moves along the axis may leave the plane of the views."""
         moving = (parameter(self.train, name) for name in self.names if name.endswith(".z"))
-        return Decisions([found.owned_by for found in moving])
+        return decide(train, self.grid, self.how, [found.owned_by for found in moving], self._parts)
+
+    def _computed(self, train: Train) -> Computed:
+        """The plan by these choices."""
+        return compute(train, self.grid, self.how, self.choices, self._parts)
 
     def _at(self, values: Values) -> _Made:
         """The plan for some values, and its numbers; what costs is kept for plans nearby."""
         key = {name: np.asarray(value, dtype=np.float64).tobytes() for name, value in values.items()}
         if self._made is None or self._made.key != key:
             train = put(self.train, dict(values))
-            with self.decisions.remembering(), self.decisions.noting() as linear:
-                plan = compile_best(train, self.grid, self.how, self.decisions)
-            made = _Made(key, train, plan, plan.numbers(), tuple(linear))
+            with self._parts.keeping():
+                computed = self._computed(train)
+            made = _Made(key, train, computed.plan, computed.plan.numbers(), computed.linears)
             self._check_form(made.numbers)
             self._made = made
         return self._made
@@ -175,7 +179,7 @@ class Chain:
 
     def _numbers(self, train: Train, name: str) -> Numbers:
         try:
-            numbers = compile_best(train, self.grid, self.how, self.decisions).numbers()
+            numbers = self._computed(train).plan.numbers()
             self._check_form(numbers)
         except InputError as error:
             raise InputError(f"there is no derivative to {name}: {error}") from None

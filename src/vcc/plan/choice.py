@@ -2,50 +2,287 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
 
+from vcc.base.cached import cached
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.optics.train import Train
 from vcc.plan.coverage import AskedLight, Missing
-from vcc.plan.decisions import ANEW, Decisions, plan_again
-from vcc.plan.depth_rule import denser
+from vcc.plan.depth_rule import ViewsBetween, denser
+from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, check_unchanged, choice, plan_again
 from vcc.plan.footprints.codes import Codes
-from vcc.plan.footprints.compile import blurs_or_why_not, compile_footprints
-from vcc.plan.footprints.diffusers import Blurs
+from vcc.plan.footprints.compile import ByFootprints, FootprintChoices, blurs_or_why_not
+from vcc.plan.footprints.diffusers import Blurs, choose_kernels
 from vcc.plan.footprints.mixtures import Mixture
 from vcc.plan.how import How
 from vcc.plan.in_focus import share_in_focus
 from vcc.plan.model import InFocus, MadeFor, Plan
-from vcc.plan.rays.compile import compile_rays
+from vcc.plan.rays.compile import ByRays, RayChoices
 
 
-def compile_best(train: Train, grid: Grid, how: How | None = None, decisions: Decisions | None = None) -> Plan:
+def compile_best(train: Train, grid: Grid, how: How | None = None, parts: Parts = NONE_KEPT) -> Plan:
     """The plan by which an engine makes the picture that an optical train makes of a light field.
 
     Args:
         train: the optics and the sensor.
         grid: of the light field.
         how: what was chosen; None takes the defaults.
-        decisions: what was decided before, for plans of one structure whose numbers follow the train's parameters
-            smoothly, textures in double precision; none yet, and they are taken here. None decides all anew and
-            keeps nothing.
+        parts: asked between stages whether the plan is still wanted.
 
     Raises:
-        InputError: options that do not go with one another, an element that returns what it must not, a train for
-            which the decisions given no longer hold.
+        InputError: options that do not go with one another, or an element that returns what it must not.
     """
-    kept = ANEW if decisions is None else decisions
-    kept.hold("the order of the elements", tuple((element.kind, element.name) for element in train.elements))
-    plan = _compiled(train, grid, how or How(), kept)
+    return _Making(train, grid, how or How(), parts=parts).known
 
-    def lacking() -> tuple[Missing, str]:
-        asked = AskedLight.of(train, grid)
+
+def decide(
+    train: Train, grid: Grid, how: How | None = None, leaving: Iterable[str] = (), parts: Parts = NONE_KEPT
+) -> Choices:
+    """All that is chosen of a plan whose numbers are to follow the train's parameters.
+
+    Args:
+        train: the optics and the sensor as they are now.
+        grid: of the light field.
+        how: what was chosen by the user; None takes the defaults.
+        leaving: labels of elements that may leave the plane of the views. What stands there is otherwise taken for
+            one weight a view, and must stay.
+        parts: keeps what is costly.
+
+    Raises:
+        InputError: as `compile_best`.
+    """
+    return _Making(train, grid, how or How(), follow=Follow(frozenset(leaving)), parts=parts).choices
+
+
+def compute(train: Train, grid: Grid, how: How | None, choices: Choices, parts: Parts = NONE_KEPT) -> Computed:
+    """The plan that was decided on for a train nearby: its numbers follow the train's parameters smoothly.
+
+    Args:
+        train: the optics and the sensor.
+        grid: of the light field, for which the choices were made.
+        how: likewise.
+        choices: of `decide`.
+        parts: keeps what is costly.
+
+    Raises:
+        InputError: an element that returns what it must not, or a train for which the choices no longer hold.
+    """
+    making = _Making(train, grid, how or How(), choices, Follow(), parts)
+    check_unchanged("the order of the elements", choices.elements, making.elements)
+    return Computed(making.known, making.linears)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Choices(Brief):
+    """All that is chosen of a plan; `vcc.plan.following.differences` compares two.
+
+    Args:
+        missing: what the light field lacks of the rays that are asked for, and that in words.
+        views_between: the grid with views in between, how they are made (None: they need none), and why; None
+            where they are not asked for.
+        elements: kinds and names of the elements in their order.
+        why_rays: why rays are traced; None for footprints.
+        dense: of the plan of the views in between; else None.
+        plain: of the plan of the views as they are beside these; else None.
+        footprints: of a plan by footprints; else None.
+        rays: of a plan by rays; else None.
+    """
+
+    missing: tuple[Missing, str]
+    elements: tuple[tuple[str, str | None], ...] = choice("the order of the elements")
+    why_rays: str | None = choice("footprints or rays", lambda one, other: True)
+    views_between: tuple[Grid, ViewsBetween | None, str] | None = choice(
+        "views in between", lambda one, other: one[0].shape == other[0].shape
+    )
+    dense: Choices | None = choice("views in between")
+    plain: Choices | None = choice("views as they are")
+    footprints: FootprintChoices | None = choice("")
+    rays: RayChoices | None = choice("")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Computed(Brief):
+    """A plan, and which of its numbers are linear in what elements hold.
+
+    Args:
+        plan: how to make the picture.
+        linears: see `vcc.plan.following.Linear`.
+    """
+
+    plan: Plan
+    linears: tuple[Linear, ...]
+
+
+class _Making:
+    """The stages of any plan: which core it gets, and that core's own stages.
+
+    Args:
+        train: see `compile_best`.
+        grid: likewise.
+        how: likewise.
+        choices: by which the plan is made; None chooses now.
+        follow: whether its numbers are to follow a camera.
+        parts: what is kept of plans nearby.
+    """
+
+    def __init__(
+        self,
+        train: Train,
+        grid: Grid,
+        how: How,
+        choices: Choices | None = None,
+        follow: Follow | None = None,
+        parts: Parts = NONE_KEPT,
+    ) -> None:
+        self.train, self.grid, self.how = train, grid, how
+        self.chosen, self.follow, self.parts = choices, follow, parts
+
+    @property
+    def choices(self) -> Choices:
+        """All that is chosen."""
+        by, dense = self.by, self.how.between_views == "depth"
+        return Choices(
+            elements=self.elements,
+            why_rays=self.blurs if isinstance(self.blurs, str) else None,
+            views_between=self.choose_views_between if dense else None,
+            dense=by.choices if isinstance(by, _Making) else None,
+            plain=self.plain.choices if dense else None,
+            footprints=by.choices if isinstance(by, ByFootprints) else None,
+            rays=by.choices if isinstance(by, ByRays) else None,
+            missing=self.choose_missing,
+        )
+
+    @property
+    def elements(self) -> tuple[tuple[str, str | None], ...]:
+        """Kinds and names of the elements in their order."""
+        return tuple((element.kind, element.name) for element in self.train.elements)
+
+    @property
+    def linears(self) -> tuple[Linear, ...]:
+        """Which numbers of the plan are linear in what elements hold."""
+        return self.by.linears
+
+    @property
+    @cached
+    def blurs(self) -> Blurs | str:
+        """What the diffusers come to where the picture is made by footprints; else why it is not, in words.
+
+        Raises:
+            InputError: it was made by footprints, and cannot be any longer.
+        """
+        if self.how.method == "rays":
+            return "asked for"
+        if self.chosen is None:
+            found = blurs_or_why_not(self.train, self.grid, self.how)
+            if self.follow is None or isinstance(found, str):
+                return found
+            kernels = choose_kernels(self.train, self.grid, self.how.interpolation == "sharp")
+            return blurs_or_why_not(self.train, self.grid, self.how, kernels)
+        if self.chosen.why_rays is not None:
+            return self.chosen.why_rays
+        first = self.chosen.plain or self.chosen
+        assert first.footprints is not None
+        now = blurs_or_why_not(self.train, self.grid, self.how, first.footprints.kernels)
+        if isinstance(now, str):
+            raise plan_again(f"footprints or rays ({now})")
+        return now
+
+    @property
+    @cached
+    def choose_missing(self) -> tuple[Missing, str]:
+        """What the light field lacks of the rays that are asked for, and that in words."""
+        if self.chosen:
+            return self.chosen.missing
+        asked = AskedLight.of(self.train, self.grid)
         return asked.missing, asked.words
 
-    missing, words = kept.keep("rays that are missing", lacking, lambda one, other: True)
-    return _known(plan, train, grid, missing, words)
+    @property
+    @cached
+    def choose_views_between(self) -> tuple[Grid, ViewsBetween | None, str]:
+        """The grid with views in between, how they are made, and why."""
+        chosen = self.chosen.views_between if self.chosen else None
+        return chosen or denser(self.train, self.grid)
+
+    @property
+    @cached
+    def by(self) -> ByFootprints | ByRays | _Making:
+        """The stages of the core: by footprints, by rays, or those of the plan for a grid with views in between.
+
+        Raises:
+            InputError: options that do not go with one another.
+        """
+        blurs, how, chosen = self.blurs, self.how, self.chosen
+        if how.between_views == "depth":
+            if isinstance(blurs, str):
+                raise InputError(
+                    "between_views='depth' is for pictures made by footprints; this one is made by rays "
+                    f"({blurs}): leave it out, and rays interpolate along the parallax of one depth"
+                )
+            return self._of_grid(self.choose_views_between[0], "auto", chosen.dense if chosen else None)
+        if isinstance(blurs, str):
+            _check_rays(how, blurs)
+            given = chosen.rays if chosen else None
+            return ByRays(self.train, self.grid, how, blurs, given, self.follow, self.parts)
+        for name, value in (("samples", how.samples), ("tolerance", how.tolerance)):
+            if value is not None:
+                raise InputError(
+                    f"{name} is for pictures made by rays, and this camera needs none: footprints have no "
+                    "sampling error. Leave it out, or pass method='rays'"
+                )
+        by_footprints = chosen.footprints if chosen else None
+        return ByFootprints(self.train, self.grid, how, blurs, by_footprints, self.follow, self.parts)
+
+    @property
+    @cached
+    def plain(self) -> _Making:
+        """The stages of the plan for the views as they are, beside one with views in between."""
+        return self._of_grid(self.grid, "none", self.chosen.plain if self.chosen else None)
+
+    def _of_grid(self, grid: Grid, between_views: Literal["auto", "none"], choices: Choices | None) -> _Making:
+        how = replace(self.how, between_views=between_views)
+        return _Making(self.train, grid, how, choices, self.follow, self.parts)
+
+    @property
+    def plan(self) -> Plan:
+        """How to make the picture."""
+        plan = self.by.plan
+        if self.how.between_views != "depth":
+            return plan
+        _, between, why = self.choose_views_between
+        if between is None:
+            return replace(plan, notes=(*plan.notes, why))
+        plain = self.plain.plan
+        share = share_in_focus(self.train, self.grid, between, plain.used_views(self.grid.shape))
+        focused = None if share is None else InFocus(plain, share)
+        if share is not None:
+            why += f"; {share.mean():.0%} of the picture is in focus, and made of the views as they are"
+        cautions = (*plan.cautions, *between.cautions())
+        return replace(plan, views_between=between, in_focus=focused, notes=(*plan.notes, why), cautions=cautions)
+
+    @property
+    def known(self) -> Plan:
+        """The plan with what it was made for, and what its light field lacks."""
+        plan = self.plan
+        return _known(plan, self.train, self.grid, *self.choose_missing)
+
+
+def _check_rays(how: How, reason: str) -> None:
+    """Refuse options that are not for pictures made by rays."""
+    if how.method == "footprints":
+        raise InputError(f"this camera's picture cannot be made by footprints: {reason}. Use method='rays'")
+    for name, value, fine in (
+        ("interpolation", how.interpolation, how.interpolation in ("sharp", "linear")),
+        ("refine", how.refine, how.refine == "auto"),
+    ):
+        if not fine:
+            raise InputError(
+                f"{name}={value!r} is for pictures made by footprints; this one is made by rays "
+                f"({reason}): leave it out"
+            )
 
 
 def _known(plan: Plan, train: Train, grid: Grid, missing: Missing, words: str) -> Plan:
@@ -105,80 +342,3 @@ def _codes(trains: Sequence[Train], how: How) -> Codes | None:
     """What trains differ in, if that is the cells of one mask, and pictures are made by footprints."""
     alone = how.method == "rays" or how.between_views == "depth" or (how.samples, how.tolerance) != (None, None)
     return None if alone or len(trains) < 2 else Codes.of(trains)
-
-
-def _compiled(train: Train, grid: Grid, how: How, decisions: Decisions) -> Plan:
-    by_footprints = _blurs(train, grid, how, decisions)
-    if how.between_views == "depth":
-        if isinstance(by_footprints, str):
-            raise InputError(
-                "between_views='depth' is for pictures made by footprints; this one is made by rays "
-                f"({by_footprints}): leave it out, and rays interpolate along the parallax of one depth"
-            )
-        made, between, why = decisions.keep(
-            "views in between",
-            lambda: denser(train, grid),
-            lambda one, other: one[0].shape == other[0].shape,
-        )
-        plan = _compiled(train, made, replace(how, between_views="auto"), decisions.of("views in between"))
-        if between is None:
-            return replace(plan, notes=(*plan.notes, why))
-        plain = _compiled(train, grid, replace(how, between_views="none"), decisions.of("views as they are"))
-        share = share_in_focus(train, grid, between, plain.used_views(grid.shape))
-        focused = None if share is None else InFocus(plain, share)
-        if share is not None:
-            why += f"; {share.mean():.0%} of the picture is in focus, and made of the views as they are"
-        cautions = (*plan.cautions, *between.cautions())
-        return replace(plan, views_between=between, in_focus=focused, notes=(*plan.notes, why), cautions=cautions)
-    if not isinstance(by_footprints, str):
-        for name, given in (("samples", how.samples), ("tolerance", how.tolerance)):
-            if given is not None:
-                raise InputError(
-                    f"{name} is for pictures made by rays, and this camera needs none: footprints have no "
-                    "sampling error. Leave it out, or pass method='rays'"
-                )
-        return compile_footprints(train, grid, how, by_footprints, decisions)
-    if how.method == "footprints":
-        raise InputError(f"this camera's picture cannot be made by footprints: {by_footprints}. Use method='rays'")
-    for name, value, fine in (
-        ("interpolation", how.interpolation, how.interpolation in ("sharp", "linear")),
-        ("refine", how.refine, how.refine == "auto"),
-    ):
-        if not fine:
-            raise InputError(
-                f"{name}={value!r} is for pictures made by footprints; this one is made by rays "
-                f"({by_footprints}): leave it out"
-            )
-    return compile_rays(train, grid, how, by_footprints, decisions)
-
-
-def _blurs(train: Train, grid: Grid, how: How, decisions: Decisions) -> Blurs | str:
-    """What the diffusers come to where a picture is made by footprints; else why it is not, in words.
-
-    Raises:
-        InputError: it was made by footprints, and cannot be any longer.
-    """
-    if how.method == "rays":
-        return "asked for"
-
-    def found() -> Blurs | str:
-        return blurs_or_why_not(train, grid, how, decisions)
-
-    def both(one: str | None, other: str | None) -> bool:
-        return (one is None) == (other is None)
-
-    if not decisions.lasting:
-        return found()
-    first: list[Blurs | str] = []
-
-    def why_rays() -> str | None:
-        first.append(found())
-        return first[0] if isinstance(first[0], str) else None
-
-    why = decisions.keep("footprints or rays", why_rays, both)
-    if why is not None:
-        return why
-    blurs = first[0] if first else found()
-    if isinstance(blurs, str):
-        raise plan_again(f"footprints or rays ({blurs})")
-    return blurs

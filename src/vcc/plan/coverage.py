@@ -150,7 +150,7 @@ class AskedLight(Brief):
         """Rays from all over the sensor, which is one pixel to them, to what bounds the light."""
         assert self.aimed is not None
         sensor, path = self.path.train.sensor, self.path
-        steps, index_from_ray = steps_met(path, self.aimed, [], coarse=True)
+        met = steps_met(path, self.aimed, coarse=True)
         height, width = sensor.size
         nv, nu, nt, ns = path.grid.shape[:4]
         return Rays(
@@ -159,8 +159,8 @@ class AskedLight(Brief):
             pitch=(width, height),
             sensitive=(width, height),
             aim=self.aimed.aim,
-            steps=tuple(steps),
-            index_from_ray=index_from_ray,
+            steps=met.steps,
+            index_from_ray=met.index_from_ray,
             motion=np.zeros((2, 2)),
             between_views=False,
             views=(nv, nu, nt, ns),

@@ -1,6 +1,6 @@
 """The numbers of a plan, by name: what derivatives are taken of, and what changes while a camera learns.
 
-A plan is decisions (which core, how many taps, which footprint) and numbers (places, steps, weights, textures).
+A plan is choices (which core, how many taps, which footprint) and numbers (places, steps, weights, textures).
 The numbers of a value are all its floating-point leaves, named as they are reached: of a core
 ``"masks[0].texture"``, of operators ``"[1].kernel"``; an affine map is its matrix, a tuple of numbers one array.
 """

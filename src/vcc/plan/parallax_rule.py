@@ -18,7 +18,6 @@ from vcc.base.affine import Affine
 from vcc.base.checks import above_zero
 from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
-from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.how import How
 
 Array = NDArray[np.float64]
@@ -42,6 +41,28 @@ class BetweenViews(Brief):
     gap_left: float
     reason: str
 
+    def like(self, other: BetweenViews) -> bool:
+        """Whether both fill the same gaps, however wide."""
+        return [gap > 0 for gap in self.gap_filled] == [gap > 0 for gap in other.gap_filled]
+
+    def now(self, grid: Grid, on_sensor: Array) -> BetweenViews:
+        """The same for optics that have changed since.
+
+        The motion is that of a point of the scene, which stays where it is. The gap that it leaves between the
+        pictures of neighbouring views is filled by what it is now.
+
+        Args:
+            grid: of the light field.
+            on_sensor: 2×4, pixels per index step (i, j, k, l).
+        """
+        if not any(self.gap_filled):
+            return self
+        views = np.array(grid.extent[::-1]) > 1
+        along = (on_sensor[:, :2] - on_sensor[:, 2:] @ self.motion) * views
+        horizontal, vertical = (float(extent) for extent in np.abs(along).sum(axis=1))
+        down, across = self.gap_filled
+        return replace(self, gap_filled=(vertical * (down > 0), horizontal * (across > 0)))
+
 
 def index_motions(frame: Affine, vergences: Array) -> Array:
     """How points of the scene move within a view: (n, 2, 2), (k, l) per (i, j), sign turned.
@@ -59,35 +80,7 @@ def index_motions(frame: Affine, vergences: Array) -> Array:
     return np.where(singular[:, None, None], 0.0, np.linalg.solve(within, across))
 
 
-def between_views_of(
-    grid: Grid, frame: Affine, on_sensor: Array, how: How, decisions: Decisions = ANEW
-) -> BetweenViews:
-    """What is chosen by `choose_between_views`; where that is kept, its gaps follow the optics.
-
-    The motion is that of a point of the scene, which stays where it is. The gap that it leaves between the
-    pictures of neighbouring views is filled by what it is now.
-    """
-    chosen = decisions.keep(
-        "gaps between views that are filled",
-        lambda: choose_between_views(grid, frame, on_sensor, how.between_views, how.scene_distance),
-        lambda one, other: [gap > 0 for gap in one.gap_filled] == [gap > 0 for gap in other.gap_filled],
-    )
-    if not decisions.lasting or not any(chosen.gap_filled):
-        return chosen
-    views = np.array(grid.extent[::-1]) > 1
-    along = (on_sensor[:, :2] - on_sensor[:, 2:] @ chosen.motion) * views
-    horizontal, vertical = (float(extent) for extent in np.abs(along).sum(axis=1))
-    down, across = chosen.gap_filled
-    return replace(chosen, gap_filled=(vertical * (down > 0), horizontal * (across > 0)))
-
-
-def choose_between_views(
-    grid: Grid,
-    frame: Affine,
-    on_sensor: Array,
-    between_views: str,
-    scene_distance: float | None,
-) -> BetweenViews:
+def choose_between_views(grid: Grid, frame: Affine, on_sensor: Array, how: How) -> BetweenViews:
     """Decide by the gaps, in pixels, between neighbouring views' pictures over the scene's distances.
 
     In focus the gap is 0, so the gap filled is the geometric mean of the smallest and the largest: nothing
@@ -97,13 +90,12 @@ def choose_between_views(
         grid: whose disparities are asked for.
         frame: its frame, as the plan uses it.
         on_sensor: 2×4, pixels per index step (i, j, k, l).
-        between_views: ``"auto"`` or ``"none"``.
-        scene_distance: metres before the entrance plane, or None.
+        how: what was chosen of views in between, and of the scene's distance.
     """
     rows, columns = grid.extent
     if rows <= 1 and columns <= 1:
         return BetweenViews(np.zeros((2, 2)), (0.0, 0.0), 0.0, "a single view: nothing between views")
-    known = vergences(grid, scene_distance)
+    known = vergences(grid, how.scene_distance)
     if known is None:
         motion = _in_focus(on_sensor)
         steps = np.stack([on_sensor[:, :2] - on_sensor[:, 2:] @ motion])
@@ -125,7 +117,7 @@ def choose_between_views(
         if known is not None
         else "the pictures show no parallax to measure"
     )
-    if between_views == "none":
+    if how.between_views == "none":
         return BetweenViews(
             motions[chosen], (0.0, 0.0), largest, f"{spread}; views are not interpolated, as asked"
         )

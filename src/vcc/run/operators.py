@@ -30,7 +30,7 @@ from vcc.optics.mask import Mask
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
 from vcc.plan.footprints.aperture import Aperture
-from vcc.plan.footprints.mask_textures import mask_as_met
+from vcc.plan.footprints.mask_textures import MaskMet
 from vcc.plan.footprints.planes import Plane, depends_on_view_only
 from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.shapes.patterns import Pattern
@@ -123,7 +123,8 @@ def _weights(
     if depends_on_view_only(plane, (nt, ns), still):
         shares = Aperture([plane], views, still, (nt, ns)).open_shares()
         return lambda j, i: shares[j, i]
-    lookup, _ = mask_as_met(plane, views, np.zeros_like(views.index), still, (nt, ns), fine=1)
+    met = MaskMet.of(plane, views, np.zeros_like(views.index), still, (nt, ns), fine=1)
+    lookup, _ = met.look_up(met.choices())
     k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
     # A texture that makes up for being looked up by splines may pass 0 beside an edge; light does not.
     return lambda j, i: np.maximum(lookup.weights(j, i, k, l), 0.0)

@@ -9,12 +9,37 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.optics.train import Stage, Train
-from vcc.plan.decisions import Decisions, plan_again
+from vcc.plan.following import Follow, check_unchanged, choice, plan_again
 from vcc.plan.footprints.landing import Landing
-from vcc.plan.footprints.planes import Plane, depends_on_view_only
+from vcc.plan.footprints.planes import Placed, Plane, PlaneChoices, choose_plane, depends_on_view_only
 from vcc.shapes.patterns import Open
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AbsorbingChoices:
+    """In which planes masks are taken together.
+
+    Args:
+        together: how many masks stand in each plane, from the front.
+        against_sensor: which planes lie against the sensor.
+        planes: what counts in each of them.
+    """
+
+    together: tuple[int, ...] = choice("which masks stand in one plane")
+    against_sensor: tuple[bool, ...] = choice("which masks stand against the sensor")
+    planes: tuple[PlaneChoices, ...] = choice("plane of masks")
+
+
+def choose_absorbing(train: Train, landing: Landing) -> AbsorbingChoices:
+    """In which planes masks are taken together: those in which samples meet them."""
+    groups = _in_one_place(train, landing)
+    return AbsorbingChoices(
+        tuple(len(stages) for _, stages in groups),
+        tuple(_same_place(place, landing.metres) for place, _ in groups),
+        tuple(choose_plane(_placed(stages)) for _, stages in groups),
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,74 +57,77 @@ class Absorbing(Brief):
     against_sensor: list[Plane]
 
     @classmethod
-    def of(cls, train: Train, landing: Landing, motion: Array, decisions: Decisions) -> Absorbing:
-        """The planes of a train.
+    def of(cls, train: Train, landing: Landing, choices: AbsorbingChoices) -> Absorbing:
+        """The planes of a train, those at the views not yet told apart from those in mid-path.
 
-        Args:
-            train: the optics.
-            landing: of the samples.
-            motion: of the scene that views follow, see `tap_origin`.
-            decisions: where these are kept, planes stay what they were.
+        Rewrite rule: a mask whose every ray meets it where it meets the sensor multiplies the picture.
+        Precondition: the place on the mask is the place on the sensor, shifted at most, for every sample.
 
         Raises:
-            InputError: one does not.
+            InputError: planes that do not stay what was chosen.
         """
-        planes, against_sensor = _planes(train, landing, decisions)
-        at_views = _at_views(planes, landing.samples, motion, decisions)
-        parted = [
-            [plane for plane, so in zip(planes, at_views, strict=True) if so is wanted] for wanted in (True, False)
+        groups = _in_one_place(train, landing)
+        together = tuple(len(stages) for _, stages in groups)
+        check_unchanged("which masks stand in one plane", choices.together, together)
+        against = tuple(_same_place(place, landing.metres) for place, _ in groups)
+        check_unchanged("which masks stand against the sensor", choices.against_sensor, against)
+        planes = [
+            # What stands in one plane is multiplied there, before anything is averaged.
+            Plane.at(place, _placed(stages), " and ".join(dict.fromkeys(s.element.label for s in stages)), counts)
+            for (place, stages), counts in zip(groups, choices.planes, strict=True)
         ]
-        return cls(parted[0], parted[1], against_sensor)
+        return cls([], _of(planes, against, False), _of(planes, against, True))
+
+    def parted(self, landing: Landing, motion: Array, at_views: tuple[bool, ...]) -> Absorbing:
+        """The same, with planes at the views.
+
+        Args:
+            landing: of the samples.
+            motion: of the scene that views follow, see `tap_origin`.
+            at_views: which planes are, of those in mid-path.
+
+        Raises:
+            InputError: one of them is no longer.
+        """
+        now = (depends_on_view_only(plane, landing.samples, motion) for plane in self.in_path)
+        if any(was and not so for was, so in zip(at_views, now, strict=True)):
+            raise plan_again("which masks tell views apart only")
+        found, in_path = (_of(self.in_path, at_views, wanted) for wanted in (True, False))
+        return Absorbing(found, in_path, self.against_sensor)
 
 
-def _planes(train: Train, landing: Landing, decisions: Decisions) -> tuple[list[Plane], list[Plane]]:
-    """What absorbs in mid-path, and what lies against the sensor (rewrite rule below).
+def choose_at_views(
+    planes: list[Plane], landing: Landing, motion: Array, follow: Follow | None
+) -> tuple[bool, ...]:
+    """Which planes are taken for one weight a view: those that tell views apart only, and stay where they do."""
+    leaving = frozenset() if follow is None else follow.leaving
+    return tuple(
+        depends_on_view_only(plane, landing.samples, motion) and plane.label not in leaving for plane in planes
+    )
 
-    Rule: a mask whose every ray meets it where it meets the sensor multiplies the picture. Precondition:
-    the place on the mask is the place on the sensor, shifted at most, for every sample.
-    """
+
+def _in_one_place(train: Train, landing: Landing) -> list[tuple[Array, list[Stage]]]:
+    """Stages that absorb, with the place in which samples meet them, neighbours in one place together."""
     groups: list[tuple[Array, list[Stage]]] = []
     for stage in train.stages:
-        place = (stage.arriving @ landing.frame).matrix[:2]
         if stage.faces.pattern is None or isinstance(stage.faces.pattern, Open):
             continue
+        place = (stage.arriving @ landing.frame).matrix[:2]
         if groups and _same_place(place, groups[-1][0]):
             groups[-1][1].append(stage)
         else:
             groups.append((place, [stage]))
-    decisions.hold("which masks stand in one plane", tuple(len(stages) for _, stages in groups))
-    in_path: list[Plane] = []
-    against_sensor: list[Plane] = []
-    for place, stages in groups:
-        # What stands in one plane is multiplied there, before anything is averaged.
-        patterns = [(stage.faces.pattern, stage.element.decentre) for stage in stages]
-        label = " and ".join(dict.fromkeys(stage.element.label for stage in stages))
-        plane = Plane.at(
-            place,
-            [(pattern, middle) for pattern, middle in patterns if pattern is not None],
-            label,
-            decisions.of(f"plane {len(in_path) + len(against_sensor) + 1} of masks"),
-        )
-        (against_sensor if _same_place(place, landing.metres) else in_path).append(plane)
-    decisions.hold(
-        "which masks stand against the sensor", tuple(_same_place(place, landing.metres) for place, _ in groups)
-    )
-    return in_path, against_sensor
+    return groups
+
+
+def _placed(stages: list[Stage]) -> list[Placed]:
+    faces = ((stage.faces.pattern, stage.element.decentre) for stage in stages)
+    return [(pattern, middle) for pattern, middle in faces if pattern is not None]
 
 
 def _same_place(one: Array, other: Array) -> bool:
     return np.allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
 
 
-def _at_views(
-    planes: list[Plane], samples: tuple[int, int], motion: Array, decisions: Decisions
-) -> tuple[bool, ...]:
-    """Which planes tell views apart only, and stay where they do."""
-    now = tuple(depends_on_view_only(plane, samples, motion) for plane in planes)
-    kept = decisions.keep(
-        "which masks tell views apart only",
-        lambda: tuple(so and plane.label not in decisions.leaving for so, plane in zip(now, planes, strict=True)),
-    )
-    if any(was and not so for was, so in zip(kept, now, strict=True)):
-        raise plan_again("which masks tell views apart only")
-    return kept
+def _of(planes: list[Plane], which: tuple[bool, ...], wanted: bool) -> list[Plane]:
+    return [plane for plane, so in zip(planes, which, strict=True) if so is wanted]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.optics.sensor import Sensor
-from vcc.plan.decisions import ANEW, Decisions
-from vcc.plan.footprints.means import Boxes, mean_over
+from vcc.plan.following import NONE_KEPT, Parts
+from vcc.plan.footprints.means import Boxes, MeanChoice, choose_mean, mean_over
 from vcc.plan.footprints.means_back import mean_back
 from vcc.plan.footprints.planes import Plane
 from vcc.shapes.mean_back import holds
@@ -22,21 +24,58 @@ PARTS_OF_A_PIXEL = 4
 """Parts each way by which a mask against the sensor is looked at within pixels."""
 
 
-def transmission(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANEW) -> Array | None:
-    """The mean transmission over each pixel of what lies against the sensor."""
+Means = tuple[MeanChoice | None, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeansOnSensor(Brief):
+    """How means of masks against the sensor are taken, of each mask.
+
+    Args:
+        pixels: over the sensitive areas of pixels.
+        parts: over parts of them.
+    """
+
+    pixels: Means
+    parts: Means
+
+
+def choose_means(sensor: Sensor, planes: list[Plane]) -> MeansOnSensor:
+    """How means of masks against the sensor are taken so that they follow a camera."""
+    pixels, parts = (
+        tuple(choose_mean(plane.pattern, _seen(plane, boxes)) for plane in planes)
+        for boxes in (_pixels(sensor), _parts(sensor))
+    )
+    return MeansOnSensor(pixels, parts)
+
+
+def transmission(
+    sensor: Sensor, planes: list[Plane], means: MeansOnSensor | None = None, parts: Parts = NONE_KEPT
+) -> Array | None:
+    """The mean transmission over each pixel of what lies against the sensor; None without masks.
+
+    Args:
+        sensor: of the camera.
+        planes: the masks.
+        means: how theirs are taken; None: by patterns themselves.
+        parts: what is kept of plans nearby.
+    """
     if not planes:
         return None
-    return reduce(np.multiply, _means(planes, _pixels(sensor), decisions), np.ones(sensor.shape))
+    chosen = None if means is None else means.pixels
+    return reduce(np.multiply, _means(planes, _pixels(sensor), chosen, parts), np.ones(sensor.shape))
 
 
 def transmission_back(
-    sensor: Sensor, planes: list[Plane], weights: Array, cells: Cells, decisions: Decisions
+    sensor: Sensor, planes: list[Plane], means: MeansOnSensor, weights: Array, cells: Cells
 ) -> Array:
     """From weights of `transmission` to weights of the cells of a mask, one of the planes'."""
-    return _means_back(planes, _pixels(sensor), weights, cells, decisions)
+    return _means_back(planes, _pixels(sensor), means.pixels, weights, cells)
 
 
-def detail(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANEW) -> Array | None:
+def detail(
+    sensor: Sensor, planes: list[Plane], means: MeansOnSensor | None = None, parts: Parts = NONE_KEPT
+) -> Array | None:
     """What the variation of a mask against the sensor within pixels does; see `vcc.plan.operators.OnSensor`.
 
     The mean of a product is not the product of the means. With the light in a pixel as its mean P, slope and
@@ -45,23 +84,26 @@ def detail(sensor: Sensor, planes: list[Plane], decisions: Decisions = ANEW) -> 
 
         T̄·P + Σₓ [Tₓ·(P₊ − P₋)/2 + (Tₓₓ/2 − T̄·a²/24)·(P₊ − 2P + P₋)] + Tₓᵧ·∂²P/∂x∂y.
 
-    None where masks are even within pixels.
+    None without masks.
     """
     if not planes:
         return None
     rows, columns = sensor.shape
-    means = reduce(np.multiply, _means(planes, _parts(sensor), decisions))
-    blocks = means.reshape(rows, PARTS_OF_A_PIXEL, columns, PARTS_OF_A_PIXEL)
-    detail = np.einsum("yxpq,rpcq->yxrc", _moments(sensor), blocks, optimize=True)
-    there = decisions.keep("detail within pixels", lambda: bool(np.abs(detail).max() > 1e-6))
-    return detail if there else None
+    found = reduce(np.multiply, _means(planes, _parts(sensor), None if means is None else means.parts, parts))
+    blocks = found.reshape(rows, PARTS_OF_A_PIXEL, columns, PARTS_OF_A_PIXEL)
+    return np.asarray(np.einsum("yxpq,rpcq->yxrc", _moments(sensor), blocks, optimize=True))
 
 
-def detail_back(sensor: Sensor, planes: list[Plane], weights: Array, cells: Cells, decisions: Decisions) -> Array:
+def counts(found: Array | None) -> bool:
+    """Whether the variation of masks within pixels, `detail`, does anything."""
+    return found is not None and bool(np.abs(found).max() > 1e-6)
+
+
+def detail_back(sensor: Sensor, planes: list[Plane], means: MeansOnSensor, weights: Array, cells: Cells) -> Array:
     """From weights of `detail` to weights of the cells of a mask, one of the planes'."""
     blocks = np.einsum("yxpq,yxrc->rpcq", _moments(sensor), weights, optimize=True)
     places = tuple(n * PARTS_OF_A_PIXEL for n in sensor.shape)
-    return _means_back(planes, _parts(sensor), blocks.reshape(places), cells, decisions)
+    return _means_back(planes, _parts(sensor), means.parts, blocks.reshape(places), cells)
 
 
 def _moments(sensor: Sensor) -> Array:
@@ -113,25 +155,18 @@ def _seen(plane: Plane, boxes: Boxes) -> Boxes:
     return boxes._replace(x=boxes.x - plane.decentre[0], y=boxes.y - plane.decentre[1])
 
 
-def _about(decisions: Decisions, n: int, boxes: Boxes) -> Decisions:
-    return decisions.of(f"mask {n + 1} against the sensor, by {boxes.x.size}×{boxes.y.size} places")
-
-
-def _means(planes: list[Plane], boxes: Boxes, decisions: Decisions) -> list[Array]:
+def _means(planes: list[Plane], boxes: Boxes, chosen: Means | None, parts: Parts = NONE_KEPT) -> list[Array]:
     """Each mask's means over boxes."""
-    return [
-        mean_over(plane.pattern, *_seen(plane, boxes), _about(decisions, n, boxes))
-        for n, plane in enumerate(planes)
-    ]
+    pairs = zip(planes, chosen or (None,) * len(planes), strict=True)
+    return [mean_over(plane.pattern, _seen(plane, boxes), its, parts) for plane, its in pairs]
 
 
-def _means_back(planes: list[Plane], boxes: Boxes, weights: Array, cells: Cells, decisions: Decisions) -> Array:
+def _means_back(planes: list[Plane], boxes: Boxes, chosen: Means, weights: Array, cells: Cells) -> Array:
     """From weights of the product of all masks' means to weights of the cells of one of them."""
-    means = _means(planes, boxes, decisions)
+    means = _means(planes, boxes, chosen)
     total = np.zeros(cells.values.shape)
-    for n, plane in enumerate(planes):
+    for n, (plane, its) in enumerate(zip(planes, chosen, strict=True)):
         if holds(plane.pattern, cells):
             others = reduce(np.multiply, (mean for m, mean in enumerate(means) if m != n), np.ones(1))
-            its = _about(decisions, n, boxes)
             total += mean_back(plane.pattern, _seen(plane, boxes), its, weights * others, cells)
     return total

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
-from vcc.plan.decisions import ANEW, Decisions
-from vcc.plan.footprints.means import Boxes, mean_over
+from vcc.base.values import content
+from vcc.plan.following import NONE_KEPT, Parts, choice
+from vcc.plan.footprints.means import Boxes, MeanChoice, choose_mean, mean_over
 from vcc.plan.footprints.means_back import mean_back
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import Mesh, Taps
@@ -38,6 +39,25 @@ class OpenParts(Brief):
     middle: Array
 
 
+Tiles = tuple[tuple[MeanChoice | None, ...], ...]
+"""How means are taken, by plane, and by the rectangles that stand for a cell there."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CellChoices(Brief):
+    """What is chosen of the cells of taps of one level.
+
+    Args:
+        whole: how means over cells are taken.
+        parts: how those over parts of cells are.
+        lit: which taps are lit.
+    """
+
+    whole: Tiles
+    parts: Tiles
+    lit: NDArray[np.bool_] = choice("taps that are lit")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Aperture(Brief):
     """Planes that tell views apart only, as the taps of a plan meet them.
@@ -47,26 +67,45 @@ class Aperture(Brief):
         taps: of the plan.
         motion: of the scene.
         samples: (rows, columns) of a view.
-        decisions: by which means are taken.
+        chosen: of taps of each level, where numbers follow a camera.
     """
 
     planes: list[Plane]
     taps: Taps
     motion: Array
     samples: tuple[int, int]
-    decisions: Decisions = ANEW
+    chosen: tuple[CellChoices, ...] | None = None
 
-    def open_parts(self) -> OpenParts:
+    def choices(self) -> tuple[CellChoices, ...]:
+        """What is chosen of the cells of taps of each level so that numbers follow a camera."""
+        return tuple(cells.choices() for cells in self._cells())
+
+    def open_parts(self, parts: Parts = NONE_KEPT) -> OpenParts:
         """What of each tap's cell is open.
 
         A cell that a rim cuts is lit through a part of it, and what other masks do to that light they do around
         the middle of that part.
+
+        Args:
+            parts: what is kept of plans nearby.
         """
+        return parts.part(
+            "what is open of views",
+            lambda: content(
+                (
+                    [(plane.pattern, plane.at_index, plane.offset) for plane in self.planes],
+                    (self.taps.index, self.taps.shift, self.motion, self.samples),
+                )
+            ),
+            self._open_parts,
+        )
+
+    def _open_parts(self) -> OpenParts:
         weights = np.ones(self.taps.shares.shape)
         middle = np.zeros((*weights.shape, 2))
         for cells in self._cells() if self.planes else ():
             shares = _product(cells.parts())
-            light, lit = self._light(shares, cells.about)
+            light, lit = cells.light(shares)
             here = np.zeros((*light.shape, 2))
             here[lit] = (shares[..., None] * cells.inside).sum(axis=(2, 3))[lit] / light[lit][:, None]
             middle[cells.mesh], weights[cells.mesh] = here, cells.open_shares(shares)
@@ -98,7 +137,7 @@ class Aperture(Brief):
         total, middles = np.zeros(cells.values.shape), self.open_parts().middle
         for here in self._cells():
             shares = here.parts()
-            light, lit = self._light(_product(shares), here.about)
+            light, lit = here.light(_product(shares))
             middle, to_middle = middles[here.mesh], weights.middle[here.mesh]
             from_middle = ((here.inside - middle[:, :, None, None]) * to_middle[:, :, None, None]).sum(axis=-1)
             of_shares = np.where(
@@ -117,13 +156,9 @@ class Aperture(Brief):
 
     def _cells(self) -> list[_Cells]:
         """The cells of the taps of each level."""
-        return [_Cells(self, mesh, parts) for mesh, parts in self.taps.levels()]
-
-    def _light(self, shares: Array, about: Decisions) -> tuple[Array, NDArray[np.bool_]]:
-        """The light through each tap's cell, and which taps are lit."""
-        light = shares.sum(axis=(2, 3))
-        least = ROUNDING if about.lasting else 0.0
-        return light, about.keep("taps that are lit", lambda: light > least) & (light > least)
+        levels = list(self.taps.levels())
+        chosen = self.chosen or (None,) * len(levels)
+        return [_Cells(self, *level, its) for level, its in zip(levels, chosen, strict=True)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,17 +169,32 @@ class _Cells(Brief):
         aperture: whose taps.
         mesh: an open mesh of their (rows, columns).
         divide: parts of a view's cell that they are, each way.
+        chosen: of them; None where numbers follow nothing.
     """
 
     aperture: Aperture
     mesh: Mesh
     divide: int
+    chosen: CellChoices | None
 
-    @property
-    def about(self) -> Decisions:
-        """Decisions about them."""
-        decisions = self.aperture.decisions
-        return decisions if self.divide == self.aperture.taps.parts[0] else decisions.of("finer")
+    def choices(self) -> CellChoices:
+        """What is chosen of them so that numbers follow a camera."""
+        planes = [plane.pattern for plane in self.aperture.planes]
+        whole, parts = (
+            tuple(tuple(choose_mean(pattern, box) for box, _ in boxes(n)) for n, pattern in enumerate(planes))
+            for boxes in (self.whole, self._divided)
+        )
+        own = CellChoices(whole, parts, np.ones(self.shift.shape[:2], dtype=np.bool_))
+        if not planes:
+            return own
+        return replace(own, lit=replace(self, chosen=own).light(_product(replace(self, chosen=own).parts()))[1])
+
+    def light(self, shares: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """The light through each cell, and which taps are lit; ``shares``: the product of `parts`."""
+        light = shares.sum(axis=(2, 3))
+        if self.chosen is None:
+            return light, light > 0
+        return light, self.chosen.lit & (light > ROUNDING)
 
     @property
     def inside(self) -> Array:
@@ -164,20 +214,18 @@ class _Cells(Brief):
     def open_shares(self, shares: Array | None = None) -> Array:
         """The open share of each cell, (rows, columns); ``shares``: the product of `parts` where it is known."""
         if self.closed:
-            return self._means(0, self.whole(0), self._of_cells(0))
+            return self._means(0, whole=True)
         return np.asarray((_product(self.parts()) if shares is None else shares).mean(axis=(2, 3)))
 
     def parts(self) -> list[Array]:
         """Each plane's open share of the parts of cells, (rows, columns, parts down, parts across)."""
-        return [self._means(n, self._divided(n), self._of_parts(n)) for n in range(len(self.aperture.planes))]
+        return [self._means(n, whole=False) for n in range(len(self.aperture.planes))]
 
     def back(self, n: int, weights: Array, cells: Cells, whole: bool) -> Array:
         """From weights of the open shares of whole cells, or of their parts, to those of a plane's cells."""
-        boxes, about = (self.whole(n), self._of_cells(n)) if whole else (self._divided(n), self._of_parts(n))
         pattern = self.aperture.planes[n].pattern
         found = [
-            mean_back(pattern, box, _of_tile(about, tile), share * weights, cells)
-            for tile, (box, share) in enumerate(boxes)
+            mean_back(pattern, box, its, share * weights, cells) for box, share, its in self._rectangles(n, whole)
         ]
         return np.asarray(np.sum(found, axis=0))
 
@@ -205,22 +253,18 @@ class _Cells(Brief):
         aperture = self.aperture
         return aperture.planes[n].boxes(index, shift, aperture.motion, aperture.samples, parts)
 
-    def _means(self, n: int, boxes: list[tuple[Boxes, float]], about: Decisions) -> Array:
+    def _rectangles(self, n: int, whole: bool) -> list[tuple[Boxes, float, MeanChoice | None]]:
+        """The rectangles of cells, or of their parts, their shares, and how means over them are taken."""
+        boxes = self.whole(n) if whole else self._divided(n)
+        if self.chosen is None:
+            return [(box, share, None) for box, share in boxes]
+        chosen = (self.chosen.whole if whole else self.chosen.parts)[n]
+        return [(*box, its) for box, its in zip(boxes, chosen, strict=True)]
+
+    def _means(self, n: int, whole: bool) -> Array:
         pattern = self.aperture.planes[n].pattern
-        means = [
-            share * mean_over(pattern, *box, _of_tile(about, tile)) for tile, (box, share) in enumerate(boxes)
-        ]
+        means = [share * mean_over(pattern, box, its) for box, share, its in self._rectangles(n, whole)]
         return np.asarray(sum(means[1:], start=means[0]))
-
-    def _of_cells(self, n: int) -> Decisions:
-        return self.about.of(f"mask {n + 1} at the views")
-
-    def _of_parts(self, n: int) -> Decisions:
-        return self.about.of(f"parts of mask {n + 1} at the views")
-
-
-def _of_tile(about: Decisions, tile: int) -> Decisions:
-    return about.of(f"rectangle {tile + 1}") if tile else about
 
 
 def _product(shares: list[Array]) -> Array:

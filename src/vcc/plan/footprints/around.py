@@ -12,12 +12,10 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Sample
 from vcc.optics.sensor import Sensor
-from vcc.plan.decisions import Decisions, plan_again
-from vcc.plan.footprints import against_sensor as masks
+from vcc.plan.following import Follow, choice, plan_again
 from vcc.plan.footprints.cells import SampleDivision
 from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.footprints.model import Footprints
-from vcc.plan.footprints.planes import Plane
 from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews, OnSensor, SwapPixelAxes
 from vcc.plan.sharpening import BOX, MEAN, TENT, across_plane, along_axis, weights_beside
 
@@ -32,9 +30,46 @@ FAR = 2**24
 Beyond that, where a sample is a thousand pixels wide, samples are interpolated by cubics and nothing is filtered:
 41 to 50 dB where sharp pictures have 43 to 45 and linear ones 33 to 39 (cosines of 5.5 samples)."""
 ROOM = 1.25
-"""By how much the gap between views may grow within decisions that are kept."""
+"""By how much the gap between views may grow where it follows a camera."""
 LARGEST_RASTER = 2**28
 """Pixels of the sensor and its margin: 1 GiB for each colour channel."""
+
+
+@dataclass(frozen=True)
+class SharpeningChoices:
+    """How what interpolation takes is given back.
+
+    Args:
+        wide: whether samples are too wide for it, and are interpolated by cubics instead.
+        along: weights beside the middle of the filters (down, across), where columns and rows part; else None.
+        plane: weights beside the middle of the filter of a sheared pixel grid, or None.
+    """
+
+    wide: bool = choice("samples too wide to be sharpened")
+    along: tuple[int, int] | None = choice("weights of the filters that give sharpness back")
+    plane: int | None = choice("weights of the filter that gives sharpness back")
+
+
+@dataclass(frozen=True)
+class GapChoices:
+    """Which gaps between taps' pictures are filled.
+
+    Args:
+        reach: (down, across) of the tents that fill them, pixels, with room to grow; None: as far as they go.
+        filled: (down, across) which.
+    """
+
+    reach: tuple[int, int] | None
+    filled: tuple[bool, bool] = choice("gaps that are wider than a pixel")
+
+
+def choose_gaps(gaps: tuple[float, float], follow: Follow | None = None) -> GapChoices:
+    """Which gaps are filled: those wider than a pixel."""
+    filled = gaps[0] > 1, gaps[1] > 1
+    if follow is None:
+        return GapChoices(None, filled)
+    down, across = (math.ceil(ROOM * gap + 0.5) if so else 0 for gap, so in zip(gaps, filled, strict=True))
+    return GapChoices((down, across), filled)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,49 +80,42 @@ class Around(Brief):
         core: which sharpens samples as it divides them, with the margin that is looked at after it.
         before: operators on samples.
         after: operators on the picture.
-        in_pixels: whether masks against the sensor count by their variation within pixels.
     """
 
     core: Footprints
     before: tuple[Before, ...]
     after: tuple[After, ...]
-    in_pixels: bool
 
     @classmethod
     def of(
         cls,
-        core: Footprints,
+        filters: Sharpened,
         sensor: Sensor,
-        sharpened: Sample | None,
-        gaps: tuple[float, float],
+        tents: tuple[int, AlongAxes | None],
         blurs: Blurs,
         swapped: bool,
-        against_sensor: list[Plane],
-        decisions: Decisions,
+        transmission: Array | None,
+        detail: Array | None,
     ) -> Around:
         """What is done around a core.
 
         Args:
-            core: footprints.
+            filters: the core, and what gives back what its interpolation takes.
             sensor: of the camera.
-            sharpened: what samples are where what interpolation takes is given back; None where it is not.
-            gaps: (vertical, horizontal) between taps' pictures, pixels; above 1 they are filled.
+            tents: which fill gaps between taps' pictures, and from how far they bring in light (`filled`).
             blurs: what diffusers come to.
             swapped: whether the pixel axes of samples are.
-            against_sensor: masks that multiply the picture.
-            decisions: where these are kept, operators stay as many and as large.
+            transmission: of masks that multiply the picture, or None.
+            detail: what their variation within pixels does, or None.
 
         Raises:
-            InputError: a margin around the sensor that is too large; gaps that no longer are what they were.
+            InputError: a margin around the sensor that is too large.
         """
-        filters = Sharpened(core) if sharpened is None else Sharpened.of(core, sharpened, decisions)
-        detail = None if sharpened is None else masks.detail(sensor, against_sensor, decisions)
         after: list[After] = []
-        _check_raster(sensor.shape, math.ceil(max(gaps)))  # before so many weights are made
-        guard, tents = _smear(gaps, decisions)
+        guard, tent = tents
         _check_raster(sensor.shape, guard)
-        if tents is not None:
-            after.append(tents)
+        if tent is not None:
+            after.append(tent)
         if blurs.picture is not None:
             guard += max(blurs.picture.shape) // 2
             after.append(Blur(blurs.picture, "picture blurred by a diffuser", scatters=True))
@@ -96,13 +124,12 @@ class Around(Brief):
         if filters.along is not None:
             after.append(AlongAxes(*filters.along, "sharpness given back"))
         guard += filters.reach + (detail is not None)
-        transmission = masks.transmission(sensor, against_sensor, decisions)
         if guard or transmission is not None:
             after.append(OnSensor(guard, transmission, detail))
         before: list[Before] = [] if blurs.views is None else [BlurViews(blurs.views)]
         if swapped:
             before.append(SwapPixelAxes())
-        return cls(filters.core.guarded(guard), tuple(before), tuple(after), detail is not None)
+        return cls(filters.core.guarded(guard), tuple(before), tuple(after))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,80 +154,95 @@ class Sharpened(Brief):
         return 0 if self.plane is None else max(self.plane.shape) // 2
 
     @classmethod
-    def of(cls, core: Footprints, sample: Sample, decisions: Decisions) -> Sharpened:
+    def choose(cls, core: Footprints, sample: Sample) -> SharpeningChoices:
+        """How what linear interpolation takes is given back; see `of`."""
+        losses, core = _sharpening(core, sample)
+        step = core.step / core.refine
+        (xk, xl), (yk, yl) = step
+        if xl or yk:
+            half = 2 + math.ceil(2 * max(0.0, float(np.abs(step).max()) - 1))
+            return SharpeningChoices(False, None, min(half, LARGEST_SHEARED_FILTER))
+        if math.prod(n + 4 * abs(size) for n, size in zip(core.raster_shape, (yl, xk), strict=True)) > FAR:
+            return SharpeningChoices(True, None, None)
+        spline = core.interpolation == "spline"
+        along = weights_beside(losses, yl, spline), weights_beside(losses, xk, spline)
+        return SharpeningChoices(False, along, None)
+
+    @classmethod
+    def of(cls, core: Footprints, sample: Sample, choices: SharpeningChoices) -> Sharpened:
         """What gives back what linear interpolation takes.
 
         Where samples are divided because a mask is finer than they are, they are filtered as they are divided,
         before the mask; the picture then lacks only what its finer samples lost, each a mean over its own cell.
+
+        Args:
+            core: footprints.
+            sample: what samples are.
+            choices: how.
         """
-        losses = TENT + (MEAN if sample == "mean" else 0)
-        if core.refine > 1:
-            core = replace(core, sharpen_samples=along_axis(losses, 1.0))
-            losses = (BOX if core.interpolation == "box" else TENT) + MEAN
-        footprint = BOX if core.interpolation == "box" else TENT
+        losses, core = _sharpening(core, sample)
         step = core.step / core.refine
         (xk, xl), (yk, yl) = step
-        if not (xl or yk):
-            wide = math.prod(n + 4 * abs(size) for n, size in zip(core.raster_shape, (yl, xk), strict=True))
-            if decisions.keep("samples too wide to be sharpened", lambda: wide > FAR):
-                return cls(replace(core, interpolation="cubic"))
-            spline = core.interpolation == "spline"
-            beside = decisions.keep(
-                "weights of the filters that give sharpness back",
-                lambda: (weights_beside(losses, yl, spline), weights_beside(losses, xk, spline)),
-            )
-            return cls(
-                core, (along_axis(losses, yl, spline, beside[0]), along_axis(losses, xk, spline, beside[1]))
-            )
+        if choices.wide:
+            return cls(replace(core, interpolation="cubic"))
+        if choices.along is not None:
+            spline, (down, across) = core.interpolation == "spline", choices.along
+            return cls(core, (along_axis(losses, yl, spline, down), along_axis(losses, xk, spline, across)))
         # Light is spread along the samples' columns on the sensor, and across at fixed rows of pixels; a pixel's
         # mean is taken along the columns, too.
+        assert choices.plane is not None
+        footprint = BOX if core.interpolation == "box" else TENT
         shear = xl / yl
         spread = [(float(footprint), np.array([xk - shear * yk, 0.0])), (float(footprint), np.array([xl, yl]))]
         spread += [(1.0, core.opening * np.array([shear, 1.0])), (-1.0, core.opening * np.array([0.0, 1.0]))]
         if losses > footprint:
             spread += [(float(MEAN), step[:, 0]), (float(MEAN), step[:, 1])]
-        half = decisions.keep(
-            "weights of the filter that gives sharpness back",
-            lambda: min(2 + math.ceil(2 * max(0.0, float(np.abs(step).max()) - 1)), LARGEST_SHEARED_FILTER),
-        )
-        return cls(core, plane=across_plane(spread, half))
+        return cls(core, plane=across_plane(spread, choices.plane))
 
 
-def sharp_footprint(step: Array, divided: SampleDivision, decisions: Decisions) -> str:
+def _sharpening(core: Footprints, sample: Sample) -> tuple[float, Footprints]:
+    """The powers of sinc that the picture lacks, and the core, which sharpens samples as it divides them."""
+    losses = TENT + (MEAN if sample == "mean" else 0)
+    if core.refine > 1:
+        core = replace(core, sharpen_samples=along_axis(losses, 1.0))
+        losses = (BOX if core.interpolation == "box" else TENT) + MEAN
+    return losses, core
+
+
+def choose_sharp_footprint(step: Array, divided: SampleDivision) -> str:
     """The footprint that is sharpened: a tent, which is quick; a spline where pixels would see a tent's bends.
 
     Behind hard edges samples that are divided fill their own cells, for the mask cuts them off there.
     """
+    if divided.parts > 1:
+        return "box" if divided.hard else "linear"
     parted = not (step[0, 1] or step[1, 0])
     finer = max(abs(step[0, 0]), abs(step[1, 1])) > FINER_PIXELS
-    return decisions.keep(
-        "footprint of samples",
-        lambda: (
-            "box"
-            if divided.parts > 1 and divided.hard
-            else "spline"
-            if divided.parts == 1 and parted and finer
-            else "linear"
-        ),
-    )
+    return "spline" if parted and finer else "linear"
 
 
-def _smear(gaps: tuple[float, float], decisions: Decisions) -> tuple[int, AlongAxes | None]:
-    """The margin from which tents that fill gaps between taps' pictures bring in light, and the tents."""
-    filled = decisions.keep("gaps that are wider than a pixel", lambda: [gap > 1 for gap in gaps])
-    if not any(filled):
+def filled(
+    gaps: tuple[float, float], choices: GapChoices, sensor_shape: tuple[int, int]
+) -> tuple[int, AlongAxes | None]:
+    """The margin from which tents that fill gaps between taps' pictures bring in light, and the tents.
+
+    Args:
+        gaps: (vertical, horizontal), pixels.
+        choices: which of them are filled.
+        sensor_shape: (rows, columns).
+
+    Raises:
+        InputError: a margin that is too large, or gaps that have grown too far.
+    """
+    _check_raster(sensor_shape, math.ceil(max(gaps)))  # before so many weights are made
+    if not any(choices.filled):
         return 0, None
-    smear = [gap if so else 0.0 for gap, so in zip(gaps, filled, strict=True)]
-    if not decisions.lasting:
-        return math.ceil(max(smear)) + 1, AlongAxes.tents(smear[0], smear[1])
-    down, across = decisions.keep(
-        "reach of the tents that fill gaps",
-        lambda: [math.ceil(ROOM * gap + 0.5) if gap > 0 else 0 for gap in smear],
-        lambda one, other: True,
-    )
-    if smear[0] > down + 0.5 or smear[1] > across + 0.5:
+    down, across = (gap if so else 0.0 for gap, so in zip(gaps, choices.filled, strict=True))
+    if choices.reach is None:
+        return math.ceil(max(down, across)) + 1, AlongAxes.tents(down, across)
+    if down > choices.reach[0] + 0.5 or across > choices.reach[1] + 0.5:
         raise plan_again("gaps between views")
-    return max(down, across) + 1, AlongAxes.tents(smear[0], smear[1], (down, across))
+    return max(choices.reach) + 1, AlongAxes.tents(down, across, choices.reach)
 
 
 def _check_raster(sensor_shape: tuple[int, int], guard: int) -> None:

@@ -266,6 +266,10 @@ class SampleDivision(NamedTuple):
     error: float
     hard: bool
 
+    def like(self, other: SampleDivision) -> bool:
+        """Whether both divide alike."""
+        return (self.parts, self.hard) == (other.parts, other.hard)
+
 
 def divide_samples(
     planes: list[Plane],

@@ -19,7 +19,7 @@ from vcc.fields.grid import Grid
 from vcc.optics.mask import Mask
 from vcc.optics.train import Train
 from vcc.plan.footprints.cells import Detail
-from vcc.plan.footprints.compile import Compiled, compiled, used_taps
+from vcc.plan.footprints.compile import ByFootprints, choose_taps
 from vcc.plan.footprints.detail import detail_lost, details_lost
 from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.footprints.mixtures import Mixture, of_cells, of_views
@@ -92,8 +92,8 @@ class Codes(Brief):
         assert isinstance(one.plan.core, Footprints)
         if one.plan.core.weights.size > len(self.cells):
             return None
-        weights = np.zeros((len(self.cells), *one.shares.shape))
-        known = one.aperture.open_shares_of(self.open, np.stack([cells.values for cells in self.cells]))
+        weights = np.zeros((len(self.cells), *one.open_taps.taps.shares.shape))
+        known = one.open_aperture.open_shares_of(self.open, np.stack([cells.values for cells in self.cells]))
         for n, cells in enumerate(self.cells):
             taps, found = self._weighed(one, cells, None if known is None else known[n])
             weights[n][taps] = found
@@ -104,29 +104,28 @@ class Codes(Brief):
         """Whether nothing scatters, and nothing bends rays by a function of position."""
         return all(stage.faces.spread is None and stage.faces.bending is None for stage in self.base.stages)
 
-    def _at_views(self, grid: Grid, how: How) -> Compiled | None:
+    def _at_views(self, grid: Grid, how: How) -> ByFootprints | None:
         """The plan from which all follow, with all cells open; None where the mask is not at the views alone."""
         if not self._folded:
             return None
-        one = compiled(self.base, grid, how, Blurs(None, None))
+        one = ByFootprints(self.base, grid, how, Blurs(None, None))
         at_views = [holds(plane.pattern, self.open) for plane in one.aperture.planes]
         return one if one.alone and any(at_views) else None
 
     def _of_path(self, grid: Grid, how: How) -> Mixture | None:
-        one = compiled(self.first, grid, how, Blurs(None, None))
-        core, own, path = one.plan.core, self.cells[0], one.in_path
-        planes = path.absorbing.in_path
+        one = ByFootprints(self.first, grid, how, Blurs(None, None))
+        core, own, planes = one.plan.core, self.cells[0], one.absorbing.in_path
         masks = [n for n, plane in enumerate(planes) if plane.pattern is own]
-        elsewhere = [plane for plane in (*path.absorbing.at_views, *planes) if holds(plane.pattern, own)]
+        elsewhere = [plane for plane in (*one.absorbing.at_views, *planes) if holds(plane.pattern, own)]
         if len(masks) != 1 or len(elsewhere) != 1 or not (isinstance(core, Footprints) and core.separable):
             return None
         details = _Details(planes[masks[0]], self.cells)
-        members = [n for n in range(len(self.cells)) if path.same_by(details.of(n), how)]
+        members = [n for n in range(len(self.cells)) if one.same_by(details.of(n))]
         cells = [self.cells[n] for n in members]
-        return of_cells(one.plan, masks[0], path.textures[masks[0]], members, cells, len(members))
+        return of_cells(one.plan, masks[0], one.textures[masks[0]], members, cells, len(members))
 
     def _weighed(
-        self, one: Compiled, cells: Cells, shares: Array | None = None
+        self, one: ByFootprints, cells: Cells, shares: Array | None = None
     ) -> tuple[tuple[NDArray[np.intp], ...], Array]:
         """What some cells leave of the views: an open mesh of the taps that are looked at, and their weights.
 
@@ -137,12 +136,12 @@ class Codes(Brief):
         """
         if shares is None:
             planes = [replace(p, pattern=exchanged(p.pattern, self.open, cells)) for p in one.aperture.planes]
-            shares = replace(one.aperture, planes=planes).open_shares()
-        weights = one.shares * shares
-        keep = np.ix_(*used_taps(weights))
+            shares = replace(one.open_aperture, planes=planes).open_shares()
+        weights = one.open_taps.taps.shares * shares
+        keep = np.ix_(*choose_taps(weights))
         return keep, weights[keep]
 
-    def _plan(self, one: Compiled, cells: Cells) -> Plan:
+    def _plan(self, one: ByFootprints, cells: Cells) -> Plan:
         core, (taps, weights) = one.plan.core, self._weighed(one, cells)
         assert isinstance(core, Footprints)
         rows, columns = (some.ravel() for some in taps)

@@ -9,20 +9,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
-from vcc.base.values import content
 from vcc.fields.grid import Grid
 from vcc.optics.train import Train
-from vcc.plan.decisions import ANEW, Decisions
-from vcc.plan.footprints.absorbing import Absorbing
-from vcc.plan.footprints.aperture import Aperture
-from vcc.plan.footprints.around import LARGEST_RASTER, Around, sharp_footprint
+from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, choice, gathered, give
+from vcc.plan.footprints import against_sensor
+from vcc.plan.footprints.absorbing import Absorbing, AbsorbingChoices, choose_absorbing, choose_at_views
+from vcc.plan.footprints.against_sensor import MeansOnSensor, choose_means
+from vcc.plan.footprints.aperture import Aperture, CellChoices, OpenParts
+from vcc.plan.footprints.around import (
+    LARGEST_RASTER,
+    Around,
+    GapChoices,
+    Sharpened,
+    SharpeningChoices,
+    choose_gaps,
+    choose_sharp_footprint,
+    filled,
+)
 from vcc.plan.footprints.cells import (
     Detail,
     Geometry,
@@ -31,17 +40,17 @@ from vcc.plan.footprints.cells import (
     divide_views,
     parts_of_sheared,
 )
-from vcc.plan.footprints.diffusers import Blurs, diffusers_as_blurs
-from vcc.plan.footprints.landing import Landing
+from vcc.plan.footprints.diffusers import Blurs, KernelChoices, choose_kernels, diffusers_as_blurs
+from vcc.plan.footprints.landing import Landing, LandingChoices, choose_landing
 from vcc.plan.footprints.linear_in_cells import by_masks_against_sensor, by_view_planes
-from vcc.plan.footprints.mask_textures import Textured, mask_as_met, mask_in_path
+from vcc.plan.footprints.mask_textures import MaskMet, TextureChoices, Textured, by_mask_in_path
 from vcc.plan.footprints.model import Footprints, MaskLookup
-from vcc.plan.footprints.planes import Plane, tap_origin
+from vcc.plan.footprints.planes import tap_origin
 from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.plan.footprints.words import cautions_of, coarse_textures, notes_of
 from vcc.plan.how import How
 from vcc.plan.model import Plan
-from vcc.plan.parallax_rule import BetweenViews, between_views_of
+from vcc.plan.parallax_rule import BetweenViews, choose_between_views
 
 Array = NDArray[np.float64]
 
@@ -49,15 +58,64 @@ MARGIN = 4
 """Pixels around the sensor within which footprints and filters look at light."""
 
 
-def blurs_or_why_not(train: Train, grid: Grid, how: How, decisions: Decisions = ANEW) -> Blurs | str:
+@dataclass(frozen=True, eq=False, repr=False)
+class FootprintChoices(Brief):
+    """All that is chosen of a plan by footprints, in the order of its stages.
+
+    Args:
+        on_sensor: how means of masks against the sensor are taken.
+        landing: how samples are brought to the sensor.
+        between: what is between views.
+        absorbing: in which planes masks are taken together.
+        at_views: which planes in mid-path are taken for one weight a view.
+        cells: how the cells of views are divided.
+        samples: how samples are.
+        open_cells: how the open shares of taps' cells are found, of each level.
+        taps: rows and columns of taps that are kept.
+        varying: taps in whose cells each mask in mid-path varies, (rows, columns).
+        textures: of masks in mid-path.
+        footprint: of samples; None: as asked.
+        sharpening: of the picture; None: none.
+        gaps: between taps' pictures.
+        within_pixels: whether masks against the sensor count by their variation within pixels.
+        kernels: of diffusers.
+    """
+
+    on_sensor: MeansOnSensor | None
+    landing: LandingChoices = choice("")
+    between: BetweenViews = choice("gaps between views that are filled", BetweenViews.like)
+    absorbing: AbsorbingChoices = choice("")
+    at_views: tuple[bool, ...] = choice("which masks tell views apart only")
+    cells: CellDivision = choice("parts of views' cells", CellDivision.like)
+    samples: SampleDivision = choice("parts of samples", SampleDivision.like)
+    open_cells: tuple[CellChoices, ...] | None = choice("views of level")
+    taps: tuple[NDArray[np.int64], NDArray[np.int64]] = choice("rows and columns of taps")
+    varying: tuple[NDArray[np.bool_], ...] = choice("cells in which masks in mid-path vary")
+    textures: tuple[TextureChoices, ...] = choice("mask in mid-path")
+    footprint: str | None = choice("footprint of samples")
+    sharpening: SharpeningChoices | None = choice("")
+    gaps: GapChoices = choice("")
+    within_pixels: bool = choice("detail within pixels")
+    kernels: tuple[KernelChoices, ...] = choice("diffuser")
+
+
+def blurs_or_why_not(
+    train: Train, grid: Grid, how: How, kernels: tuple[KernelChoices, ...] | None = None
+) -> Blurs | str:
     """What the diffusers come to where a picture can be made by footprints; else why it cannot, in words.
 
     The words name the element.
+
+    Args:
+        train: the optics.
+        grid: of the light field.
+        how: what was chosen.
+        kernels: what was chosen of those of diffusers, where numbers follow a camera.
     """
     for stage in train.stages:
         if stage.faces.bending is not None:
             return f"{stage.element.label} bends rays by a function of position that is not affine"
-    blurs = diffusers_as_blurs(train, grid, how.interpolation == "sharp", decisions)
+    blurs = diffusers_as_blurs(train, grid, how.interpolation == "sharp", kernels)
     if isinstance(blurs, Blurs) and blurs.picture is not None:
         rows, columns = (n + m for n, m in zip(train.sensor.shape, blurs.picture.shape, strict=True))
         if rows * columns > LARGEST_RASTER:
@@ -65,239 +123,278 @@ def blurs_or_why_not(train: Train, grid: Grid, how: How, decisions: Decisions = 
     return blurs
 
 
-def compile_footprints(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisions = ANEW) -> Plan:
-    """The plan by which footprints make the picture that a train makes of a light field; see `compiled`."""
-    return compiled(train, grid, how, blurs, decisions).plan
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Compiled(Brief):
-    """A plan, and what masks at the views have to do with it.
-
-    Args:
-        plan: how to make the picture.
-        aperture: the masks at the views, as the plan's taps meet them.
-        shares: of the light of views, that these taps have.
-        alone: whether nothing else in the plan depends on what these masks let through.
-        in_path: the masks in mid-path.
-    """
-
-    plan: Plan
-    aperture: Aperture
-    shares: Array
-    alone: bool
-    in_path: InPath
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class InPath(Brief):
-    """Masks in mid-path, and what was decided for their sake.
-
-    Args:
-        absorbing: they and those at the views.
-        textures: how theirs were made.
-        between: what is between views.
-        divided: how cells of views are, and samples.
-    """
-
-    absorbing: Absorbing
-    textures: tuple[Textured, ...]
-    between: BetweenViews
-    divided: Divided
-
-    def same_by(self, detail: Detail, how: How) -> bool:
-        """Whether the same would have been decided of other patterns of the same size; see `divide_views`."""
-        at_views, planes, geometry = self.absorbing.at_views, self.absorbing.in_path, self.divided.geometry
-        cells = divide_views(at_views, planes, self.between, geometry, how.refine, detail)
-        fine = divide_samples(planes, geometry, cells, how.refine, detail)
-        own = self.divided.samples
-        return cells.like(self.divided.cells) and (own.parts, own.hard) == (fine.parts, fine.hard)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Divided(Brief):
-    """How cells of views and samples are divided.
-
-    Args:
-        geometry: by which.
-        cells: of views.
-        samples: likewise.
-    """
-
-    geometry: Geometry
-    cells: CellDivision
-    samples: SampleDivision
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class OpenTaps(Brief):
     """Taps that masks at the views leave light.
 
     Args:
-        aperture: these masks, as all taps meet them.
         kept: an open mesh of the rows and columns of taps that are looked at.
         taps: those.
         weights: of their light.
         middle: how far the open part of each one's cell lies from the cell's middle, in views, (…, 2).
     """
 
-    aperture: Aperture
     kept: tuple[NDArray[np.intp], ...]
     taps: Taps
     weights: Array
     middle: Array
 
 
-def compiled(train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisions = ANEW) -> Compiled:
-    """The plan by which footprints make the picture that an optical train makes of a light field.
+class ByFootprints:
+    """The stages of a plan by footprints, each made once of those before it, in this order.
+
+    Stages named ``choose_…`` are the fields of `FootprintChoices`: what was chosen, or else is chosen now. The
+    others compute.
 
     Args:
         train: the optics, all affine but for ``blurs``.
         grid: of the light field.
         how: what was chosen.
         blurs: what the diffusers come to (`blurs_or_why_not`).
-        decisions: where these are kept, the plan is made as the first one was.
+        choices: by which the plan is made; None chooses now.
+        follow: whether its numbers are to follow a camera.
+        parts: what is kept of plans nearby.
 
     Raises:
-        InputError: a frame that the sensor cannot be reached by, or decisions that no longer hold.
-    """
-    made = _Stages(train, grid, how, blurs, decisions)
-    open_taps, absorbing, around = made.open_taps, made.absorbing, made.around
-    decisions.note(by_view_planes(open_taps.aperture, open_taps.kept, absorbing.in_path))
-    decisions.note(
-        by_masks_against_sensor(
-            train.sensor, absorbing.against_sensor, len(around.after) - 1, around.in_pixels, decisions
-        )
-    )
-    plan = Plan(
-        sensor_shape=train.sensor.shape,
-        grid_shape=grid.shape[:4],
-        core=around.core,
-        before=around.before,
-        after=around.after,
-        expected_ghosting=made.between.gap_left,
-        notes=made.notes,
-        cautions=made.cautions,
-    )
-    # Gaps between views' pictures that are filled ask for parts of cells where a mask is fine.
-    alone = not absorbing.in_path and (how.refine == 1 or max(made.between.gap_filled) <= 1)
-    textures = tuple(kept for _, kept in made.masks_as_met)
-    return Compiled(
-        plan,
-        replace(open_taps.aperture, taps=open_taps.taps),
-        open_taps.taps.shares,
-        alone,
-        InPath(absorbing, textures, made.between, made.divided),
-    )
-
-
-class _Stages:
-    """The stages of a plan, each made once of those before it, in this order.
-
-    Args:
-        train: see `compiled`.
-        grid: likewise.
-        how: likewise.
-        blurs: likewise.
-        decisions: likewise.
+        InputError: a frame that the sensor cannot be reached by, or choices that no longer hold.
     """
 
-    def __init__(self, train: Train, grid: Grid, how: How, blurs: Blurs, decisions: Decisions) -> None:
-        self.sensor, self.train, self.how, self.blurs, self.decisions = train.sensor, train, how, blurs, decisions
+    def __init__(
+        self,
+        train: Train,
+        grid: Grid,
+        how: How,
+        blurs: Blurs,
+        choices: FootprintChoices | None = None,
+        follow: Follow | None = None,
+        parts: Parts = NONE_KEPT,
+    ) -> None:
+        self.sensor, self.train, self.how, self.blurs = train.sensor, train, how, blurs
+        self.follow, self.parts = follow, parts
+        give(self, choices)
+        self.light_field = grid
         self.grid = grid if blurs.views is None else grid.grown(*(n // 2 for n in blurs.views.shape))
         self.sharp = how.interpolation == "sharp"
+
+    @property
+    def choices(self) -> FootprintChoices:
+        """All that is chosen."""
+        return gathered(FootprintChoices, self)
+
+    @property
+    @cached
+    def plan(self) -> Plan:
+        """How to make the picture."""
+        around = self.around
+        return Plan(
+            sensor_shape=self.sensor.shape,
+            grid_shape=self.light_field.shape[:4],
+            core=around.core,
+            before=around.before,
+            after=around.after,
+            expected_ghosting=self.between.gap_left,
+            notes=self.notes,
+            cautions=self.cautions,
+        )
+
+    @property
+    def linears(self) -> tuple[Linear, ...]:
+        """Which of its numbers are linear in the cells of masks."""
+        absorbing, textures = self.absorbing, self.textures
+        spacings = [made.lattice.spacing for made in textures]
+        place = len(self.around.after) - 1
+        means, within = self.choose_on_sensor, self.choose_within_pixels
+        assert means is not None
+        return (
+            *(by_mask_in_path(n, *each) for n, each in enumerate(zip(absorbing.in_path, textures, strict=True))),
+            by_view_planes(self.aperture, self.open_taps.kept, absorbing.in_path, spacings),
+            by_masks_against_sensor(self.sensor, absorbing.against_sensor, means, place, within),
+        )
+
+    # --- where samples fall, and what they meet
+
+    @property
+    @cached
+    def choose_landing(self) -> LandingChoices:
+        """How samples are brought to the sensor."""
+        return choose_landing(self.train, self.grid)
 
     @property
     @cached
     def landing(self) -> Landing:
         """Where samples fall on the sensor."""
-        return Landing.of(self.train, self.grid, self.decisions)
+        return Landing.of(self.train, self.grid, self.choose_landing)
+
+    @property
+    @cached
+    def choose_between(self) -> BetweenViews:
+        """What is between views."""
+        return choose_between_views(self.grid, self.landing.frame, self.landing.pixels, self.how)
 
     @property
     @cached
     def between(self) -> BetweenViews:
-        """What is between views."""
-        return between_views_of(self.grid, self.landing.frame, self.landing.pixels, self.how, self.decisions)
+        """The same, as the optics are now."""
+        return self.choose_between.now(self.grid, self.landing.pixels)
+
+    @property
+    @cached
+    def choose_absorbing(self) -> AbsorbingChoices:
+        """In which planes masks are taken together."""
+        return choose_absorbing(self.train, self.landing)
+
+    @property
+    @cached
+    def planes(self) -> Absorbing:
+        """Planes of masks in mid-path and against the sensor."""
+        return Absorbing.of(self.train, self.landing, self.choose_absorbing)
+
+    @property
+    @cached
+    def choose_at_views(self) -> tuple[bool, ...]:
+        """Which planes in mid-path are taken for one weight a view."""
+        return choose_at_views(self.planes.in_path, self.landing, self.between.motion, self.follow)
 
     @property
     @cached
     def absorbing(self) -> Absorbing:
-        """Masks, by where samples meet them."""
-        return Absorbing.of(self.train, self.landing, self.between.motion, self.decisions)
+        """Planes of masks, by where samples meet them."""
+        return self.planes.parted(self.landing, self.between.motion, self.choose_at_views)
+
+    # --- taps
 
     @property
     @cached
-    def divided(self) -> Divided:
-        """How cells of views and samples are divided."""
-        grid, how, landing = self.grid, self.how, self.landing
-        at_views, in_path, between = self.absorbing.at_views, self.absorbing.in_path, self.between
+    def geometry(self) -> Geometry:
+        """How samples lie on the sensor."""
+        self.parts.check()
+        grid, landing = self.grid, self.landing
         beyond = grid.beyond[2], grid.beyond[3]
-        geometry = Geometry(
+        return Geometry(
             views=(grid.shape[0], grid.shape[1]),
             extent=grid.extent,
             samples=landing.samples,
             on_sensor=landing.pixels,
             origin=landing.origin,
             sensor=self.sensor.shape,
-            margin=MARGIN + max(between.gap_filled),
-            parts=parts_of_sheared(landing.step) if self.sharp and how.refine != 1 else 1,
+            margin=MARGIN + max(self.between.gap_filled),
+            parts=parts_of_sheared(landing.step) if self.sharp and self.how.refine != 1 else 1,
             beyond=beyond[::-1] if landing.swapped else beyond,
         )
-        cells = self.decisions.keep(
-            "parts of views' cells",
-            lambda: divide_views(at_views, in_path, between, geometry, how.refine),
-            CellDivision.like,
-        )
-        samples = self.decisions.keep(
-            "parts of samples",
-            lambda: divide_samples(in_path, geometry, cells, how.refine),
-            lambda one, other: (one.parts, one.hard) == (other.parts, other.hard),
-        )
-        return Divided(geometry, cells, samples)
+
+    @property
+    @cached
+    def choose_cells(self) -> CellDivision:
+        """How the cells of views are divided."""
+        absorbing = self.absorbing
+        return divide_views(absorbing.at_views, absorbing.in_path, self.between, self.geometry, self.how.refine)
+
+    @property
+    @cached
+    def choose_samples(self) -> SampleDivision:
+        """How samples are divided."""
+        return divide_samples(self.absorbing.in_path, self.geometry, self.choose_cells, self.how.refine)
+
+    @property
+    @cached
+    def _all_taps(self) -> Aperture:
+        """The masks at the views, as all taps meet them."""
+        rows, columns = ((before == 0, after == 0) for before, after in self.grid.beyond[:2])
+        taps = Taps.of(self.geometry.views, self.choose_cells, (rows, columns))
+        return Aperture(self.absorbing.at_views, taps, self.between.motion, self.landing.samples)
+
+    @property
+    @cached
+    def choose_open_cells(self) -> tuple[CellChoices, ...] | None:
+        """How the open shares of taps' cells are found, of each level; None where nothing has to follow."""
+        return None if self.follow is None else self._all_taps.choices()
+
+    @property
+    @cached
+    def aperture(self) -> Aperture:
+        """The masks at the views, as all taps meet them, and how their open shares are found."""
+        return replace(self._all_taps, chosen=self.choose_open_cells)
+
+    @property
+    @cached
+    def open_parts(self) -> OpenParts:
+        """What is open of each tap's cell."""
+        return self.aperture.open_parts(self.parts)
+
+    @property
+    @cached
+    def choose_taps(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Rows and columns of taps that are looked at."""
+        return choose_taps(self.aperture.taps.shares * self.open_parts.weights, self.follow)
 
     @property
     @cached
     def open_taps(self) -> OpenTaps:
-        """Parts of views that masks at the views leave light."""
-        rows, columns = ((before == 0, after == 0) for before, after in self.grid.beyond[:2])
-        taps = Taps.of(self.divided.geometry.views, self.divided.cells, (rows, columns))
-        planes = self.absorbing.at_views
-        aperture = Aperture(planes, taps, self.between.motion, self.landing.samples, self.decisions)
-        parts = self.decisions.made(
-            "what is open of views",
-            lambda: tuple(content((plane.pattern, plane.at_index, plane.offset)) for plane in planes),
-            aperture.open_parts,
-        )
-        weights = taps.shares * parts.weights
-        used = used_taps(weights, self.decisions)
-        kept = np.ix_(*used)
-        return OpenTaps(aperture, kept, taps.some(*used), weights[kept], parts.middle[kept])
+        """Those taps, and their light."""
+        taps, parts = self.aperture.taps, self.open_parts
+        kept = np.ix_(*self.choose_taps)
+        weights = (taps.shares * parts.weights)[kept]
+        return OpenTaps(kept, taps.some(*self.choose_taps), weights, parts.middle[kept])
+
+    # --- masks in mid-path
 
     @property
     @cached
-    def masks_as_met(self) -> tuple[tuple[MaskLookup, Textured], ...]:
-        """Masks in mid-path as samples meet them, and how their textures were made."""
-        taps, divided = self.open_taps.taps, self.divided
-        points = self.grid.sample == "point" and divided.samples.parts == 1
+    def choose_varying(self) -> tuple[NDArray[np.bool_], ...]:
+        """Taps in whose cells each mask varies: elsewhere it does not matter which part of one is open.
 
-        def met(n: int, plane: Plane) -> tuple[MaskLookup, Textured]:
-            own = self.decisions.of(mask_in_path(n))
-            middle = self.open_taps.middle * _varying(divided.geometry, plane, taps, own)[..., None]
-            fine, samples = divided.samples.parts, self.landing.samples
-            return mask_as_met(plane, taps, middle, self.between.motion, samples, fine, not points, own)
+        Moved to the middle of the open part, a cell would reach over an edge that does not cross it.
+        """
+        geometry, taps = self.geometry, self.open_taps.taps
+        return tuple(geometry.varying_taps(plane, taps) for plane in self.absorbing.in_path)
 
-        return tuple(met(n, plane) for n, plane in enumerate(self.absorbing.in_path))
+    @property
+    @cached
+    def masks_met(self) -> tuple[MaskMet, ...]:
+        """Masks as samples meet them."""
+        opened, fine = self.open_taps, self.choose_samples.parts
+        over_samples = not (self.grid.sample == "point" and fine == 1)
+        motion, samples = self.between.motion, self.landing.samples
+        return tuple(
+            MaskMet.of(plane, opened.taps, opened.middle * varying[..., None], motion, samples, fine, over_samples)
+            for plane, varying in zip(self.absorbing.in_path, self.choose_varying, strict=True)
+        )
+
+    @property
+    @cached
+    def choose_textures(self) -> tuple[TextureChoices, ...]:
+        """How their textures are made."""
+        return tuple(met.choices(self.follow) for met in self.masks_met)
+
+    @property
+    @cached
+    def looked_up(self) -> tuple[tuple[MaskLookup, Textured], ...]:
+        """Their textures, and what is needed to make others like them."""
+        pairs = zip(self.masks_met, self.choose_textures, strict=True)
+        return tuple(met.look_up(choices, self.parts) for met, choices in pairs)
+
+    @property
+    def textures(self) -> tuple[Textured, ...]:
+        """How their textures were made."""
+        return tuple(made for _, made in self.looked_up)
+
+    # --- the core, and what is done around it
+
+    @property
+    @cached
+    def choose_footprint(self) -> str | None:
+        """The footprint of samples; None: as asked."""
+        return choose_sharp_footprint(self.landing.step, self.choose_samples) if self.sharp else None
 
     @property
     @cached
     def core(self) -> Footprints:
         """The footprints, before what is done around them."""
-        landing, taps, samples = self.landing, self.open_taps.taps, self.divided.samples
+        landing, taps = self.landing, self.open_taps.taps
         place = tap_origin(landing.pixels, landing.origin, taps.index, taps.shift, self.between.motion)
-        sharp = sharp_footprint(landing.step, samples, self.decisions) if self.sharp else None
         return Footprints(
             raster_shape=self.sensor.shape,
-            interpolation=sharp or self.how.interpolation,
+            interpolation=self.choose_footprint or self.how.interpolation,
             scale=self.grid.sample_volume / (self.sensor.pitches[0] * self.sensor.pitches[1]),
             view_rows=taps.rows,
             view_columns=taps.columns,
@@ -306,33 +403,80 @@ class _Stages:
             y=place[..., 1],
             step=landing.step,
             samples=landing.samples,
-            masks=tuple(lookup for lookup, _ in self.masks_as_met),
-            refine=samples.parts,
+            masks=tuple(lookup for lookup, _ in self.looked_up),
+            refine=self.choose_samples.parts,
             opening=math.sqrt(self.sensor.fill_factor),
         )
 
     @property
     @cached
+    def choose_sharpening(self) -> SharpeningChoices | None:
+        """How what interpolation takes from sharpness is given back; None: not at all."""
+        return Sharpened.choose(self.core, self.grid.sample) if self.sharp else None
+
+    @property
+    def gaps(self) -> tuple[float, float]:
+        """(vertical, horizontal) between taps' pictures, pixels."""
+        down, across = (gap / self.choose_cells.parts for gap in self.between.gap_filled)
+        return down, across
+
+    @property
+    @cached
+    def choose_gaps(self) -> GapChoices:
+        """Which of them are filled."""
+        return choose_gaps(self.gaps, self.follow)
+
+    @property
+    @cached
+    def choose_on_sensor(self) -> MeansOnSensor | None:
+        """How means of masks against the sensor are taken; None: by patterns themselves."""
+        return None if self.follow is None else choose_means(self.sensor, self.absorbing.against_sensor)
+
+    @property
+    @cached
+    def within_pixels(self) -> Array | None:
+        """What the variation of masks against the sensor within pixels does; None without."""
+        if not self.sharp:
+            return None
+        planes = self.absorbing.against_sensor
+        return against_sensor.detail(self.sensor, planes, self.choose_on_sensor, self.parts)
+
+    @property
+    @cached
+    def choose_within_pixels(self) -> bool:
+        """Whether it counts."""
+        return against_sensor.counts(self.within_pixels)
+
+    @property
+    @cached
+    def choose_kernels(self) -> tuple[KernelChoices, ...]:
+        """Of the diffusers that ``blurs`` stands for."""
+        return choose_kernels(self.train, self.light_field, self.sharp)
+
+    @property
+    @cached
     def around(self) -> Around:
-        """What is done before and after them."""
-        down, across = (gap / self.divided.cells.parts for gap in self.between.gap_filled)
+        """What is done before and after the footprints."""
+        choices, planes = self.choose_sharpening, self.absorbing.against_sensor
+        filters = Sharpened(self.core) if choices is None else Sharpened.of(self.core, self.grid.sample, choices)
         return Around.of(
-            self.core,
+            filters,
             self.sensor,
-            self.grid.sample if self.sharp else None,
-            (down, across),
+            filled(self.gaps, self.choose_gaps, self.sensor.shape),
             self.blurs,
             self.landing.swapped,
-            self.absorbing.against_sensor,
-            self.decisions,
+            against_sensor.transmission(self.sensor, planes, self.choose_on_sensor, self.parts),
+            self.within_pixels if self.choose_within_pixels else None,
         )
+
+    # --- words
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the plan does, in words."""
-        cells, samples, absorbing = self.divided.cells, self.divided.samples, self.absorbing
+        cells, samples, absorbing = self.choose_cells, self.choose_samples, self.absorbing
         of_masks = "as asked" if self.how.refine != "auto" else "a mask near the sensor is finer than a sample"
-        turned = samples.parts == self.divided.geometry.parts
+        turned = samples.parts == self.geometry.parts
         why_divided = "they lie turned on the sensor" if turned else of_masks
         planes = absorbing.at_views, absorbing.in_path, absorbing.against_sensor
         swapped = self.landing.swapped
@@ -344,29 +488,38 @@ class _Stages:
         """What the plan cautions of, in words."""
         ghosts = 0.0 if self.how.between_views == "none" else self.between.gap_left
         pixel = max(1.0, abs(self.core.row_step))
-        cautions = cautions_of(self.divided.cells, self.divided.samples, ghosts, pixel)
+        cautions = cautions_of(self.choose_cells, self.choose_samples, ghosts, pixel)
         return cautions + coarse_textures(self.core.masks)
 
+    # --- for pictures of other masks
 
-def _varying(geometry: Geometry, plane: Plane, taps: Taps, decisions: Decisions) -> NDArray[np.bool_]:
-    """Taps in whose cells a mask varies, (rows, columns): elsewhere it does not matter which part of one is open.
+    @property
+    def open_aperture(self) -> Aperture:
+        """The masks at the views, as those taps meet them that are looked at."""
+        return replace(self.aperture, taps=self.open_taps.taps)
 
-    Moved to the middle of the open part, a cell would reach over an edge that does not cross it.
+    @property
+    def alone(self) -> bool:
+        """Whether nothing in the plan but taps' weights depends on what masks at the views let through."""
+        # Gaps between views' pictures that are filled ask for parts of cells where a mask is fine.
+        return not self.absorbing.in_path and (self.how.refine == 1 or max(self.between.gap_filled) <= 1)
+
+    def same_by(self, detail: Detail) -> bool:
+        """Whether cells and samples would be divided alike for other patterns of the same size."""
+        at_views, planes, geometry = self.absorbing.at_views, self.absorbing.in_path, self.geometry
+        cells = divide_views(at_views, planes, self.between, geometry, self.how.refine, detail)
+        fine = divide_samples(planes, geometry, cells, self.how.refine, detail)
+        return cells.like(self.choose_cells) and fine.like(self.choose_samples)
+
+
+def choose_taps(weights: Array, follow: Follow | None = None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows and columns of taps that are looked at: that give light, or the first where none does.
+
+    All where numbers follow a camera, since what is dark may be lit later.
     """
-    return decisions.keep("cells in which it varies", lambda: geometry.varying_taps(plane, taps), np.array_equal)
-
-
-def used_taps(weights: Array, decisions: Decisions = ANEW) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of taps that give light; where decisions are kept, and one without on each side."""
-    found = []
-    for axis, along in enumerate(("rows", "columns")):
-        lit = np.asarray(weights.any(axis=1 - axis))
-        found.append(decisions.keep(f"{along} of taps", partial(_kept_taps, lit, decisions.lasting)))
-    return found[0], found[1]
-
-
-def _kept_taps(lit: NDArray[np.bool_], lasting: bool) -> NDArray[np.int64]:
-    """Those that are lit, or the first where none is; all where what is dark may be lit later."""
-    if lasting:
-        return np.arange(len(lit))
-    return np.flatnonzero(lit) if lit.any() else np.zeros(1, dtype=np.int64)
+    if follow is not None:
+        rows, columns = map(np.arange, weights.shape)
+        return rows, columns
+    lit = (np.flatnonzero(weights.any(axis=axis)) for axis in (1, 0))
+    rows, columns = (found if found.size else np.zeros(1, dtype=np.int64) for found in lit)
+    return rows, columns

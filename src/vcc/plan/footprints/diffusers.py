@@ -17,8 +17,8 @@ Where neither holds, rays are traced.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.optics.train import Stage, Train
-from vcc.plan.decisions import ANEW, Decisions, plan_again
+from vcc.plan.following import check_unchanged, choice, plan_again
 from vcc.plan.sharpening import along_axis, weights_beside
 from vcc.shapes.kernel_weights import axes_of
 from vcc.shapes.kernels import Kernel
@@ -36,7 +36,7 @@ from vcc.shapes.sheets import clear_over
 Array = NDArray[np.float64]
 
 ROOM = 1.25
-"""By how much a kernel may grow within decisions that are kept."""
+"""By how much a kernel may grow where it follows a camera."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,18 +54,73 @@ class Blurs(Brief):
     notes: tuple[str, ...] = ()
 
 
-def diffusers_as_blurs(train: Train, grid: Grid, sharp: bool = True, decisions: Decisions = ANEW) -> Blurs | str:
+@dataclass(frozen=True)
+class KernelChoices:
+    """What is chosen of a kernel on a lattice so that it follows a camera.
+
+    Args:
+        axes: that the kernel lies along (`vcc.shapes.kernel_weights.axes_of`).
+        steps_beside: (rows, columns) of steps on each side of its middle, with room to grow.
+        filters: weights beside the middle of those that give back, (down, across), what sharing out takes.
+    """
+
+    axes: Hashable = choice("axes that the kernel lies along")
+    steps_beside: tuple[int, int] = choice("reach of the kernel", lambda one, other: _within_room(one, other))
+    filters: tuple[int, ...] = choice("filters along the axes")
+
+
+@dataclass(frozen=True, eq=False)
+class _Scattered:
+    """A diffuser as a blur: its kernel, steps from slopes (2×2), whether it blurs views, and that in words."""
+
+    label: str
+    kernel: Kernel
+    steps_from_slopes: Array
+    of_views: bool
+    words: str
+
+
+def diffusers_as_blurs(
+    train: Train, grid: Grid, sharp: bool = True, choices: tuple[KernelChoices, ...] | None = None
+) -> Blurs | str:
     """The blurs by which the rules replace all diffusers of a camera, or why they do not.
 
     Args:
         train: with diffusers or without.
         grid: that it looks at.
         sharp: whether the tent by which a kernel is shared out on its lattice is given back.
-        decisions: by which kernels have their sizes.
+        choices: of each kernel, where numbers follow a camera.
+
+    Raises:
+        InputError: kernels for which the choices no longer hold.
     """
-    picture: Array | None = None
-    views: Array | None = None
-    notes: list[str] = []
+    found = _scattered(train, grid)
+    if isinstance(found, str):
+        return found
+    if choices is not None and len(choices) != len(found):
+        raise plan_again("which diffusers are blurs")
+    total: dict[bool, Array | None] = {False: None, True: None}
+    for each, own in zip(found, choices or (None,) * len(found), strict=True):
+        try:
+            weights = _on_lattice(each.kernel, each.steps_from_slopes, sharp, own)
+        except InputError:
+            if own is not None:
+                raise
+            return f"{each.label} scatters further than a blur can reach"
+        total[each.of_views] = _convolved(total[each.of_views], weights)
+    return Blurs(total[False], total[True], tuple(each.words for each in found))
+
+
+def choose_kernels(train: Train, grid: Grid, sharp: bool) -> tuple[KernelChoices, ...]:
+    """What is chosen of the kernels of diffusers that are blurs, so that they follow a camera."""
+    found = _scattered(train, grid)
+    assert not isinstance(found, str)
+    return tuple(_choose_kernel(each.kernel, each.steps_from_slopes, sharp) for each in found)
+
+
+def _scattered(train: Train, grid: Grid) -> list[_Scattered] | str:
+    """The diffusers of a camera as blurs, or why one of them is none."""
+    found: list[_Scattered] = []
     for n, stage in enumerate(train.stages):
         if stage.faces.spread is None:
             continue
@@ -74,23 +129,15 @@ def diffusers_as_blurs(train: Train, grid: Grid, sharp: bool = True, decisions: 
             return f"{label} scatters by a kernel that varies over its surface"
         kernel = stage.faces.spread.kernels[0]
         obstacle = behind(train, n, grid)
-        its = decisions.of(f"diffuser {len(notes) + 1}")
-        try:
-            if obstacle is None:
-                picture = _convolved(picture, _on_lattice(kernel, _pixels_from_slopes(train, n), sharp, its))
-                notes.append(
-                    f"blur of the picture: {label}, since all behind it is affine and nothing there absorbs"
-                )
-            elif meets_views_in_points(train, grid, n):
-                views = _convolved(views, _on_lattice(kernel, _samples_from_slopes(train, grid, n), sharp, its))
-                notes.append(f"blur of each view: {label}, since each view meets it in one place")
-            else:
-                return f"{label} scatters, and {obstacle} behind it"
-        except InputError:
-            if decisions.lasting:
-                raise
-            return f"{label} scatters further than a blur can reach"
-    return Blurs(picture, views, tuple(notes))
+        if obstacle is None:
+            words = f"blur of the picture: {label}, since all behind it is affine and nothing there absorbs"
+            found.append(_Scattered(label, kernel, _pixels_from_slopes(train, n), False, words))
+        elif meets_views_in_points(train, grid, n):
+            words = f"blur of each view: {label}, since each view meets it in one place"
+            found.append(_Scattered(label, kernel, _samples_from_slopes(train, grid, n), True, words))
+        else:
+            return f"{label} scatters, and {obstacle} behind it"
+    return found
 
 
 def behind(train: Train, n: int, grid: Grid) -> str | None:
@@ -157,27 +204,54 @@ def _samples_from_slopes(train: Train, grid: Grid, n: int) -> Array:
     return np.asarray((train.stages[n].arriving @ grid.frame).inverse().linear[2:, 2:])
 
 
-def _on_lattice(kernel: Kernel, steps_from_slopes: Array, sharp: bool, decisions: Decisions) -> Array:
+def _on_lattice(
+    kernel: Kernel, steps_from_slopes: Array, sharp: bool, choices: KernelChoices | None = None
+) -> Array:
     """A kernel's weights; ``sharp``, without what they spread by sharing out what falls between lattice points.
+
+    Raises:
+        InputError: a kernel that reaches too far, or for which the choices no longer hold.
+    """
+    if choices is None:
+        weights = kernel.weights(steps_from_slopes, None)
+    else:
+        check_unchanged("axes that the kernel lies along", choices.axes, axes_of(steps_from_slopes, kernel.reach))
+        needed, room = kernel.steps_beside(steps_from_slopes), choices.steps_beside
+        if needed[0] > room[0] or needed[1] > room[1]:
+            raise plan_again(f"reach of a kernel, {max(needed)} steps where there is room for {max(room)}")
+        weights = kernel.weights(steps_from_slopes, room)
+    if not sharp:
+        return weights
+    losses = _losses(kernel, steps_from_slopes, weights)
+    beside = [weights_beside(loss, 1.0) for loss in losses] if choices is None else choices.filters
+    for axis, (loss, each) in enumerate(zip(losses, beside, strict=True)):
+        weights = _filtered(weights, along_axis(loss, 1.0, beside=each), 1 - axis)
+    return weights
+
+
+def _choose_kernel(kernel: Kernel, steps_from_slopes: Array, sharp: bool) -> KernelChoices:
+    room = kernel.steps_beside(ROOM * steps_from_slopes)
+    losses = _losses(kernel, steps_from_slopes, kernel.weights(steps_from_slopes, room)) if sharp else []
+    filters = tuple(weights_beside(loss, 1.0) for loss in losses)
+    return KernelChoices(axes_of(steps_from_slopes, kernel.reach), room, filters)
+
+
+def _losses(kernel: Kernel, steps_from_slopes: Array, weights: Array) -> list[float]:
+    """What sharing a kernel out on its lattice takes, along x and y, as a power of sinc.
 
     Along an axis that adds E|δ| − E δ² steps² to the variance of a kernel narrower than a step, and 1/6 to that of
     a wide one, as much as sinc² takes.
     """
-    weights = kernel.weights(steps_from_slopes, _beside(kernel, steps_from_slopes, decisions))
-    if not sharp:
-        return weights
     slopes, shares = kernel.quadrature()
     places = slopes @ steps_from_slopes.T
     wanted = shares @ places**2 - (shares @ places) ** 2
-    made = weights
+    found = []
     for axis in (0, 1):
         along = weights.sum(axis=axis)
         step = np.arange(len(along)) - len(along) // 2
         added = along @ step**2 - (along @ step) ** 2 - wanted[axis]
-        losses = min(max(12 * added, 0.0), 3.0)
-        beside = decisions.keep(f"filter along axis {axis}", partial(weights_beside, losses, 1.0))
-        made = _filtered(made, along_axis(losses, 1.0, beside=beside), 1 - axis)
-    return made
+        found.append(min(max(12 * added, 0.0), 3.0))
+    return found
 
 
 def _filtered(weights: Array, along: Array, axis: int) -> Array:
@@ -190,20 +264,6 @@ def _filtered(weights: Array, along: Array, axis: int) -> Array:
     room = [(0, 0), (0, 0)]
     room[axis] = (len(along) // 2, len(along) // 2)
     return np.asarray(convolve1d(np.pad(weights, room), along, axis=axis, mode="constant"))
-
-
-def _beside(kernel: Kernel, steps_from_slopes: Array, decisions: Decisions) -> tuple[int, int] | None:
-    """Room for a kernel that may grow; None where nothing has to follow it."""
-    if not decisions.lasting:
-        return None
-    decisions.hold("axes that the kernel lies along", axes_of(steps_from_slopes, kernel.reach))
-    needed = kernel.steps_beside(steps_from_slopes)
-    rows, columns = decisions.keep(
-        "reach of the kernel", lambda: kernel.steps_beside(ROOM * steps_from_slopes), _within_room
-    )
-    if needed[0] > rows or needed[1] > columns:
-        raise plan_again(f"reach of a kernel, {max(needed)} steps where there is room for {max(rows, columns)}")
-    return rows, columns
 
 
 def _within_room(one: tuple[int, int], other: tuple[int, int]) -> bool:

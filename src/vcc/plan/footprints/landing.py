@@ -11,11 +11,61 @@ from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
 from vcc.optics.train import Train
-from vcc.plan.decisions import Decisions, plan_again
+from vcc.plan.following import check_unchanged, choice, plan_again
 from vcc.plan.footprints.mask_textures import ROUNDING
 from vcc.plan.footprints.shares import SMALLEST_STEP
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LandingChoices:
+    """How samples are brought to the sensor.
+
+    Args:
+        swapped: whether pixel axes are taken in the other order than the light field's.
+        straight: of the steps across (x from l, y from k), which are rounding.
+        points: along (x, y), whether views fall into points.
+    """
+
+    swapped: bool = choice("order of the axes of pixels")
+    straight: tuple[bool, bool] = choice("steps across the sensor that are rounding")
+    points: tuple[bool, bool] = choice("views that fall into points")
+
+
+def choose_landing(train: Train, grid: Grid) -> LandingChoices:
+    """How samples are best brought to the sensor."""
+    down = (train.arriving_at_sensor @ grid.frame).linear[1]
+    swapped = bool(abs(down[3]) < abs(down[2]))
+    found = _Places.of(train, grid, swapped)
+    crossing, along = found.crossing < ROUNDING, np.abs(np.diag(found.pixels[:, 2:])) < SMALLEST_STEP
+    return LandingChoices(swapped, (bool(crossing[0]), bool(crossing[1])), (bool(along[0]), bool(along[1])))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Places(Brief):
+    """Places of samples, their pixel axes in one order or the other; see `Landing`."""
+
+    frame: Affine
+    samples: tuple[int, int]
+    metres: Array
+    pixels: Array
+    origin: Array
+
+    @classmethod
+    def of(cls, train: Train, grid: Grid, swapped: bool) -> _Places:
+        frame, (nt, ns) = grid.frame, grid.shape[2:4]
+        if swapped:
+            frame, nt, ns = frame @ Affine(np.eye(5)[[0, 1, 3, 2, 4]]), ns, nt
+        metres = (train.arriving_at_sensor @ frame).matrix[:2]
+        pixels_from_metres = train.sensor.frame.inverse()
+        pixels = pixels_from_metres.linear @ metres[:, :4]
+        return cls(frame, (nt, ns), metres, pixels, pixels_from_metres(metres[:, 4]))
+
+    @property
+    def crossing(self) -> Array:
+        """By how many pixels a view leaves its row along x, and its column along y, at most."""
+        return np.asarray(np.abs(self.pixels[[0, 1], [3, 2]]) * max(self.samples))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,44 +91,32 @@ class Landing(Brief):
     step: Array
 
     @classmethod
-    def of(cls, train: Train, grid: Grid, decisions: Decisions) -> Landing:
+    def of(cls, train: Train, grid: Grid, choices: LandingChoices) -> Landing:
         """Where a train brings the samples of a grid.
 
         Raises:
-            InputError: rows of samples no longer land where they were decided to.
+            InputError: rows of samples no longer land where it was chosen that they do.
         """
-        frame, samples, swapped = _without_transposition(grid, train.arriving_at_sensor, decisions)
-        metres = (train.arriving_at_sensor @ frame).matrix[:2]
-        pixels_from_metres = train.sensor.frame.inverse()
-        pixels = pixels_from_metres.linear @ metres[:, :4]
-        origin = pixels_from_metres(metres[:, 4])
-        return cls(frame, samples, swapped, metres, pixels, origin, _cleaned(pixels[:, 2:], samples, decisions))
+        found = _Places.of(train, grid, choices.swapped)
+        step = _cleaned(found.pixels[:, 2:], found.crossing, choices)
+        return cls(found.frame, found.samples, choices.swapped, found.metres, found.pixels, found.origin, step)
 
 
-def _without_transposition(
-    grid: Grid, at_sensor: Affine, decisions: Decisions
-) -> tuple[Affine, tuple[int, int], bool]:
-    """The frame with its pixel axes in the order in which rows of samples land on rows of the sensor."""
-    frame, (nt, ns) = grid.frame, grid.shape[2:4]
-    down = (at_sensor @ frame).linear[1]
-    swapped = decisions.keep("order of the axes of pixels", lambda: bool(abs(down[3]) < abs(down[2])))
-    if not swapped:
-        return frame, (nt, ns), False
-    exchange = Affine(np.eye(5)[[0, 1, 3, 2, 4]])
-    return frame @ exchange, (ns, nt), True
+def _cleaned(step: Array, crossing: Array, choices: LandingChoices) -> Array:
+    """Steps without cross terms that are rounding errors, and without zeros on the way to the pixels.
 
-
-def _cleaned(step: Array, samples: tuple[int, int], decisions: Decisions) -> Array:
-    """Steps without cross terms that are rounding errors, and without zeros on the way to the pixels."""
-    step = step.copy()
-    crossing = np.abs(step[[0, 1], [1, 0]]) * max(samples)
-    straight = decisions.keep("steps across the sensor that are rounding", lambda: crossing < ROUNDING)
+    Args:
+        step: 2×2, pixels per index step (k, l).
+        crossing: see `_Places.crossing`.
+        choices: which steps are rounding.
+    """
+    step, straight = step.copy(), np.array(choices.straight)
     if (straight & (crossing >= ROUNDING)).any():
         raise plan_again("rows of samples that land on rows of pixels")
     step[[0, 1], [1, 0]] = np.where(straight, 0.0, step[[0, 1], [1, 0]])
-    for axis in (0, 1):
-        if decisions.hold(
-            f"views that fall into points, axis {axis}", bool(abs(step[axis, axis]) < SMALLEST_STEP)
-        ):
+    for axis, point in enumerate(choices.points):
+        now = bool(abs(step[axis, axis]) < SMALLEST_STEP)
+        check_unchanged(f"views that fall into points, axis {axis}", point, now)
+        if point:
             step[axis, axis] = np.copysign(SMALLEST_STEP, step[axis, axis])
     return step

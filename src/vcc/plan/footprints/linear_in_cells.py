@@ -1,6 +1,6 @@
 """Which numbers of a plan by footprints are linear in the cells of masks, and the transposes of these maps.
 
-Those of masks in mid-path are noted where their textures are made (`vcc.plan.footprints.mask_textures`).
+Those of masks in mid-path stand beside their textures (`vcc.plan.footprints.mask_textures`).
 """
 
 from __future__ import annotations
@@ -11,31 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.optics.sensor import Sensor
-from vcc.plan.decisions import Decisions, Linear
-from vcc.plan.footprints.against_sensor import detail_back, transmission_back
+from vcc.plan.following import Linear
+from vcc.plan.footprints.against_sensor import MeansOnSensor, detail_back, transmission_back
 from vcc.plan.footprints.aperture import Aperture, OpenParts
-from vcc.plan.footprints.mask_textures import LATTICE, mask_in_path
 from vcc.plan.footprints.planes import Plane
 from vcc.shapes.mean_back import holds, is_values
 
 Array = NDArray[np.float64]
 
 
-def by_view_planes(aperture: Aperture, keep: Any, path_planes: list[Plane]) -> Linear:
+def by_view_planes(aperture: Aperture, keep: Any, path_planes: list[Plane], spacings: list[Array]) -> Linear:
     """How taps' weights, and where they meet masks in mid-path, follow the cells of masks at the views.
 
     Args:
         aperture: these masks.
         keep: which of the taps there are.
         path_planes: the masks in mid-path: light through a part of a tap's cell meets them around its middle.
+        spacings: (x, y) of the points of their textures, metres.
     """
 
     def back(cells: Any, weights: list[Any]) -> Any:
         shares = aperture.taps.shares
         of_taps = OpenParts(np.zeros(shares.shape), np.zeros((*shares.shape, 2)))
         of_taps.weights[keep] = weights[0] * shares[keep]
-        for n, plane in enumerate(path_planes):
-            spacing = aperture.decisions.of(mask_in_path(n)).taken(LATTICE).spacing
+        for n, (plane, spacing) in enumerate(zip(path_planes, spacings, strict=True)):
             places = np.stack(weights[1 + 2 * n : 3 + 2 * n], axis=-1) / spacing
             of_taps.middle[keep] += places @ plane.view_step(aperture.motion)
         return aperture.back(of_taps, cells)
@@ -53,21 +52,21 @@ def by_view_planes(aperture: Aperture, keep: Any, path_planes: list[Plane]) -> L
 
 
 def by_masks_against_sensor(
-    sensor: Sensor, planes: list[Plane], place: int, detailed: bool, decisions: Decisions
+    sensor: Sensor, planes: list[Plane], means: MeansOnSensor, place: int, detailed: bool
 ) -> Linear:
     """How what the picture is multiplied by follows the cells of masks against the sensor.
 
     Args:
         sensor: of the camera.
         planes: the masks against it.
+        means: how theirs are taken.
         place: of what applies them among what is done after the core.
         detailed: whether their variation within pixels counts.
-        decisions: by which means are taken.
     """
 
     def back(cells: Any, weights: list[Any]) -> Any:
-        found = transmission_back(sensor, planes, weights[0], cells, decisions)
-        return found + detail_back(sensor, planes, weights[1], cells, decisions) if detailed else found
+        found = transmission_back(sensor, planes, means, weights[0], cells)
+        return found + detail_back(sensor, planes, means, weights[1], cells) if detailed else found
 
     return Linear(
         lambda thing, field: is_values(thing, field) and any(holds(plane.pattern, thing) for plane in planes),

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.values import content
-from vcc.plan.decisions import ANEW, Decisions, Linear, plan_again
-from vcc.plan.footprints.means import Boxes, mean_over
+from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, choice, plan_again
+from vcc.plan.footprints.means import Boxes, MeanChoice, choose_mean, mean_over
 from vcc.plan.footprints.means_back import mean_back
 from vcc.plan.footprints.model import MaskLookup
 from vcc.plan.footprints.planes import Plane, along_axes, tap_origin
@@ -23,6 +23,8 @@ from vcc.shapes.mean_back import holds, is_values
 from vcc.shapes.patterns import Cells, Pattern
 
 Array = NDArray[np.float64]
+Means = tuple[tuple[MeanChoice | None, ...], ...]
+"""How means are taken, by level, and by rows that are averaged at once."""
 
 TEXTURE_POINTS_PER_FOOTPRINT = 3
 """Weights are quadratic B-splines of texture points this fine; what those take is given back beforehand."""
@@ -46,8 +48,6 @@ ROUNDING = 1e-6
 """Points or pixels, over a whole view, that are rounding."""
 ROOM = 0.1
 """By how much of what samples meet of a mask a texture that is kept reaches beyond it on each side."""
-LATTICE = "points of its texture"
-"""The decision that holds them."""
 COARSER = 1.5
 """By how much the footprint of samples may change before another texture would be made."""
 
@@ -93,115 +93,156 @@ class Lattice(Brief):
         return len(self.footings) == len(other.footings) and bool(np.maximum(ratio, 1 / ratio).max() < COARSER)
 
 
-def mask_as_met(
-    plane: Plane,
-    taps: Taps,
-    off_middle: Array,
-    motion: Array,
-    samples: tuple[int, int],
-    fine: int,
-    over_samples: bool = True,
-    decisions: Decisions = ANEW,
-) -> tuple[MaskLookup, Textured]:
-    """The mask averaged over a sample's footprint: as a texture that each sample reads, and how that was made.
+@dataclass(frozen=True, eq=False, repr=False)
+class TextureChoices(Brief):
+    """How the texture of a mask is made, and read.
 
     Args:
-        plane: the mask.
-        taps: of the plan.
-        off_middle: how far the open part of each tap's cell lies from its middle, in views, (rows, columns, 2).
-        motion: see `tap_origin`.
-        samples: (rows, columns) of a view.
-        fine: parts of a sample, each way.
-        over_samples: whether to average over the sample's cell besides that of the view: samples that are points
-            meet the mask in a point.
-        decisions: where these are kept, the texture stays in double precision, and its points where they are.
-
-    Raises:
-        InputError: samples that meet the mask beyond the points that were kept.
+        means: how the means are taken of which it is made, for taps of each level, by rows that are averaged at
+            once; None: by the pattern itself, in single precision, where nothing has to follow.
+        lattice: where its points stand.
+        straight: of the steps from sample to sample across it (2×2), which are rounding.
     """
-    place = tap_origin(plane.at_index, plane.offset, taps.index, taps.shift + off_middle, motion)
-    sample_sides = plane.sample_step / fine * over_samples
-    sides = [np.hstack([plane.view_step(motion) / parts, sample_sides]) for _, parts in taps.levels()]
-    finest = np.hstack([plane.view_step(motion) / taps.parts[-1], sample_sides])
-    lattice = _lattice(place, plane, taps, samples, sides, finest, decisions)
-    spacing = lattice.spacing
-    texture = decisions.made(
-        "texture",
-        lambda: (content(plane.pattern), content(lattice), content(tuple(sides))),
-        lambda: _texture(plane.pattern, lattice, sides, decisions),
-    )
-    tops = np.zeros((*place.shape[:2], 1))
-    for (mesh, _), footing in zip(taps.levels(), lattice.footings, strict=True):
-        tops[mesh] = footing.top
-    kept = Textured(lattice, tuple(sides), tops[..., 0], decisions)
-    decisions.note(
-        Linear(
-            lambda thing, field: is_values(thing, field) and holds(plane.pattern, thing),
-            lambda plan: tuple(
-                f"core.masks[{n}].texture" for n, mask in enumerate(plan.core.masks) if mask.texture is texture
-            ),
-            lambda cells, weights: texture_back(plane, kept, weights[0], cells),
-        )
-    )
-    lookup = MaskLookup(
-        texture=texture,
-        column=place[..., 0] / spacing[0] - lattice.first[0],
-        row=place[..., 1] / spacing[1] - lattice.first[1] + kept.tops,
-        step=cleaned(plane.sample_step / spacing[:, None], samples, decisions),
-        label=plane.label,
-    )
-    return lookup, kept
+
+    means: tuple[tuple[MeanChoice | None, ...], ...] | None
+    lattice: Lattice = choice("points of its texture", Lattice.like)
+    straight: NDArray[np.bool_] = choice("steps that are rounding")
 
 
-def _lattice(
-    place: Array,
-    plane: Plane,
-    taps: Taps,
-    samples: tuple[int, int],
-    sides: list[Array],
-    finest: Array,
-    decisions: Decisions,
-) -> Lattice:
-    """The lattice of a mask's texture: one, whatever part of it is needed: pieces of a light field read alike.
+@dataclass(frozen=True, eq=False, repr=False)
+class MaskMet(Brief):
+    """A mask in mid-path as the samples of taps meet it.
 
     Args:
-        place: at which sample (0, 0) of each tap meets the mask, (rows of taps, columns of taps, 2), metres.
         plane: the mask.
         taps: of the plan.
         samples: (rows, columns) of a view.
+        place: at which sample (0, 0) of each tap meets it, (rows of taps, columns of taps, 2), metres.
         sides: of the footprints of samples in taps of each level, (2, 4): of a view's part, and of a sample.
         finest: those of the finest level, which a piece of a light field may lack.
-        decisions: the lattice is kept, with room around what is read.
     """
-    footprint = [np.sqrt((each**2).sum(axis=1)) for each in (*sides, finest)]
-    bound = np.array(plane.pattern.size) / 2 + np.max(footprint, axis=0)
-    region = _region(place, plane.sample_step, samples, bound)
 
-    def ends(spacing: Array, low: Array, high: Array) -> tuple[Array, Array]:
-        first = np.floor(low / spacing) - AROUND
-        return first, np.maximum(np.ceil(high / spacing) + AROUND, first + 2)
+    plane: Plane
+    taps: Taps
+    samples: tuple[int, int]
+    place: Array
+    sides: tuple[Array, ...]
+    finest: Array
 
-    def decided() -> Lattice:
-        low, high = region
-        room = ROOM * decisions.lasting
-        spacing = _spacing(footprint[-1], np.minimum(2 * bound, high - low))
+    @classmethod
+    def of(
+        cls,
+        plane: Plane,
+        taps: Taps,
+        off_middle: Array,
+        motion: Array,
+        samples: tuple[int, int],
+        fine: int,
+        over_samples: bool = True,
+    ) -> MaskMet:
+        """A mask, met.
+
+        Args:
+            plane: the mask.
+            taps: of the plan.
+            off_middle: how far the open part of each tap's cell lies from its middle, in views,
+                (rows, columns, 2).
+            motion: see `tap_origin`.
+            samples: (rows, columns) of a view.
+            fine: parts of a sample, each way.
+            over_samples: whether to average over the sample's cell besides that of the view: samples that are
+                points meet the mask in a point.
+        """
+        place = tap_origin(plane.at_index, plane.offset, taps.index, taps.shift + off_middle, motion)
+        sample_sides = plane.sample_step / fine * over_samples
+        sides = tuple(np.hstack([plane.view_step(motion) / parts, sample_sides]) for _, parts in taps.levels())
+        finest = np.hstack([plane.view_step(motion) / taps.parts[-1], sample_sides])
+        return cls(plane, taps, samples, place, sides, finest)
+
+    def choices(self, follow: Follow | None = None) -> TextureChoices:
+        """How the mask's texture is best made; with room around what is read where it follows a camera."""
+        lattice = self._lattice(0.0 if follow is None else ROOM)
+        tiny = np.abs(self.plane.sample_step / lattice.spacing[:, None]) * max(self.samples) < ROUNDING
+        if follow is None:
+            return TextureChoices(None, lattice, tiny)
+        averaged = (_Averaging.of(lattice, *level) for level in zip(lattice.footings, self.sides, strict=True))
+        means = tuple(
+            tuple(choose_mean(self.plane.pattern, boxes) for _, boxes in each.rectangles()) for each in averaged
+        )
+        # Only what leads from rows to columns and back is left out, for all else may begin to grow.
+        return TextureChoices(means, lattice, tiny & ~np.eye(2, dtype=bool))
+
+    def look_up(self, choices: TextureChoices, parts: Parts = NONE_KEPT) -> tuple[MaskLookup, Textured]:
+        """The mask averaged over a sample's footprint: as a texture that each sample reads, and how it was made.
+
+        Args:
+            choices: how.
+            parts: what is kept of plans nearby.
+
+        Raises:
+            InputError: samples that meet the mask beyond the points that were chosen, or no longer along them.
+        """
+        plane, lattice, sides = self.plane, choices.lattice, self.sides
+        first, last = _ends(lattice.spacing, *self._region)
+        if (first < lattice.first).any() or (last > lattice.last).any():
+            raise plan_again("where samples meet a mask")
+        texture = parts.part(
+            "texture",
+            lambda: content((plane.pattern, lattice, sides)),
+            lambda: _texture(plane.pattern, lattice, sides, choices.means, parts),
+        )
+        tops = np.zeros((*self.place.shape[:2], 1))
+        for (mesh, _), footing in zip(self.taps.levels(), lattice.footings, strict=True):
+            tops[mesh] = footing.top
+        kept = Textured(lattice, sides, tops[..., 0], choices.means)
+        lookup = MaskLookup(
+            texture=texture,
+            column=self.place[..., 0] / lattice.spacing[0] - lattice.first[0],
+            row=self.place[..., 1] / lattice.spacing[1] - lattice.first[1] + kept.tops,
+            step=cleaned(plane.sample_step / lattice.spacing[:, None], self.samples, choices.straight),
+            label=plane.label,
+        )
+        return lookup, kept
+
+    @property
+    def _bound(self) -> Array:
+        """Half the size (x, y) of the mask and of the footprints around it, metres."""
+        return np.asarray(np.array(self.plane.pattern.size) / 2 + np.max(self._footprints, axis=0))
+
+    @property
+    def _footprints(self) -> list[Array]:
+        """Sizes (x, y) of the footprints of samples, of each level and the finest."""
+        return [np.sqrt((each**2).sum(axis=1)) for each in (*self.sides, self.finest)]
+
+    @property
+    def _region(self) -> tuple[Array, Array]:
+        return _region(self.place, self.plane.sample_step, self.samples, self._bound)
+
+    def _lattice(self, room: float) -> Lattice:
+        """The lattice of the texture: one, whatever part of it is needed: pieces of a light field read alike.
+
+        Args:
+            room: around what is read, a share of it.
+        """
+        bound, (low, high) = self._bound, self._region
+        spacing = _spacing(self._footprints[-1], np.minimum(2 * bound, high - low))
         low, high = (
             np.maximum(low - room * (high - low), -(1 + room) * bound),
             np.minimum(high + room * (high - low), (1 + room) * bound),
         )
-        first, last = ends(spacing, low, high)
-        footings = [_footing(each, spacing, 1 + room) for each in sides]
-        tops = _tops(place, plane.sample_step, samples, taps, spacing[1], (first[1], last[1]))
+        first, last = _ends(spacing, low, high)
+        footings = [_footing(each, spacing, 1 + room) for each in self.sides]
+        ends = float(first[1]), float(last[1])
+        tops = _tops(self.place, self.plane.sample_step, self.samples, self.taps, spacing[1], ends)
         return Lattice(
             first, last, spacing, tuple(replace(f, top=top) for f, top in zip(footings, tops, strict=True))
         )
 
-    lattice = decisions.keep(LATTICE, decided, Lattice.like)
-    if decisions.lasting:
-        first, last = ends(lattice.spacing, *region)
-        if (first < lattice.first).any() or (last > lattice.last).any():
-            raise plan_again("where samples meet a mask")
-    return lattice
+
+def _ends(spacing: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Numbers of the first and the last point of a texture that is read from low to high."""
+    first = np.floor(low / spacing) - AROUND
+    return first, np.maximum(np.ceil(high / spacing) + AROUND, first + 2)
 
 
 def _footing(sides: Array, spacing: Array, room: float) -> Footing:
@@ -226,7 +267,7 @@ def _tops(
     """Rows at which the textures of taps of each level begin: so far apart that no tap meets those of others.
 
     Args:
-        place: see `_lattice`.
+        place: see `MaskMet`.
         step: 2×2, from sample to sample.
         samples: (rows, columns) of a view.
         taps: of the plan.
@@ -267,28 +308,29 @@ def _spacing(footprint: Array, extent: Array) -> Array:
 
 
 def _texture(
-    pattern: Pattern, lattice: Lattice, sides: Sequence[Array], decisions: Decisions
+    pattern: Pattern,
+    lattice: Lattice,
+    sides: Sequence[Array],
+    chosen: Means | None,
+    parts: Parts = NONE_KEPT,
 ) -> NDArray[np.floating]:
     """Means of a pattern over footprints of samples, at points of a lattice: (rows, columns).
 
     Args:
         pattern: of the mask.
         lattice: its points.
-        sides: see `_lattice`.
-        decisions: where these are kept, in double precision.
+        sides: see `MaskMet`.
+        chosen: see `TextureChoices.means`.
+        parts: what is kept of plans nearby.
     """
     found: list[NDArray[np.floating]] = []
-    for number, (footing, each) in enumerate(zip(lattice.footings, sides, strict=True)):
-        averaging = _Averaging.of(lattice, footing, each)
-        means = averaging.means(pattern, decisions.of(f"level {number}") if number else decisions)
+    for level, (footing, each) in enumerate(zip(lattice.footings, sides, strict=True)):
+        means = _Averaging.of(lattice, footing, each).means(
+            pattern, None if chosen is None else chosen[level], parts
+        )
         gap = footing.top - sum(map(len, found))
         found += [np.zeros((gap, means.shape[1]), dtype=means.dtype), means]
     return np.concatenate(found[1:]) if len(found) > 2 else found[1]
-
-
-def mask_in_path(n: int) -> str:
-    """What decisions are about that concern the n-th mask in mid-path."""
-    return f"mask {n + 1} in mid-path"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -299,17 +341,17 @@ class Textured(Brief):
         lattice: its points.
         sides: of the footprints over which the pattern was averaged, of taps of each level, metres.
         tops: row at which the texture of each tap begins, (rows of taps, columns of taps).
-        decisions: about it.
+        means: see `TextureChoices`.
     """
 
     lattice: Lattice
     sides: tuple[Array, ...]
     tops: Array
-    decisions: Decisions
+    means: Means | None
 
     def of(self, pattern: Pattern) -> NDArray[np.floating]:
         """The texture of another pattern, (rows, columns)."""
-        return _texture(pattern, self.lattice, self.sides, self.decisions)
+        return _texture(pattern, self.lattice, self.sides, self.means)
 
     def seen(self, axis: int, place: Array) -> tuple[Array, Array]:
         """From where to where a pattern counts in what is looked up at places of the texture.
@@ -329,6 +371,21 @@ class Textured(Brief):
         return middle - reach, middle + reach
 
 
+def by_mask_in_path(n: int, plane: Plane, kept: Textured) -> Linear:
+    """How the texture of the n-th mask in mid-path follows the cells of its pattern.
+
+    Args:
+        n: its number.
+        plane: the mask.
+        kept: how its texture was made.
+    """
+    return Linear(
+        lambda thing, field: is_values(thing, field) and holds(plane.pattern, thing),
+        lambda plan: (f"core.masks[{n}].texture",),
+        lambda cells, weights: texture_back(plane, kept, weights[0], cells),
+    )
+
+
 def texture_back(plane: Plane, kept: Textured, weights: Array, cells: Cells) -> Array:
     """From weights of a mask's texture to weights of the cells of its pattern.
 
@@ -340,10 +397,10 @@ def texture_back(plane: Plane, kept: Textured, weights: Array, cells: Cells) -> 
     """
     total = np.zeros(cells.values.shape)
     rows = round(kept.lattice.last[1] - kept.lattice.first[1]) + 1
-    for number, (footing, each) in enumerate(zip(kept.lattice.footings, kept.sides, strict=True)):
+    for level, (footing, each) in enumerate(zip(kept.lattice.footings, kept.sides, strict=True)):
         averaging = _Averaging.of(kept.lattice, footing, each)
-        about = kept.decisions.of(f"level {number}") if number else kept.decisions
-        total += averaging.back(plane.pattern, weights[footing.top : footing.top + rows], about, cells)
+        own = weights[footing.top : footing.top + rows]
+        total += averaging.back(plane.pattern, own, None if kept.means is None else kept.means[level], cells)
     return total
 
 
@@ -385,25 +442,31 @@ class _Averaging(Brief):
         )
         return cls(x, y, (float(wide[0]), float(wide[1])), (across, down))
 
-    def means(self, pattern: Pattern, decisions: Decisions) -> NDArray[np.floating]:
+    def rectangles(self) -> list[tuple[NDArray[np.int64], Boxes]]:
+        """Rows that are averaged at once, and their rectangles."""
+        pieces = _rows_at_once(self.y.size, self.x.size)
+        return [(rows, Boxes(self.x[None, :], self.y[rows, None], *self.size)) for rows in pieces]
+
+    def means(
+        self, pattern: Pattern, chosen: tuple[MeanChoice | None, ...] | None, parts: Parts
+    ) -> NDArray[np.floating]:
         """The means, without the margin that filters take."""
-        found = np.empty((self.y.size, self.x.size), dtype=np.float64 if decisions.lasting else np.float32)
-        across = self.x[None, :]
-        for n, some in enumerate(_rows_at_once(self.y.size, self.x.size)):
-            part = decisions.of(f"part {n}")
-            found[some] = mean_over(pattern, across, self.y[some, None], *self.size, part)
+        found = np.empty((self.y.size, self.x.size), dtype=np.float32 if chosen is None else np.float64)
+        for n, (rows, boxes) in enumerate(self.rectangles()):
+            found[rows] = mean_over(pattern, boxes, None if chosen is None else chosen[n], parts)
         return _filtered(found, self.filters)
 
-    def back(self, pattern: Pattern, weights: Array, decisions: Decisions, cells: Cells) -> Array:
+    def back(
+        self, pattern: Pattern, weights: Array, chosen: tuple[MeanChoice | None, ...] | None, cells: Cells
+    ) -> Array:
         """From weights of the means to weights of the cells of a pattern."""
         # Filters are symmetric: a mean counts in all points that its own filter reaches.
         beside = [(n // 2,) * 2 for n in _reach(self.filters)]
         wide = np.pad(weights, [(2 * low, 2 * high) for low, high in beside])
         means = np.asarray(_filtered(wide, self.filters), dtype=np.float64)
         total = np.zeros(cells.values.shape)
-        for n, some in enumerate(_rows_at_once(self.y.size, self.x.size)):
-            boxes = Boxes(self.x[None, :], self.y[some, None], *self.size)
-            total += mean_back(pattern, boxes, decisions.of(f"part {n}"), means[some], cells)
+        for n, (rows, boxes) in enumerate(self.rectangles()):
+            total += mean_back(pattern, boxes, None if chosen is None else chosen[n], means[rows], cells)
         return total
 
 
@@ -492,16 +555,12 @@ def texture_error(texture: NDArray[np.floating]) -> float:
     return math.sqrt(squares / 30240) / largest
 
 
-def cleaned(step: Array, samples: tuple[int, int], decisions: Decisions = ANEW) -> Array:
+def cleaned(step: Array, samples: tuple[int, int], straight: NDArray[np.bool_]) -> Array:
     """Steps across a texture, in points from sample to sample, without what is rounding over a whole view.
 
-    Where decisions are kept only what leads from rows to columns and back is, for all else may begin to grow.
+    Raises:
+        InputError: steps that were rounding are no longer.
     """
-    tiny = np.abs(step) * max(samples) < ROUNDING
-    if not decisions.lasting:
-        return np.where(tiny, 0.0, step)
-    crossing = ~np.eye(2, dtype=bool)
-    cleared = decisions.keep("steps that are rounding", lambda: tiny & crossing)
-    if (cleared & ~tiny).any():
+    if (straight & (np.abs(step) * max(samples) >= ROUNDING)).any():
         raise plan_again("rows of samples that lie along rows of a mask")
-    return np.where(cleared, 0.0, step)
+    return np.where(straight, 0.0, step)

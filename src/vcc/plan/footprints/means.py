@@ -1,22 +1,23 @@
 """Means of patterns over rectangles, as numbers that follow the rectangles and the patterns smoothly.
 
 A pattern without a mean in closed form is looked at on a raster. Made anew for each camera, its points would move
-with the rectangles, and what is hard in a pattern would jump from point to point. Where decisions are kept, the
-raster is: its points stand still on the pattern, and means are exact for what they show.
+with the rectangles, and what is hard in a pattern would jump from point to point. Where numbers follow a camera,
+the raster is chosen once: its points stand still on the pattern, and means are exact for what they show.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.lookup import smooth, three_around
 from vcc.base.values import content
-from vcc.plan.decisions import Decisions, plan_again
+from vcc.plan.following import NONE_KEPT, Parts, plan_again
 from vcc.shapes.lattice import CellApertures
 from vcc.shapes.patterns import (
     FEWEST_PER_CELL,
@@ -46,51 +47,89 @@ class Boxes(NamedTuple):
     height: float
 
 
-def mean_over(
-    pattern: Pattern, x: ArrayLike, y: ArrayLike, width: float, height: float, decisions: Decisions
-) -> Array:
+@dataclass(frozen=True, eq=False, repr=False)
+class MeanChoice(Brief):
+    """How the mean of a pattern without one in closed form is taken.
+
+    Args:
+        rasters: (across, down) on which it is looked at; None: in parts of each rectangle.
+        factors: of several patterns that multiply one another, how the mean of each is taken.
+    """
+
+    rasters: tuple[Raster, Raster] | None
+    factors: tuple[MeanChoice | None, ...] = ()
+
+
+def choose_mean(pattern: Pattern, boxes: Boxes) -> MeanChoice | None:
+    """How the mean of a pattern over rectangles is taken so that it follows them; None: by its own `mean`."""
+    if isinstance(pattern, Shifted):
+        return choose_mean(pattern.pattern, _from_middle(pattern, boxes))
+    if isinstance(pattern, Bounded) or (isinstance(pattern, Product) and len(pattern.factors) == 1):
+        return choose_mean(pattern.pattern if isinstance(pattern, Bounded) else pattern.factors[0], boxes)
+    if isinstance(pattern, Product) and pattern.factors:
+        rasters = _rasters(pattern, boxes)
+        within = parts_of(boxes)[0] if rasters is None else points_of(rasters)
+        return MeanChoice(rasters, tuple(_choose_factor(factor, within) for factor in pattern.factors))
+    return None if _closed(pattern) or isinstance(pattern, Product) else MeanChoice(_rasters(pattern, boxes))
+
+
+def _choose_factor(factor: Pattern, within: Boxes) -> MeanChoice | None:
+    return choose_mean(factor, within) if _closed(_plain(factor)) else None
+
+
+def mean_over(pattern: Pattern, boxes: Boxes, chosen: MeanChoice | None, parts: Parts = NONE_KEPT) -> Array:
     """A pattern's mean over rectangles; see `vcc.shapes.patterns.Pattern.mean`.
 
     Args:
         pattern: any.
-        x: centres, metres.
-        y: centres, metres.
-        width: of every rectangle, metres.
-        height: of every rectangle, metres.
-        decisions: where these are kept, the raster is too.
+        boxes: the rectangles.
+        chosen: how the mean is taken (`choose_mean`).
+        parts: what is kept of plans nearby.
 
     Raises:
-        InputError: rectangles beyond the raster that was kept.
+        InputError: rectangles beyond the raster that was chosen.
     """
-    if not decisions.lasting:
-        return pattern.mean(x, y, width, height)
-    return _mean(pattern, Boxes(np.asarray(x, float), np.asarray(y, float), width, height), decisions)
-
-
-def _mean(pattern: Pattern, boxes: Boxes, decisions: Decisions) -> Array:
+    if chosen is None:
+        return pattern.mean(*boxes)
     x, y, width, height = boxes
     if isinstance(pattern, Shifted):
-        return _mean(pattern.pattern, boxes._replace(x=x - pattern.middle[0], y=y - pattern.middle[1]), decisions)
+        return mean_over(pattern.pattern, _from_middle(pattern, boxes), chosen, parts)
     if isinstance(pattern, Bounded):
         share_x = overlap_share(x, max(width, pattern.width * 1e-5), pattern.width)
         share_y = overlap_share(y, max(height, pattern.height * 1e-5), pattern.height)
-        return _mean(pattern.pattern, boxes, decisions) * share_x * share_y
-    if isinstance(pattern, Product) and len(pattern.factors) != 1:
-        return _mean_of_product(pattern, boxes, decisions)
-    if isinstance(pattern, Product):
-        return _mean(pattern.factors[0], boxes, decisions)
-    if _closed(pattern):
-        return pattern.mean(*boxes)
-    rasters = kept_rasters(pattern, boxes, decisions)
-    if rasters is None:
-        return _in_each(lambda parts: pattern(parts.x, parts.y), boxes)
-    across, down = rasters
-    found = decisions.made(
-        "values of its raster",
+        return mean_over(pattern.pattern, boxes, chosen, parts) * share_x * share_y
+    if isinstance(pattern, Product) and len(pattern.factors) == 1:
+        return mean_over(pattern.factors[0], boxes, chosen, parts)
+    check_within(pattern, boxes, chosen)
+    if chosen.rasters is None:
+        return np.asarray(
+            np.mean(np.broadcast_arrays(*(_values(pattern, each, chosen) for each in parts_of(boxes))), axis=0)
+        )
+    rasters = chosen.rasters
+    found = parts.part(
+        "values on a raster",
         lambda: (content(pattern), content(rasters)),
-        lambda: np.asarray(pattern(across.places[None, :], down.places[:, None]), float),
+        lambda: _values(pattern, points_of(rasters), chosen),
     )
     return _of_raster(found, rasters, boxes)
+
+
+def _values(pattern: Pattern, points: Boxes, chosen: MeanChoice) -> Array:
+    """What a pattern shows at points that stand for rectangles: of several, the product of their means."""
+    if isinstance(pattern, Product):
+        pairs = zip(pattern.factors, chosen.factors, strict=True)
+        means = (mean_or_value(factor, points, its) for factor, its in pairs)
+        return np.clip(math.prod(means, start=np.ones(1)), 0.0, 1.0)
+    return np.asarray(pattern(points.x, points.y), float)
+
+
+def _from_middle(pattern: Shifted, boxes: Boxes) -> Boxes:
+    """Rectangles counted from the middle of what is shifted."""
+    return boxes._replace(x=boxes.x - pattern.middle[0], y=boxes.y - pattern.middle[1])
+
+
+def _plain(factor: Pattern) -> Pattern:
+    return factor.pattern if isinstance(factor, Shifted) else factor
 
 
 def _closed(pattern: Pattern) -> bool:
@@ -98,31 +137,6 @@ def _closed(pattern: Pattern) -> bool:
     if isinstance(pattern, CellApertures) and pattern.lattice.rotation:
         return False
     return type(pattern).mean is not Pattern.mean
-
-
-def _mean_of_product(product: Product, boxes: Boxes, decisions: Decisions) -> Array:
-    """What several patterns let pass together: on a raster whose points hold the products of their means."""
-    if not product.factors:
-        return np.ones(np.broadcast_shapes(boxes.x.shape, boxes.y.shape))
-
-    def together(parts: Boxes) -> Array:
-        means = (mean_or_value(factor, parts, decisions) for factor in product.factors)
-        return np.clip(math.prod(means, start=np.ones(1)), 0.0, 1.0)
-
-    rasters = kept_rasters(product, boxes, decisions)
-    if rasters is None:
-        return _in_each(together, boxes)
-    across, down = rasters
-    points = Boxes(across.places[None, :], down.places[:, None], across.step, down.step)
-    found = decisions.made(
-        "values of its raster", lambda: (content(product), content(rasters)), lambda: together(points)
-    )
-    return _of_raster(found, rasters, boxes)
-
-
-def _in_each(values: Callable[[Boxes], Array], boxes: Boxes) -> Array:
-    """Means by what parts of each rectangle show, which move with it."""
-    return np.asarray(np.mean(np.broadcast_arrays(*(values(parts) for parts in parts_of(boxes))), axis=0))
 
 
 def parts_of(boxes: Boxes) -> list[Boxes]:
@@ -133,12 +147,15 @@ def parts_of(boxes: Boxes) -> list[Boxes]:
     return [Boxes(x + a * width, y + b * height, *part) for a in steps for b in steps]
 
 
-def mean_or_value(factor: Pattern, parts: Boxes, decisions: Decisions) -> Array:
+def points_of(rasters: tuple[Raster, Raster]) -> Boxes:
+    """The rectangles that the points of rasters stand for."""
+    across, down = rasters
+    return Boxes(across.places[None, :], down.places[:, None], across.step, down.step)
+
+
+def mean_or_value(factor: Pattern, points: Boxes, chosen: MeanChoice | None) -> Array:
     """Means over the parts that points of a raster stand for; without a closed form, values in their middles."""
-    plain = factor.pattern if isinstance(factor, Shifted) else factor
-    if _closed(plain):
-        return _mean(factor, parts, decisions)
-    return factor(parts.x, parts.y)
+    return mean_over(factor, points, chosen) if _closed(_plain(factor)) else factor(points.x, points.y)
 
 
 def _of_raster(found: Array, rasters: tuple[Raster, Raster], boxes: Boxes) -> Array:
@@ -210,18 +227,20 @@ def _up_to(place: Array, borders: int) -> Any:
 # --- rasters ---
 
 
-def kept_rasters(pattern: Pattern, boxes: Boxes, decisions: Decisions) -> tuple[Raster, Raster] | None:
-    """The rasters (across, down) on which a pattern is looked at, always the same; None: in each rectangle."""
-    rasters = decisions.keep("raster", lambda: _rasters(pattern, boxes), lambda one, other: True)
-    if rasters is None:
-        return None
+def check_within(pattern: Pattern, boxes: Boxes, chosen: MeanChoice) -> None:
+    """Check that rectangles lie where a pattern is looked at.
+
+    Raises:
+        InputError: they do not.
+    """
+    if chosen.rasters is None:
+        return
     x, y, width, height = boxes
-    for raster, centre, length, bound in zip(rasters, (x, y), (width, height), pattern.size, strict=True):
+    for raster, centre, length, bound in zip(chosen.rasters, (x, y), (width, height), pattern.size, strict=True):
         low, high = max(centre.min() - length / 2, -bound / 2), min(centre.max() + length / 2, bound / 2)
         tolerance = 1e-9 * raster.length
         if low < high and (low < raster.low - tolerance or high > raster.high + tolerance):
             raise plan_again("where a pattern is looked at")
-    return rasters
 
 
 def _rasters(pattern: Pattern, boxes: Boxes) -> tuple[Raster, Raster] | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
-from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.following import choice
 from vcc.plan.footprints.means import Boxes
 from vcc.shapes.patterns import Pattern
 from vcc.shapes.sheets import in_one_plane, not_clear_beside_others
@@ -19,6 +19,33 @@ Array = NDArray[np.float64]
 
 ALONG_AXES = 1e-9
 """Of a cell: sides that leave the axes by less are along them."""
+
+
+Placed = tuple[Pattern, tuple[float, float]]
+"""A pattern, and the place of its middle in metres."""
+
+
+@dataclass(frozen=True)
+class PlaneChoices:
+    """Of patterns in one plane, what counts.
+
+    Args:
+        cutting: numbers of those that cut light off, beside the others.
+        about: number, of these, of the one from whose middle all is counted.
+    """
+
+    cutting: tuple[int, ...] = choice("what cuts light off")
+    about: int = choice("about which middle")
+
+
+def choose_plane(patterns: list[Placed]) -> PlaneChoices:
+    """What counts of patterns in one plane.
+
+    About the middle of the smallest, as it would be by itself, whatever the order in which they are given.
+    """
+    cutting = tuple(not_clear_beside_others(patterns))
+    sizes = [(float(np.prod(pattern.size)), *middle) for pattern, middle in (patterns[n] for n in cutting)]
+    return PlaneChoices(cutting, sizes.index(min(sizes)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,24 +65,21 @@ class Plane(Brief):
     def at(
         cls,
         place: Array,
-        patterns: list[tuple[Pattern, tuple[float, float]]],
+        patterns: list[Placed],
         label: str,
-        decisions: Decisions = ANEW,
+        choices: PlaneChoices | None = None,
     ) -> Plane:
         """The plane of all patterns that samples meet in one place.
 
         Args:
             place: (x, y) in metres from index (i, j, k, l, 1), 2×5.
-            patterns: each with the place of its middle, metres.
+            patterns: one or several.
             label: what they are called.
-            decisions: by which the place is chosen from which all is counted.
+            choices: what of them counts; None chooses now.
         """
-        cutting = decisions.keep("what cuts light off", lambda: not_clear_beside_others(patterns))
-        patterns = [patterns[n] for n in cutting]
-        # About the middle of the smallest, as it would be by itself, whatever the order in which they are given.
-        sizes = [(float(np.prod(pattern.size)), *middle) for pattern, middle in patterns]
-        smallest = decisions.keep("about which middle", lambda: sizes.index(min(sizes)))
-        decentre = patterns[smallest][1]
+        choices = choices or choose_plane(patterns)
+        patterns = [patterns[n] for n in choices.cutting]
+        decentre = patterns[choices.about][1]
         pattern = in_one_plane([(one, (x - decentre[0], y - decentre[1])) for one, (x, y) in patterns])
         return cls(pattern, label, decentre, place[:, :4], place[:, 4] - np.array(decentre))
 

@@ -8,7 +8,7 @@ bounds are in `vcc.plan.rays.bounds`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import NoReturn
 
 import numpy as np
@@ -17,19 +17,19 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.optics.deflections import CellDeflection, FacetDeflection
-from vcc.plan.decisions import ANEW, plan_again
+from vcc.plan.following import check_unchanged, choice, plan_again
 from vcc.plan.rays.bounds import cell_windows
 from vcc.plan.rays.bounds.deflections import DeflectionBounds, Slopes, largest_bend, regions_and_deflections
-from vcc.plan.rays.bounds.slopes import UNBOUNDED, window_of, windows, windows_by_strips
+from vcc.plan.rays.bounds.slopes import UNBOUNDED, bounds, is_round, window_of, windows, windows_by_strips
 from vcc.plan.rays.bounds.windows import Aim, CellWindows, Window
-from vcc.plan.rays.path import Leg, Path
+from vcc.plan.rays.path import Leg, Path, stops_in_one_plane
 
 Array = NDArray[np.float64]
 
 ROUNDS = 8
 """Plates deflect by where they are met, and are met by how they deflect: bounds are refined so often."""
 ROOM = 1.1
-"""By how much more what bends rays may bend them within decisions that are kept."""
+"""By how much more what bends rays may bend them where their aim follows a camera."""
 SETTLED = 0.01
 """Share of the deflections' bounds by which they change where no more rounds are needed."""
 WORTH_NARROWING = 0.7
@@ -56,10 +56,50 @@ class Aimed(Brief):
 
 
 @dataclass(frozen=True)
-class KeptAim:
-    """What of an aim is decided; its numbers follow the optics.
+class StopChoices:
+    """What stops are, by which rays are aimed.
 
     Args:
+        in_one_plane: the numbers of stages that stand in the plane of the one before, where one stops light.
+        rounds: which legs' stops are round.
+        bound: whether stops bound the light; None where all bounds count.
+        borders: how many sides of cells do not lie along the axes; None where cells have no windows.
+    """
+
+    in_one_plane: tuple[int, ...] = choice("which stops stand in one plane")
+    rounds: tuple[bool, ...] = choice("which stop is round")
+    bound: bool | None = choice("whether stops bound the light")
+    borders: int | None = choice(
+        "sides of cells that lie along the axes (which those of an array that is turned never do)"
+    )
+
+    @classmethod
+    def of(cls, path: Path, everything: bool) -> StopChoices:
+        """What stops are now, but for cells."""
+        rounds, bound = tuple(map(is_round, path.legs)), None if everything else path.stops_bound
+        return cls(stops_in_one_plane(path.train.stages), rounds, bound, None)
+
+    def through(self, aim: Aim) -> StopChoices:
+        """The same with the cells of an aim."""
+        return replace(self, borders=len(aim.opening.borders) if isinstance(aim, CellWindows) else None)
+
+    def check(self, now: StopChoices) -> None:
+        """Check that stops are what they were.
+
+        Raises:
+            InputError: they are not.
+        """
+        for each in fields(self):
+            check_unchanged(each.metadata["words"], getattr(self, each.name), getattr(now, each.name))
+
+
+@dataclass(frozen=True)
+class AimChoices:
+    """What of an aim is chosen; its numbers follow the optics.
+
+    Args:
+        stops: what they are.
+        rounds: see `vcc.plan.rays.path.Path`.
         everything: see `vcc.plan.rays.bounds.slopes.bounds`.
         bends: by how much each leg's stage bends rays at most, with room; None: as it does now, however much.
         strips: the two that cut out the window; None where cells have windows of their own.
@@ -68,6 +108,8 @@ class KeptAim:
         halvings: of the rays of a pixel.
     """
 
+    stops: StopChoices
+    rounds: tuple[bool, ...]
     everything: bool
     bends: tuple[Slopes, ...]
     strips: tuple[int, int] | None
@@ -75,39 +117,46 @@ class KeptAim:
     reach: tuple[int, int] = (0, 0)
     halvings: int = 0
 
-    def like(self, other: KeptAim) -> bool:
+    def like(self, other: AimChoices) -> bool:
         """Whether both aim at the same, by as many rays."""
         return replace(self, bends=(), towards=None) == replace(other, bends=(), towards=None)
 
 
-def aimed(path: Path) -> Aimed:
-    """Where to aim; as it was decided, where that is kept.
+def choose_aim(path: Path) -> AimChoices:
+    """Where to aim, with room for what bends rays to bend them further.
 
     Raises:
-        InputError: nothing bounds the rays, or they leave what was kept.
+        InputError: nothing bounds the rays.
     """
-    if not path.decisions.lasting:
-        return found(path)
-
-    def decided() -> KeptAim:
-        return _kept(path, found(replace(path, decisions=ANEW)))
-
-    return _as_kept(path, path.decisions.keep("aim of the rays", decided, KeptAim.like))
+    taken = found(path)
+    kept = replace(_with_room(path, taken), stops=StopChoices.of(path, taken.everything).through(taken.aim))
+    return replace(kept, rounds=_rounds(path, kept))
 
 
-def _kept(path: Path, taken: Aimed) -> KeptAim:
-    """What of an aim that was found is to be kept."""
-    aim, anew = taken.aim, replace(path, decisions=ANEW)
+def _rounds(path: Path, kept: AimChoices) -> tuple[bool, ...]:
+    """Which stops are smaller for being taken for round, by how far rays stray that are aimed so."""
+    _, deflections = regions_and_deflections(path, _chosen(path, DeflectionBounds.none(path), kept), kept.bends)
+    if kept.towards is None:
+        stops = bounds(path, deflections.unknown, kept.everything)[: len(path.legs)]
+        return tuple(stop.widened()[1] for stop in stops)
+    aim = _chosen(path, deflections, kept)
+    assert isinstance(aim, CellWindows)
+    return tuple(leg.number == kept.towards[0] and aim.stop.disc for leg in path.legs)
+
+
+def _with_room(path: Path, taken: Aimed) -> AimChoices:
+    """What of an aim that was found is chosen."""
+    aim, stops = taken.aim, StopChoices((), (), None, None)
     largest = [largest_bend(leg, region) for leg, region in zip(path.legs, taken.regions, strict=True)]
     bends = tuple(
         None if most is None or _the_same_anywhere(leg) else (ROOM * most[0], ROOM * most[1])
         for leg, most in zip(path.legs, largest, strict=True)
     )
     if isinstance(aim, CellWindows):
-        kept = KeptAim(taken.everything, bends, None, aim.towards, aim.reach, aim.halvings)
+        kept = AimChoices(stops, (), taken.everything, bends, None, aim.towards, aim.reach, aim.halvings)
         for _ in range(2):  # the cells that are seen by all that can stray, and may bend others
-            _, deflections = regions_and_deflections(anew, aim, bends)
-            wider = cell_windows.cell_windows_towards(anew, deflections.whole, kept.everything, *aim.towards)
+            _, deflections = regions_and_deflections(path, aim, bends)
+            wider = cell_windows.cell_windows_towards(path, deflections.whole, kept.everything, *aim.towards)
             if wider is not None:
                 return replace(kept, bends=bends, reach=wider.reach)
             bends = tuple(
@@ -116,13 +165,13 @@ def _kept(path: Path, taken: Aimed) -> KeptAim:
         return kept
     pair = next(
         pair
-        for pair, window in windows_by_strips(anew, taken.deflections.unknown, taken.everything)
+        for pair, window in windows_by_strips(path, taken.deflections.unknown, taken.everything)
         if window.words == aim.words and window.solid_angle == aim.solid_angle
     )
-    return _as_much_as_it_likes(anew, KeptAim(taken.everything, bends, pair))
+    return _as_much_as_it_likes(path, AimChoices(stops, (), taken.everything, bends, pair))
 
 
-def _as_much_as_it_likes(path: Path, kept: KeptAim) -> KeptAim:
+def _as_much_as_it_likes(path: Path, kept: AimChoices) -> AimChoices:
     """A kept window, with room only for what bends rays before they are where it counts.
 
     What stands where the window is, or before all that has a texture, may bend rays as much as it likes.
@@ -151,12 +200,18 @@ def _the_same_anywhere(leg: Leg) -> bool:
     return isinstance(leg.stage.faces.bending, CellDeflection | FacetDeflection)
 
 
-def _as_kept(path: Path, kept: KeptAim) -> Aimed:
-    """The aim that was decided, as the optics are now."""
-    anew = replace(path, decisions=ANEW)
-    _, deflections = regions_and_deflections(path, _chosen(anew, DeflectionBounds.none(path), kept), kept.bends)
+def aim_now(path: Path, kept: AimChoices) -> Aimed:
+    """The aim that was chosen, as the optics are now.
+
+    Raises:
+        InputError: stops are no longer what they were, or rays leave what there is room for.
+    """
+    stops, as_chosen = StopChoices.of(path, kept.everything), replace(path, rounds=kept.rounds)
+    kept.stops.check(replace(stops, borders=kept.stops.borders))
+    _, deflections = regions_and_deflections(path, _chosen(path, DeflectionBounds.none(path), kept), kept.bends)
     # Without what rays stray by, more cells may seem to be seen than are.
-    aim = _with_kept_reach(_chosen(path, deflections, kept), kept)
+    aim = _with_kept_reach(_chosen(as_chosen, deflections, kept), kept)
+    kept.stops.check(stops.through(aim))
     regions, _ = regions_and_deflections(path, aim, kept.bends)
     for leg, region, most in zip(path.legs, regions, kept.bends, strict=True):
         now = largest_bend(leg, region)
@@ -165,7 +220,7 @@ def _as_kept(path: Path, kept: KeptAim) -> Aimed:
     return Aimed(aim, regions, deflections, kept.everything)
 
 
-def _chosen(path: Path, deflections: DeflectionBounds, kept: KeptAim) -> Aim:
+def _chosen(path: Path, deflections: DeflectionBounds, kept: AimChoices) -> Aim:
     """The window, or the windows of cells, that were decided on."""
     if kept.strips is not None:
         return window_of(path, deflections.unknown, kept.everything, kept.strips)
@@ -176,7 +231,7 @@ def _chosen(path: Path, deflections: DeflectionBounds, kept: KeptAim) -> Aim:
     return replace(cells, halvings=kept.halvings)
 
 
-def _with_kept_reach(aim: Aim, kept: KeptAim) -> Aim:
+def _with_kept_reach(aim: Aim, kept: AimChoices) -> Aim:
     """The aim with as many cells as were looked at, which are enough."""
     if not isinstance(aim, CellWindows):
         return aim

@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
+from vcc.base.cached import cached, is_computed
+from vcc.base.describe import Brief
 from vcc.base.units import short
 from vcc.base.values import content
 from vcc.fields.grid import ALL, Block, Grid
 from vcc.optics.deflections import CellDeflection, FacetDeflection
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.train import Stage, Train
-from vcc.plan.decisions import ANEW, Decisions
+from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, check_unchanged, choice, gathered, give
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.operators import Before, DarkBorder, SharpenViews
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import steps
-from vcc.plan.rays.aim import Aimed, aimed
+from vcc.plan.rays.aim import AimChoices, Aimed, aim_now, choose_aim, found
 from vcc.plan.rays.bounds.extent import footprint
 from vcc.plan.rays.bounds.windows import Aim, Window
 from vcc.plan.rays.linear import by_cells, by_surface, by_widths
@@ -32,12 +34,17 @@ from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.points import table
 from vcc.plan.rays.textures import (
     COARSE_SIZES,
+    EXACT,
     POINTS_PER_FOOTPRINT,
     SIZES,
     WORTH_SAYING,
+    Enough,
+    Points,
     Sampled,
+    at_points,
+    choose_points,
+    made_fine_enough,
     means_around,
-    textured,
 )
 from vcc.shapes.lattice import CellApertures, CellBlock
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
@@ -48,10 +55,40 @@ Array = NDArray[np.float64]
 DEFAULT_SAMPLES = 64
 
 
-def compile_rays(
-    train: Train, grid: Grid, how: How, reason: str = "asked for", decisions: Decisions = ANEW
-) -> Plan:
-    """The plan by which rays make the picture that an optical train makes of a light field.
+@dataclass(frozen=True, eq=False, repr=False)
+class RayChoices(Brief):
+    """All that is chosen of a plan by rays.
+
+    Args:
+        parallax: the motion along which views are interpolated (`Rays.motion`), and that in words.
+        aim: where rays are aimed.
+        elements: of each, from the sensor on.
+    """
+
+    parallax: tuple[Array, str]
+    aim: AimChoices | None = choice("aim of the rays", AimChoices.like)
+    elements: tuple[ElementChoices, ...] = choice("element from the sensor")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ElementChoices(Brief):
+    """What is chosen of an element that rays meet.
+
+    Args:
+        aimed_at: whether rays are aimed at the very hole that it is.
+        textures: the points of its textures, in the order in which they are made.
+    """
+
+    aimed_at: bool = choice("whether rays are aimed at it")
+    textures: tuple[Points, ...] = choice("points of its textures", lambda one, other: _alike(one, other))
+
+
+def _alike(one: tuple[Points, ...], other: tuple[Points, ...]) -> bool:
+    return len(one) == len(other) and all(a.like(b) for a, b in zip(one, other, strict=True))
+
+
+class ByRays:
+    """The stages of a plan by rays, each made once of those before it.
 
     Args:
         train: the optics.
@@ -59,68 +96,140 @@ def compile_rays(
             samples add to the picture of the whole.
         how: what was chosen.
         reason: why rays are needed, for the plan's notes.
+        choices: by which the plan is made; None chooses now.
+        follow: whether its numbers are to follow a camera.
+        parts: what is kept of plans nearby.
 
     Raises:
-        InputError: an element that returns what it must not (named), or optics through which no bound on the rays
-            can be found.
+        InputError: an element that returns what it must not (named), optics through which no bound on the rays can
+            be found, or choices that no longer hold.
     """
-    motion, followed = decisions.keep(
-        "parallax along which views are interpolated", lambda: _motion(grid, how), lambda one, other: True
-    )
-    path = Path(train, grid.whole_grid, motion, how.rays_a_pixel or DEFAULT_SAMPLES, decisions)
-    taken = aimed(path)
-    notes = [f"rays are traced back from the sensor: {reason}", f"they are aimed at {taken.aim.words}"]
-    core = _core(path, taken, how, notes)
-    notes.append(followed)
-    before = _before(grid, how, notes)
-    if grid.beyond != ALL:
-        border = _border(grid, core, before)
-        before = (border, *before)
-        core = core.part(_with(border, grid.in_whole))
-        notes.append(
-            f"the light field is a piece of one of {'×'.join(map(str, grid.whole_grid.shape[:4]))} samples: it is "
-            "looked at by the rays of the whole, and fades towards the neighbours that it was cut from, so that "
-            "pictures of pieces add up"
+
+    def __init__(
+        self,
+        train: Train,
+        grid: Grid,
+        how: How,
+        reason: str = "asked for",
+        choices: RayChoices | None = None,
+        follow: Follow | None = None,
+        parts: Parts = NONE_KEPT,
+    ) -> None:
+        self.train, self.grid, self.how, self.reason = train, grid, how, reason
+        self.follow, self.parts = follow, parts
+        give(self, choices)
+
+    @property
+    def choices(self) -> RayChoices:
+        """All that is chosen."""
+        return gathered(RayChoices, self)
+
+    @property
+    def linears(self) -> tuple[Linear, ...]:
+        """Which numbers of the plan are linear in what elements hold."""
+        return self.met.linears
+
+    @property
+    @cached
+    def choose_parallax(self) -> tuple[Array, str]:
+        """The motion along which views are interpolated, and what is done with it, in words."""
+        self.parts.check()
+        return _motion(self.grid, self.how)
+
+    @property
+    @cached
+    def path(self) -> Path:
+        """The camera from the sensor back to the light field."""
+        motion, _ = self.choose_parallax
+        return Path(self.train, self.grid.whole_grid, motion, self.how.rays_a_pixel or DEFAULT_SAMPLES)
+
+    @property
+    @cached
+    def choose_aim(self) -> AimChoices | None:
+        """Where rays are aimed; None: at the smallest window that there is, which is found with its numbers."""
+        self.parts.check()
+        return None if self.follow is None else choose_aim(self.path)
+
+    @property
+    @cached
+    def aimed(self) -> Aimed:
+        """Where rays are aimed, and where they meet elements then."""
+        return found(self.path) if self.choose_aim is None else aim_now(self.path, self.choose_aim)
+
+    @property
+    @cached
+    def met(self) -> Met:
+        """What rays meet."""
+        chosen = self.choose_elements if is_computed(self, "choose_elements") else None
+        return steps_met(self.path, self.aimed, False, self.follow, chosen, self.parts)
+
+    @property
+    @cached
+    def choose_elements(self) -> tuple[ElementChoices, ...]:
+        """What is chosen of each element: the points of its textures, with what they hold."""
+        return self.met.choices
+
+    @property
+    @cached
+    def core(self) -> Rays:
+        """The rays."""
+        path, aim, how = self.path, self.aimed.aim, self.how
+        sensor = path.train.sensor
+        vertical, horizontal = sensor.pitches
+        first = sensor.frame(np.zeros((1, 2)))[0]
+        wide, high = path.pixel.tolist()
+        nv, nu, nt, ns = path.grid.shape[:4]
+        return Rays(
+            raster_shape=sensor.shape,
+            first_pixel=(float(first[0]), float(first[1])),
+            pitch=(horizontal, vertical),
+            sensitive=(wide, high),
+            aim=aim,
+            steps=self.met.steps,
+            index_from_ray=self.met.index_from_ray,
+            motion=path.motion,
+            between_views=how.between_views == "auto",
+            views=(nv, nu, nt, ns),
+            scale=1.0,
+            samples=path.samples >> aim.halvings,
+            seed=how.seed,
+            points=self.parts.part(
+                "points of the rays",
+                lambda: (how.seed, content(path.scatters), aim.on_disc),
+                partial(table, how.seed, path.scatters, aim.on_disc, _kind(self.follow)),
+            ),
         )
-    return Plan(
-        sensor_shape=train.sensor.shape,
-        grid_shape=grid.shape[:4],
-        core=core,
-        before=before,
-        cautions=tuple(_cautions(train)),
-        notes=tuple(notes),
-    )
+
+    @property
+    @cached
+    def plan(self) -> Plan:
+        """How to make the picture."""
+        core, grid = self.core, self.grid
+        notes = [f"rays are traced back from the sensor: {self.reason}"]
+        notes += [f"they are aimed at {self.aimed.aim.words}", *self.met.notes, self.choose_parallax[1]]
+        before = _before(grid, self.how, notes)
+        if grid.beyond != ALL:
+            border = _border(grid, core, before)
+            before = (border, *before)
+            core = core.part(_with(border, grid.in_whole))
+            notes.append(
+                f"the light field is a piece of one of {'×'.join(map(str, grid.whole_grid.shape[:4]))} samples: "
+                "it is looked at by the rays of the whole, and fades towards the neighbours that it was cut from, "
+                "so that pictures of pieces add up"
+            )
+        return Plan(
+            sensor_shape=self.train.sensor.shape,
+            grid_shape=grid.shape[:4],
+            core=core,
+            before=before,
+            cautions=tuple(_cautions(self.train)),
+            notes=tuple(notes),
+        )
 
 
-def _core(path: Path, taken: Aimed, how: How, notes: list[str]) -> Rays:
-    """The rays that are aimed so."""
-    sensor = path.train.sensor
-    vertical, horizontal = sensor.pitches
-    first = sensor.frame(np.zeros((1, 2)))[0]
-    wide, high = path.pixel.tolist()
-    made, index_from_ray = steps_met(path, taken, notes)
-    kind = np.float64 if path.decisions.lasting else np.float32
-    nv, nu, nt, ns = path.grid.shape[:4]
-    return Rays(
-        raster_shape=sensor.shape,
-        first_pixel=(float(first[0]), float(first[1])),
-        pitch=(horizontal, vertical),
-        sensitive=(wide, high),
-        aim=taken.aim,
-        steps=tuple(made),
-        index_from_ray=index_from_ray,
-        motion=path.motion,
-        between_views=how.between_views == "auto",
-        views=(nv, nu, nt, ns),
-        scale=1.0,
-        samples=path.samples >> taken.aim.halvings,
-        seed=how.seed,
-        points=path.decisions.made(
-            "points of the rays",
-            lambda: (how.seed, content(path.scatters), taken.aim.on_disc),
-            partial(table, how.seed, path.scatters, taken.aim.on_disc, kind),
-        ),
-    )
+def _kind(follow: Follow | None) -> type[np.floating]:
+    """Of the numbers of textures and points: in double precision where they follow a camera."""
+    return np.float32 if follow is None else np.float64
 
 
 def _before(grid: Grid, how: How, notes: list[str]) -> tuple[Before, ...]:
@@ -164,6 +273,25 @@ def _cautions(train: Train) -> Iterator[str]:
 
 
 @dataclass(frozen=True, eq=False)
+class Met:
+    """What rays meet.
+
+    Args:
+        steps: in the order in which they meet it.
+        index_from_ray: from rays behind all that to the light field's indices.
+        notes: what is to be said of it.
+        linears: which numbers of the steps are linear in what elements hold.
+        choices: what was chosen of each element, from the sensor on; none where nothing follows a camera.
+    """
+
+    steps: tuple[steps.Step, ...]
+    index_from_ray: Affine
+    notes: tuple[str, ...]
+    linears: tuple[Linear, ...]
+    choices: tuple[ElementChoices, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class _Met:
     """What is met, where, and how finely it must be known.
 
@@ -175,7 +303,12 @@ class _Met:
             that is not known.
         sizes: points a side of textures for masks, and for bends.
         passes: lowest and highest (x, y) of what passes in its plane, metres.
-        decisions: about it.
+        chosen: points of its textures; None chooses now.
+        follow: whether its numbers are to follow a camera.
+        parts: what is kept of plans nearby.
+        points: of its textures that were made, in their order.
+        notes: what is to be said of it.
+        linears: which of its numbers are linear in what it holds.
     """
 
     stage: Stage
@@ -184,41 +317,81 @@ class _Met:
     index_from_slope: Array | None
     sizes: tuple[tuple[int, ...], tuple[int, ...]]
     passes: tuple[Array, Array]
-    decisions: Decisions
+    chosen: tuple[Points, ...] | None
+    follow: Follow | None
+    parts: Parts
+    points: list[Points] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    linears: list[Linear] = field(default_factory=list)
 
     @property
     def label(self) -> str:
         return self.stage.element.label
 
+    def texture(self, sampled: Sampled, sizes: tuple[int, ...], enough: Enough) -> tuple[steps.Texture, float]:
+        """The next of its textures, fine enough, and its error; see `made_fine_enough`."""
+        if self.follow is None:
+            return made_fine_enough(sampled, sizes, enough)
+        number = len(self.points)
+        chosen = choose_points(sampled, sizes, enough) if self.chosen is None else self.chosen[number]
+        self.points.append(chosen)
+        return at_points(sampled, chosen, self.parts), chosen.error
 
-def steps_met(path: Path, taken: Aimed, notes: list[str], coarse: bool = False) -> tuple[list[steps.Step], Affine]:
-    """What rays meet, and the map from rays behind all that to the light field's indices.
 
-    ``coarse`` takes the coarsest textures, for a share of light rather than for a picture.
+def steps_met(
+    path: Path,
+    taken: Aimed,
+    coarse: bool = False,
+    follow: Follow | None = None,
+    chosen: tuple[ElementChoices, ...] | None = None,
+    parts: Parts = NONE_KEPT,
+) -> Met:
+    """What rays meet on a path.
+
+    Args:
+        path: from the sensor.
+        taken: where they are aimed.
+        coarse: takes the coarsest textures, for a share of light rather than for a picture.
+        follow: whether numbers are to follow a camera.
+        chosen: of each element; None chooses now.
+        parts: what is kept of plans nearby.
     """
     sizes = (COARSE_SIZES[:1], SIZES[:1]) if coarse else (COARSE_SIZES, SIZES)
     made: list[steps.Step] = []
+    all_met: list[_Met] = []
+    choices: list[ElementChoices] = []
     pending = Affine.identity()
     for leg, region in zip(path.legs, taken.regions, strict=True):
+        parts.check()
         pending = leg.undone @ pending
         stage, faces = leg.stage, leg.stage.faces
-        its = path.decisions.of(f"element {len(path.legs) - leg.number} from the front")
-        onward = path.index_from_slope(leg)
-        met = _Met(stage, region, footprint(path, taken.aim, leg), onward, sizes, leg.stop, its)
+        own = None if chosen is None else chosen[leg.number]
+        points = None if own is None else own.textures
+        onward, wide = path.index_from_slope(leg), footprint(path, taken.aim, leg)
+        met = _Met(stage, region, wide, onward, sizes, leg.stop, points, follow, parts)
         here: list[steps.Step] = []
         with stage.named():
-            at = its.hold("whether rays are aimed at it", _is_aimed_at(taken.aim, leg))
+            at = _is_aimed_at(taken.aim, leg)
+            if own is not None:
+                check_unchanged("whether rays are aimed at it", own.aimed_at, at)
             if faces.pattern is not None and not at:
-                here += _transmission(faces.pattern, met, notes)
+                here += _transmission(faces.pattern, met)
             if faces.bending is not None:
-                here.append(_deflection(met, notes))
+                here.append(_deflection(met))
             if faces.spread is not None:
                 here.append(_scatter(faces.spread, leg.column, met))
+        all_met.append(met)
+        choices.append(ElementChoices(at, tuple(met.points)))
         if here:
             made += [steps.Move(pending), *here]
             pending = Affine.identity()
-    index = path.index_from_entrance @ path.entrance_from_last @ pending
-    return made, index
+    return Met(
+        tuple(made),
+        path.index_from_entrance @ path.entrance_from_last @ pending,
+        tuple(note for met in all_met for note in met.notes),
+        tuple(linear for met in all_met for linear in met.linears),
+        tuple(choices),
+    )
 
 
 def _is_aimed_at(aim: Aim, leg: Leg) -> bool:
@@ -236,7 +409,7 @@ def _is_aimed_at(aim: Aim, leg: Leg) -> bool:
     )
 
 
-def _transmission(pattern: Pattern, met: _Met, notes: list[str]) -> list[steps.Step]:
+def _transmission(pattern: Pattern, met: _Met) -> list[steps.Step]:
     """The steps by which a pattern weighs rays."""
     decentre, label = met.stage.element.decentre, met.label
     if isinstance(pattern, Open):
@@ -245,9 +418,9 @@ def _transmission(pattern: Pattern, met: _Met, notes: list[str]) -> list[steps.S
         return [steps.Disc(decentre, pattern.diameter / 2, label)]
     if isinstance(pattern, Bounded):
         sheet = steps.Rectangle(decentre, (pattern.width / 2, pattern.height / 2), f"edges of {label}")
-        return [sheet, *_transmission(pattern.pattern, met, notes)]
+        return [sheet, *_transmission(pattern.pattern, met)]
     if isinstance(pattern, Product):
-        return [step for one in pattern.patterns for step in _transmission(one, met, notes)]
+        return [step for one in pattern.patterns for step in _transmission(one, met)]
     if isinstance(pattern, CellApertures):
         half = pattern.scale * pattern.lattice.pitch / 2
         return [steps.CellGaps(pattern.lattice, decentre, half, pattern.circular, f"gaps of {label}")]
@@ -260,9 +433,8 @@ def _transmission(pattern: Pattern, met: _Met, notes: list[str]) -> list[steps.S
             pattern.middle[0] + decentre[0] - size[0] * columns / 2,
             pattern.middle[1] + decentre[1] - size[1] * rows / 2,
         )
-        kind = np.float64 if met.decisions.lasting else np.float32
-        shares = steps.CellShares(pattern.values.astype(kind), corner, size, label)
-        met.decisions.note(by_cells(pattern, shares))
+        shares = steps.CellShares(pattern.values.astype(_kind(met.follow)), corner, size, label)
+        met.linears.append(by_cells(pattern, shares))
         return [shares]
     if isinstance(pattern, CosineSum):
         across, down = (2 * math.pi / period for period in pattern.periods)
@@ -274,20 +446,19 @@ def _transmission(pattern: Pattern, met: _Met, notes: list[str]) -> list[steps.S
     def itself(x: Array, y: Array) -> Array:
         return np.asarray(pattern(x, y))[..., None]
 
-    its = met.decisions.of("mask")
     enough = None if met.footprint is None else met.footprint / POINTS_PER_FOOTPRINT
     sampled = Sampled(means, decentre, met.region, met.passes, pattern, itself)
-    texture, error = textured(sampled, met.sizes[0], decisions=its, spacing_enough=enough)
+    texture, error = met.texture(sampled, met.sizes[0], Enough(spacing=enough))
     if error > WORTH_SAYING:
         note = f"{label} is finer than its texture shows: {error:.1%} root mean square of its largest value"
         if met.footprint is not None:
             note += f", of which a pixel averages {min(met.footprint / texture.spacing):.0f} points across or more"
-        notes.append(note)
-    single = texture if its.lasting else replace(texture, values=texture.values.astype(np.float32))
-    return [steps.TextureShares(single, label)]
+        met.notes.append(note)
+    values = texture.values.astype(_kind(met.follow), copy=False)
+    return [steps.TextureShares(replace(texture, values=values), label)]
 
 
-def _deflection(met: _Met, notes: list[str]) -> steps.Step:
+def _deflection(met: _Met) -> steps.Step:
     bending, decentre, label = met.stage.faces.bending, met.stage.element.decentre, met.label
     assert bending is not None
     if isinstance(bending, CellDeflection):
@@ -300,16 +471,14 @@ def _deflection(met: _Met, notes: list[str]) -> steps.Step:
         return np.stack(np.broadcast_arrays(s, t), axis=-1)
 
     sampled = Sampled(slopes, decentre, met.region, met.passes, bending)
-    texture, error = textured(
-        sampled, met.sizes[1], decisions=met.decisions.of("bend"), index_from_value=met.index_from_slope
-    )
+    texture, error = met.texture(sampled, met.sizes[1], Enough(index_from_value=met.index_from_slope))
     if error > WORTH_SAYING:
-        notes.append(
+        met.notes.append(
             f"{label} bends by a texture of {texture.values.shape[0]}² points, {error:.1%} root mean square of "
             "its steepest slope away from it"
         )
     step = steps.TextureUnbend(texture, label)
-    met.decisions.note(by_surface(met.stage, step))
+    met.linears.append(by_surface(met.stage, step))
     return step
 
 
@@ -318,18 +487,18 @@ def _scatter(scatter: Scatter, column: int, met: _Met) -> steps.Unscatter:
     kernels = len(scatter.kernels)
     cumulative = width = None
     if scatter.weights is not None:
-        shares = _sheet(scatter.weights, met, "shares of kernels")
+        shares = _sheet(scatter.weights, met)
         cumulative = replace(shares, values=np.cumsum(shares.values, axis=-1))
     if scatter.width is not None:
-        width = _sheet(scatter.width, met, "widths of kernels")
+        width = _sheet(scatter.width, met)
     pick = column + 2 * kernels if cumulative is not None else -1
     step = steps.Unscatter(column, kernels, pick, cumulative, width, met.label)
     if width is not None:
-        met.decisions.note(by_widths(met.stage, step, width))
+        met.linears.append(by_widths(met.stage, step, width))
     return step
 
 
-def _sheet(given: object, met: _Met, what: str) -> steps.Texture:
+def _sheet(given: object, met: _Met) -> steps.Texture:
     """A map over a sheet as a texture: as it is where it is one, else sampled."""
     decentre = met.stage.element.decentre
     if isinstance(given, SheetMap):
@@ -340,7 +509,7 @@ def _sheet(given: object, met: _Met, what: str) -> steps.Texture:
             decentre[0] - given.width / 2 + spacing[0] / 2,
             decentre[1] - given.height / 2 + spacing[1] / 2,
         )
-        return steps.Texture(values.astype(np.float64 if met.decisions.lasting else np.float32), start, spacing)
+        return steps.Texture(values.astype(_kind(met.follow)), start, spacing)
 
     def numbers(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
         values = np.asarray(given(x, y))  # type: ignore[operator]
@@ -348,7 +517,7 @@ def _sheet(given: object, met: _Met, what: str) -> steps.Texture:
         return values[..., None] if values.shape == shape else values
 
     sampled = Sampled(numbers, decentre, met.region, met.passes, given)
-    return textured(sampled, met.sizes[1], decisions=met.decisions.of(what))[0]
+    return met.texture(sampled, met.sizes[1], EXACT)[0]
 
 
 # --- between views ---

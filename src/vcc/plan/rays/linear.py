@@ -8,7 +8,7 @@ import numpy as np
 
 from vcc.optics.diffuser import CodedDiffuser
 from vcc.optics.train import Stage
-from vcc.plan.decisions import Linear
+from vcc.plan.following import Linear
 from vcc.plan.rays.steps import CellShares, Step, Texture, TextureUnbend
 from vcc.shapes.mean_back import is_values
 from vcc.shapes.patterns import Cells

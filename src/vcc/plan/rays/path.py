@@ -13,7 +13,6 @@ from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
-from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.rays.points import FIRST_COLUMNS, columns_of
 
 Array = NDArray[np.float64]
@@ -53,20 +52,21 @@ class Path(Brief):
         grid: that they end in.
         motion: 2×2, along which they are interpolated between views (`Rays.motion`).
         samples: rays a pixel.
-        decisions: where these are kept, what bounds the rays is.
+        rounds: which stops, by the number of their leg, are taken for round when they are widened by how far rays
+            stray; None: those that are smaller so.
     """
 
     train: Train
     grid: Grid
     motion: Array
     samples: int
-    decisions: Decisions = ANEW
+    rounds: tuple[bool, ...] | None = None
 
     @property
     @cached
     def legs(self) -> tuple[Leg, ...]:
         """The stages as rays meet them, the last one of the train first."""
-        stages, stops = self.train.stages, _stops(self.train.stages, self.decisions)
+        stages, stops = self.train.stages, _stops(self.train.stages)
         undone, entrance_from_sensor = self.train.approach_to_sensor.inverse(), self._entrance_from_sensor
         legs: list[Leg] = []
         column = FIRST_COLUMNS
@@ -145,7 +145,7 @@ class Path(Brief):
         A stop so near the sensor that slopes of more than `STEEPEST` pass it bounds nothing that paraxial optics
         could speak of.
         """
-        return self.decisions.hold("whether stops bound the light", any(map(_bounds_slopes, self.legs)))
+        return any(map(_bounds_slopes, self.legs))
 
 
 def _bounds_slopes(leg: Leg) -> bool:
@@ -168,12 +168,21 @@ def _undone(stage: Stage) -> Affine:
     return approach if stage.centred is None else approach @ stage.centred.inverse()
 
 
-def _stops(stages: tuple[Stage, ...], decisions: Decisions) -> list[tuple[Array, Array]]:
+def in_one_plane(stages: tuple[Stage, ...]) -> list[int]:
+    """The numbers of stages that stand in the plane of the one before."""
+    return [n for n, stage in enumerate(stages) if n and np.array_equal(stage.approach.matrix, np.eye(5))]
+
+
+def stops_in_one_plane(stages: tuple[Stage, ...]) -> tuple[int, ...]:
+    """The same, where any of them stops light."""
+    same = in_one_plane(stages)
+    stops = any(stages[m].faces.pattern is not None for n in same for m in (n - 1, n))
+    return tuple(same) if stops else ()
+
+
+def _stops(stages: tuple[Stage, ...]) -> list[tuple[Array, Array]]:
     """For each stage what passes in its plane: bounded by all that stands in that plane."""
-    stops = [_own_stop(stage) for stage in stages]
-    same = [n for n, stage in enumerate(stages) if n and np.array_equal(stage.approach.matrix, np.eye(5))]
-    if any(faces.pattern is not None for faces in (stages[m].faces for n in same for m in (n - 1, n))):
-        decisions.hold("which stops stand in one plane", same)
+    stops, same = [_own_stop(stage) for stage in stages], in_one_plane(stages)
     for n in [*same, *reversed(same)]:  # forwards, then backwards
         low = np.maximum(stops[n][0], stops[n - 1][0])
         high = np.minimum(stops[n][1], stops[n - 1][1])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.values import content
-from vcc.plan.decisions import ANEW, Decisions, plan_again
+from vcc.plan.following import Parts, plan_again
 from vcc.plan.rays.steps import Texture
 from vcc.shapes.patterns import Pattern
 
@@ -78,6 +78,24 @@ class Sampled(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Enough(Brief):
+    """What is fine enough of a texture, beside its own error.
+
+    Args:
+        spacing: distance (x, y) of points that is whatever the error, metres; None: none is.
+        index_from_value: (4, numbers), by how many samples of the light field rays move for an error of the
+            numbers; None where that is not known, and the error counts alone.
+    """
+
+    spacing: Array | None = None
+    index_from_value: Array | None = None
+
+
+EXACT = Enough()
+"""Nothing but that a texture errs little."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Points(Brief):
     """Where the points of a texture stand on its element.
 
@@ -85,7 +103,7 @@ class Points(Brief):
         size: points a side.
         start: place (x, y) of the first, metres from the element's middle.
         spacing: (x, y), metres.
-        error: of the texture, see `textured`.
+        error: of the texture, root mean square as a share of the largest value.
     """
 
     size: int
@@ -103,62 +121,49 @@ class Points(Brief):
         return self.size == other.size and np.allclose(self.spacing, other.spacing, rtol=0.5, atol=0)
 
 
-def textured(
-    sampled: Sampled,
-    sizes: tuple[int, ...] = SIZES,
-    *,
-    decisions: Decisions = ANEW,
-    spacing_enough: Array | None = None,
-    index_from_value: Array | None = None,
-) -> tuple[Texture, float]:
-    """A texture that is fine enough, and its error; see `made_fine_enough`.
+def choose_points(sampled: Sampled, sizes: tuple[int, ...], enough: Enough) -> Points:
+    """The points of a texture that follows a camera: on the element, with room around the region.
 
     Args:
         sampled: what is sampled.
         sizes: see `made_fine_enough`.
-        decisions: where these are kept, so are the points, on the element, with room around the region.
-        spacing_enough: see `made_fine_enough`.
-        index_from_value: likewise.
+        enough: likewise.
+    """
+    texture, error = made_fine_enough(sampled.with_room(), sizes, enough)
+    x, y = (start - middle for start, middle in zip(texture.start, sampled.middle, strict=True))
+    return Points(texture.values.shape[0], (x, y), texture.spacing, error)
+
+
+def at_points(sampled: Sampled, points: Points, parts: Parts) -> Texture:
+    """The texture whose points were chosen.
+
+    Args:
+        sampled: what is sampled.
+        points: on the element.
+        parts: what is kept of plans nearby.
 
     Raises:
-        InputError: a region beyond the points that were kept.
+        InputError: a region beyond the points.
     """
-    enough = {"spacing_enough": spacing_enough, "index_from_value": index_from_value}
-    if not decisions.lasting:
-        return made_fine_enough(sampled, sizes, **enough)
-
-    def decided() -> Points:
-        texture, error = made_fine_enough(sampled.with_room(), sizes, **enough)
-        x, y = (start - middle for start, middle in zip(texture.start, sampled.middle, strict=True))
-        return Points(texture.values.shape[0], (x, y), texture.spacing, error)
-
-    points = decisions.keep("points of its texture", decided, Points.like)
     if not points.holds(*sampled.from_middle()):
         raise plan_again("where rays meet an element")
-    values = decisions.made(
-        "texture",
+    values = parts.part(
+        "texture met by rays",
         lambda: (content(sampled.of), content(points)),
         lambda: _values(sampled, points.start, points.spacing, points.size),
     )
     x, y = (start + middle for start, middle in zip(points.start, sampled.middle, strict=True))
-    return Texture(values, (x, y), points.spacing), points.error
+    return Texture(values, (x, y), points.spacing)
 
 
-def made_fine_enough(
-    sampled: Sampled,
-    sizes: tuple[int, ...],
-    spacing_enough: Array | None = None,
-    index_from_value: Array | None = None,
-) -> tuple[Texture, float]:
+def made_fine_enough(sampled: Sampled, sizes: tuple[int, ...], enough: Enough = EXACT) -> tuple[Texture, float]:
     """The coarsest texture that is fine enough for a function over a region, and its error anywhere.
 
     Args:
         sampled: what is sampled, and where.
         sizes: points a side. After the first, the first one is tried that should do: interpolation errs as the
             square of the spacing. The last one is taken if none should.
-        spacing_enough: distance (x, y) of points that is fine enough whatever the error, metres; None: none is.
-        index_from_value: (4, numbers), by how many samples of the light field rays move for an error of the
-            numbers; None where that is not known, and the error counts alone.
+        enough: what is fine enough.
 
     Returns:
         The texture, and its root mean square error as a share of its largest value.
@@ -182,12 +187,13 @@ def made_fine_enough(
         largest = float(np.abs(values).max())
         error = float(np.sqrt(np.mean(off**2))) / largest if largest > 0 else 0.0
         excess = error / FINE_ENOUGH
-        if index_from_value is not None:
-            moved = np.sqrt(np.mean((off @ index_from_value.T) ** 2, axis=0)).max()
+        if enough.index_from_value is not None:
+            moved = np.sqrt(np.mean((off @ enough.index_from_value.T) ** 2, axis=0)).max()
             excess = min(excess, float(moved) / SHIFT_ENOUGH)
 
         def does(finer: int, excess: float = excess, size: int = size) -> bool:
-            even = spacing_enough is not None and bool((extent / (finer - 1) <= spacing_enough).all())
+            close = enough.spacing
+            even = close is not None and bool((extent / (finer - 1) <= close).all())
             return even or excess * (size / finer) ** 2 < 1
 
         if does(size) or not left:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.optics.deflections import CellDeflection
 from vcc.optics.sensor import Sensor
-from vcc.plan.decisions import Decisions
 from vcc.plan.rays.bounds.slopes import Bound, bounds
 from vcc.plan.rays.bounds.windows import CellOpening, CellWindows, Sight, Stop
 from vcc.plan.rays.path import Leg, Path, mixes_axes
@@ -105,7 +104,7 @@ def _towards(path: Path, leg: Leg, beyond: list[Bound]) -> Iterator[CellWindows]
     bending, element = leg.stage.faces.bending, leg.stage.element
     assert isinstance(bending, CellDeflection)
     cells = replace(bending, lattice=_moved(bending.lattice, element.decentre))
-    opening = _opening(leg.stage.faces.pattern, bending.lattice, path.decisions)
+    opening = _opening(leg.stage.faces.pattern, bending.lattice)
     to_sensor = leg.from_sensor.inverse()
     for bound in beyond:
         way = bound.from_sensor @ to_sensor
@@ -126,12 +125,12 @@ def _moved(lattice: Lattice, decentre: tuple[float, float]) -> Lattice:
     return replace(lattice, offset=(lattice.offset[0] + decentre[0], lattice.offset[1] + decentre[1]))
 
 
-def _opening(pattern: Pattern | None, lattice: Lattice, decisions: Decisions) -> CellOpening:
+def _opening(pattern: Pattern | None, lattice: Lattice) -> CellOpening:
     """What of a lattice's cells is open: whole cells, where nothing stands before them."""
     apertures = _apertures(pattern, lattice)
     radius = apertures.scale * lattice.pitch / 2 if apertures.circular else math.inf
     half = np.array(lattice.reach) * (1 if apertures.circular else apertures.scale)
-    return CellOpening(np.minimum(half, radius), _borders(apertures, decisions), radius)
+    return CellOpening(np.minimum(half, radius), _borders(apertures), radius)
 
 
 def _apertures(pattern: Pattern | None, lattice: Lattice) -> CellApertures:
@@ -142,7 +141,7 @@ def _apertures(pattern: Pattern | None, lattice: Lattice) -> CellApertures:
     return CellApertures(lattice)
 
 
-def _borders(apertures: CellApertures, decisions: Decisions) -> Array:
+def _borders(apertures: CellApertures) -> Array:
     """The strips that cut out an opening in the shape of its cell; see `CellOpening.borders`."""
     if apertures.circular:
         return np.zeros((0, 2))
@@ -150,9 +149,6 @@ def _borders(apertures: CellApertures, decisions: Decisions) -> Array:
     across = apertures.lattice.rotation + np.arange(sides) * math.pi / sides  # to the sides, from the centre
     x, y = np.cos(across), np.sin(across)
     bounding = np.abs(y) > 1e-9  # others are the rectangle's own sides
-    decisions.hold(
-        "sides of cells that lie along the axes (which those of an array that is turned never do)", bounding
-    )
     half = apertures.scale * apertures.lattice.pitch / 2
     return np.stack([-x[bounding] / y[bounding], half / np.abs(y[bounding])], axis=-1)
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
-from vcc.plan.decisions import ANEW, Decisions
 from vcc.plan.rays.bounds.windows import Window
 from vcc.plan.rays.path import Leg, Path
 from vcc.shapes.patterns import Circle
@@ -44,7 +43,7 @@ class Bound(Brief):
         loose: by how much rays can stray there from where affine optics lead.
         circle: whether it is a round hole.
         words: what it is.
-        decisions: where these are kept, what a hole is taken for when it is widened is.
+        round: whether a round hole is taken for round when it is widened; None: where it is smaller so.
     """
 
     number: int
@@ -55,7 +54,7 @@ class Bound(Brief):
     loose: Array
     circle: bool
     words: str
-    decisions: Decisions = ANEW
+    round: bool | None = None
 
     def widened(self, known: Array | float = 0.0) -> tuple[Array, bool]:
         """Half the size by which rays are bound, straying included, and whether that is a disc.
@@ -70,7 +69,7 @@ class Bound(Brief):
         if self.circle:
             radius = self.half + np.linalg.norm(loose)
             smaller = bool(np.pi * np.prod(radius) < 4 * np.prod(self.half + loose))
-            if self.decisions.keep(f"stop {self.number} taken for round", lambda: smaller):
+            if smaller if self.round is None else self.round:
                 return radius, True
         return self.half + loose, False
 
@@ -122,7 +121,7 @@ def bounds(path: Path, deflections: list[Array], everything: bool) -> list[Bound
         deflections: how far rays can stray, see `vcc.plan.rays.bounds.deflections.DeflectionBounds`.
         everything: the views' pictures too, and the grid of views anyway.
     """
-    found = [_stop(leg, deflections[leg.number], path.decisions) for leg in path.legs]
+    found = [_stop(path, leg, deflections[leg.number]) for leg in path.legs]
     if everything or not path.stops_bound:
         found.append(_of_light_field(path, deflections, slice(0, 2), GRID_OF_VIEWS))
     if everything:
@@ -135,10 +134,15 @@ def pictures(path: Path, deflections: list[Array]) -> Bound:
     return _of_light_field(path, deflections, slice(2, 4), PICTURES)
 
 
-def _stop(leg: Leg, deflections: Array, decisions: Decisions) -> Bound:
+def is_round(leg: Leg) -> bool:
+    """Whether what passes in a leg's plane is a round hole."""
     pattern, (low, high) = leg.stage.faces.pattern, leg.stop
+    return isinstance(pattern, Circle) and np.allclose((high - low) / 2, pattern.diameter / 2, rtol=1e-12, atol=0)
+
+
+def _stop(path: Path, leg: Leg, deflections: Array) -> Bound:
+    low, high = leg.stop
     half = np.asarray((high - low) / 2)
-    circle = isinstance(pattern, Circle) and np.allclose(half, pattern.diameter / 2, rtol=1e-12, atol=0)
     return Bound(
         number=leg.number,
         from_sensor=leg.from_sensor,
@@ -146,9 +150,9 @@ def _stop(leg: Leg, deflections: Array, decisions: Decisions) -> Bound:
         middle=np.add(low, high, out=np.zeros(2), where=np.isfinite(half)) / 2,  # of no meaning where unbounded
         half=half,
         loose=np.abs(deflections[:2]).sum(axis=1),
-        circle=decisions.hold(f"stop {leg.number} is round", bool(circle)),
+        circle=is_round(leg),
         words=leg.stage.element.label,
-        decisions=decisions,
+        round=None if path.rounds is None else path.rounds[leg.number],
     )
 
 
