@@ -73,9 +73,9 @@ def test_capture_takes_views_that_are_only_numbered(folder):
 
 
 def test_progress_is_asked_for_where_work_is_long(folder, monkeypatch):
-    from vcc.cli import camera_verbs
+    from vcc.cli import capture
 
-    monkeypatch.setattr(camera_verbs, "SAMPLES_WORTH_A_BAR", 0)
+    monkeypatch.setattr(capture, "WORTH_A_BAR", 0)
     assert run("capture", "camera.toml", "views", "-o", "picture.npy", *KNOWN).exit_code == 0
 
 

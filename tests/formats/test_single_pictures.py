@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tests.formats.small_views import moving_texture
 from vcc.base.errors import InputError, ResultWarning
 from vcc.files import transfer
-from vcc.files.pfm import read_pfm
+from vcc.files.netpbm import read_pfm
 from vcc.files.pictures import read_picture
 from vcc.formats import eslf, open_light_field, read_container, read_ground_truth, save_light_field
 from vcc.formats.tiles import mosaic_evidence, taken_apart

@@ -9,7 +9,7 @@ import pytest
 
 from vcc import InputError
 from vcc.base.units import mm
-from vcc.files.pfm import read_pfm
+from vcc.files.netpbm import read_pfm
 from vcc.files.pictures import read_picture
 from vcc.files.transfer import decode
 from vcc.sources import CameraArray, PlanesScene, TexturedPlane

@@ -6,7 +6,7 @@ import re
 import textwrap
 from typing import Any
 
-from vcc.advice import explain_executor, explain_footprints, explain_rays, explain_store
+from vcc.advice import explain_footprints, explain_rays, explain_runs
 from vcc.advice.limits import sampling_limits
 from vcc.advice.words import in_words
 from vcc.base.showing import Shown
@@ -56,11 +56,11 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: An
     limits = _limits(train, samples.grid, how.scene_distance)
     text = wrapped("\n\n".join([_what(train, samples.grid), made, limits, *parts]))
     if samples.whole() is None:
-        more, seconds = explain_store.section(Drive(*needed(plan, samples), how))
+        more, seconds = explain_runs.of_store(Drive(*needed(plan, samples), how))
         text = f"{text}\n\n{more}"
     by_executor = None
     if executor is not None:
-        more, by_executor = explain_executor.section(Drive(*needed(plan, samples), how, executor), seconds)
+        more, by_executor = explain_runs.of_executor(Drive(*needed(plan, samples), how, executor), seconds)
         text = f"{text}\n\n{wrapped(more)}"
     result = Explanation(text)
     result.plan, result.expected_seconds, result.expected_seconds_by_executor = plan, seconds, by_executor

@@ -1,6 +1,5 @@
 """``vcc capture``: the picture that a camera records."""
 
-from vcc.cli.camera_verbs import captured, captured_over_time
 from vcc.cli.console import check_output, progress, show
 from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, Factor, LightFieldFile, Making, Output, Reading
@@ -8,6 +7,9 @@ from vcc.cli.timing import Timing
 from vcc.files.pictures import WRITE_ENDINGS
 from vcc.motion import load_moving_camera
 from vcc.store import StoredVideo
+
+WORTH_A_BAR = 3e8
+"""Samples below which a picture takes less than a second, and asking for progress would only slow it down."""
 
 
 def capture(
@@ -39,7 +41,14 @@ def capture(
     field = reading.light(light_field)
     with executing.opened() as executor, progress("Capturing") as advance:
         if moves or isinstance(field, StoredVideo):
-            image = captured_over_time(moving, field, timing, how, advance, executor)
+            start, length = timing.of(field)
+            tolerance = timing.time_tolerance
+            image = moving.capture(
+                field, length, how, start=start, time_tolerance=tolerance, progress=advance, executor=executor
+            )
         else:
-            image = captured(moving.camera, field, how, advance, executor)
+            plan = moving.camera.compile(field, how, progress=advance)
+            long = field.whole() is None or plan.samples_touched * (field.grid.channels or 1) > WORTH_A_BAR
+            bar = advance if long else None
+            image = moving.camera.capture(field, how, plan=plan, executor=executor, progress=bar)
     show(image.save(output, exposure=exposure, upright=not as_recorded).description)

@@ -1,6 +1,5 @@
 """``vcc explain``: how a picture would be made."""
 
-from vcc.cli.camera_verbs import explained
 from vcc.cli.console import show
 from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Reading
@@ -21,4 +20,4 @@ def explain(
     executing.check(light_field)
     field = reading.light_field(light_field)
     with executing.opened() as executor:
-        show(str(explained(moving, field, how, executor)))
+        show(str(moving.explain(field, how, executor=executor)))

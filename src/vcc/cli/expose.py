@@ -7,7 +7,6 @@ from cyclopts import Parameter
 
 from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
-from vcc.cli.camera_verbs import exposed
 from vcc.cli.console import check_output, show
 from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time, Whole
@@ -49,7 +48,9 @@ def expose(
     executing.check(light_field)
     field = reading.light_field(light_field)
     with executing.opened() as executor:
-        recording = exposed(optics, field, exposure, how, seed=seed, radiance=radiance, executor=executor)
+        recording = optics.expose(
+            field, exposure, seed=seed, radiance=radiance, ray_seed=how.seed, how=how, executor=executor
+        )
     show(recording.save(output).description)
     if picture is not None:
         mosaic = recording.electronics.color_filter is not None

@@ -1,8 +1,10 @@
-"""Netpbm's binary pictures, ``.ppm`` and ``.pgm``; JPEG Pleno's light fields are such, with 10 bits."""
+"""Netpbm's binary pictures, ``.ppm`` and ``.pgm`` (JPEG Pleno's light fields are such), and floats, ``.pfm``."""
 
 from __future__ import annotations
 
+import math
 import re
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.reading import expanded, read_bytes
 
 _SPACE = rb"(?:\s|#[^\n]*\n)+"
 _HEADER = re.compile(rb"P([56])" + _SPACE + rb"(\d{1,18})" + _SPACE + rb"(\d{1,18})" + _SPACE + rb"(\d{1,9})\s")
+_HEADER_OF_FLOATS = re.compile(rb"(P[fF])\s+(\d{1,18})\s+(\d{1,18})\s+(\S+)[ \t\r]*\n")
 
 
 def read_netpbm(path: Path) -> NDArray[Any]:
@@ -46,3 +50,34 @@ def read_netpbm(path: Path) -> NDArray[Any]:
             raise InputError(f"this picture holds {samples.max()}, and states that nothing is above {largest}")
         samples = np.rint(samples * np.float64(full / largest)).astype(samples.dtype)
     return samples.reshape((height, width, 3) if channels == 3 else (height, width))
+
+
+def read_pfm(path: str | PathLike[str]) -> NDArray[np.float32]:
+    """The numbers of a PFM file, (rows, columns) or (rows, columns, 3), first row at the top.
+
+    Raises:
+        InputError: no such file, another format, or one that is truncated.
+    """
+    path = expanded(path)
+    data = read_bytes(path)
+    match = _HEADER_OF_FLOATS.match(data)
+    scale = math.nan
+    if match is not None:
+        try:
+            scale = float(match[4])
+        except ValueError:
+            scale = math.nan
+    if match is None or not (math.isfinite(scale) and scale != 0):
+        raise InputError(
+            f'{path} is not a PFM file: it begins with {data[:12]!r} and not with "Pf", size and scale'
+        )
+    width, height, channels = int(match[2]), int(match[3]), 3 if match[1] == b"PF" else 1
+    wanted, there = 4 * width * height * channels, len(data) - match.end()
+    if wanted == 0 or there < wanted:
+        raise InputError(
+            f"{path} is truncated: {width}×{height} pixels of {channels} float32 are {wanted} bytes, and it has "
+            f"{there}. Copy it again from where it came from"
+        )
+    values = np.frombuffer(data, "<f4" if scale < 0 else ">f4", width * height * channels, match.end())
+    shape = (height, width, 3) if channels == 3 else (height, width)
+    return np.ascontiguousarray(values.reshape(shape)[::-1], dtype=np.float32)

@@ -1,22 +1,32 @@
-"""Names that state the camera, as a Blender exporter for light-field renderers writes them:
-``NAME_RR_CC_V_U_FOCAL_SENSOR.jpg`` (row, column, position downwards and to the right in mm, focal length, sensor).
+"""Names of files that state a view's row, column and position: ``NAME_RR_CC_V_U…`` of gantries and renderers.
+
+The Stanford light-field archive's gantry writes ``out_RR_CC_V_U.png`` (row, column, camera v and u). A Blender
+exporter for light-field renderers adds the camera: ``NAME_RR_CC_V_U_FOCAL_SENSOR.jpg`` (position downwards and to
+the right in mm, focal length, sensor).
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.units import mm
 from vcc.files.pictures import read_picture
-from vcc.formats.grid import Geometry, ViewGrid
-from vcc.formats.positions import START, find_named, names_of, stepped
+from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
 
+_START = r"(.+?)_(\d+)_(\d+)_(-?\d+\.\d+)_(-?\d+\.\d+)"
+"""How such names begin: a word, row, column, and the position downwards and to the right."""
 _NUMBER = r"(\d+(?:\.\d+)?)"
-_NAME = re.compile(rf"{START}_{_NUMBER}_{_NUMBER}")
-_KIND = "names with camera, focal length and sensor"
+_OF_GANTRIES = re.compile(rf"{_START}_?", re.IGNORECASE)
+_WITH_CAMERA = re.compile(rf"{_START}_{_NUMBER}_{_NUMBER}")
 
 
 def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
@@ -25,7 +35,9 @@ def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
     Raises:
         InputError: a grid that `vcc.formats.grid.arrange` refuses, or cameras that are not alike.
     """
-    return find_named(folder, _NAME, _KIND, read_geometry, sparse=sparse)
+    return _find_named(
+        folder, _WITH_CAMERA, "names with camera, focal length and sensor", read_geometry, sparse=sparse
+    )
 
 
 def read_geometry(grid: ViewGrid) -> Geometry | None:
@@ -38,7 +50,7 @@ def read_geometry(grid: ViewGrid) -> Geometry | None:
     Raises:
         InputError: cameras of different focal lengths or sensors, or a focal length of 0.
     """
-    names = names_of(grid, _NAME)
+    names = _names_of(grid, _WITH_CAMERA)
     if names is None:
         return None
     kinds: dict[tuple[float, float], Path] = {}
@@ -55,8 +67,94 @@ def read_geometry(grid: ViewGrid) -> Geometry | None:
     focal_length, sensor = next(iter(kinds))
     picture, _ = read_picture(next(iter(grid.present.values())))
     return replace(
-        stepped(names, grid.shape),
+        _stepped(names, grid.shape),
         slope_per_pixel=sensor / focal_length / max(picture.shape[:2]),
         focus_distance=math.inf,
         directions_are_true=True,
     )
+
+
+def find_of_gantry(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
+    """The grid of the pictures that have gantry names; None if there are none.
+
+    Raises:
+        InputError: a grid that `vcc.formats.grid.arrange` refuses.
+    """
+    return _find_named(folder, _OF_GANTRIES, "Stanford gantry names", geometry_of_gantry, sparse=sparse)
+
+
+def geometry_of_gantry(grid: ViewGrid) -> Geometry | None:
+    """The cameras that the names of a grid's files state; None if they are no gantry names.
+
+    The names state camera positions without a unit: their ratio is known, and they are taken as millimetres.
+    Whether they grow with row and column tells which axis to suspect if one is flipped.
+    """
+    names = _names_of(grid, _OF_GANTRIES)
+    return None if names is None else replace(_stepped(names, grid.shape), spacing_unit="mm")
+
+
+def _find_named(
+    folder: Path,
+    name: re.Pattern[str],
+    kind: str,
+    geometry_of: Callable[[ViewGrid], Geometry | None],
+    *,
+    sparse: bool,
+) -> ViewGrid | None:
+    """The grid of the pictures with such names; None if there are none.
+
+    Args:
+        folder: where the pictures are; others are left alone.
+        name: of a file without its ending, begins with `_START`.
+        kind: what the files follow, for people.
+        geometry_of: the cameras that the names of a grid state.
+        sparse: leave None where a view is missing, instead of refusing the grid.
+
+    Raises:
+        InputError: a grid that `vcc.formats.grid.arrange` refuses, or what ``geometry_of`` does.
+    """
+    matches = {file: match for file in pictures_in(folder) if (match := name.fullmatch(file.stem))}
+    if not matches:
+        return None
+    places = [Place(int(match[2]), int(match[3]), file) for file, match in matches.items()]
+    grid = ViewGrid(kind, arrange(places, folder, sparse=sparse))
+    return replace(grid, geometry=geometry_of(grid) or Geometry())
+
+
+def _names_of(grid: ViewGrid, name: re.Pattern[str]) -> dict[tuple[int, int], re.Match[str]] | None:
+    """The names of a grid's files, taken apart; None if one of them is not such a name."""
+    matches = {place: name.fullmatch(file.stem) for place, file in grid.present.items()}
+    found = {place: match for place, match in matches.items() if match is not None}
+    return found if len(found) == len(matches) else None
+
+
+def _stepped(names: dict[tuple[int, int], re.Match[str]], shape: tuple[int, int]) -> Geometry:
+    """The spacing and the directions that positions in names state, taken as millimetres.
+
+    Args:
+        names: of the views there are, from `_names_of`.
+        shape: (rows, columns) of views.
+    """
+    where = np.full((*shape, 2), np.nan)
+    for place, match in names.items():
+        where[place] = float(match[4]), float(match[5])
+    down, right = _mean_step(where[..., 0], 0), _mean_step(where[..., 1], 1)
+    spacing = (abs(down) or abs(right), abs(right) or abs(down))  # a single row has no step down
+    return Geometry(
+        spacing=(spacing[0] * mm, spacing[1] * mm) if spacing[0] > 0 else None,
+        directions=(-1 if down < 0 else 1, -1 if right < 0 else 1),
+    )
+
+
+def _mean_step(positions: NDArray[Any], axis: int) -> float:
+    """The mean step between neighbours along an axis of a grid; 0 if it has one place only, NaN where missing."""
+    if positions.shape[axis] < 2:
+        return 0.0
+    places = np.arange(positions.shape[axis])
+    along = np.moveaxis(positions, axis, -1).reshape(-1, positions.shape[axis])
+    slopes = []
+    for line in along:
+        there = np.isfinite(line)
+        if there.sum() > 1:
+            slopes.append(float(np.polyfit(places[there], line[there], 1)[0]))
+    return float(np.mean(slopes)) if slopes else 0.0

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.base.reading import check_path
-from vcc.formats import cambridge, camera_names, hci, numbered, orders, rowcol, stanford, views_csv
+from vcc.formats import cambridge, camera_names, hci, numbered, orders, rowcol, views_csv
 from vcc.formats.grid import Geometry, ViewGrid
 from vcc.formats.orders import Order, counted_from, running_numbers
 
-_FINDERS = (hci.find, camera_names.find, stanford.find, rowcol.find)
+_FINDERS = (hci.find, camera_names.find, camera_names.find_of_gantry, rowcol.find)
 """The formats in the order in which they are tried, behind a list of views."""
 
 
@@ -116,7 +116,7 @@ def _by_names(grid: ViewGrid, folder: Path) -> Geometry:
     """The cameras that the names of views state, or ``param.txt``."""
     if grid.geometry != Geometry():
         return grid.geometry
-    for read in (camera_names.read_geometry, stanford.read_geometry):
+    for read in (camera_names.read_geometry, camera_names.geometry_of_gantry):
         named = read(grid)
         if named is not None:
             return named

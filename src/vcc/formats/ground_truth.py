@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.reading import check_path, expanded, reading
+from vcc.files.netpbm import read_pfm
 from vcc.files.npy import read_npy
-from vcc.files.pfm import read_pfm
 from vcc.formats import cambridge, containers, hci
 
 Quantity = Literal["disparity", "depth"]

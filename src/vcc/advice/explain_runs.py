@@ -1,4 +1,4 @@
-"""What an executor adds to an explanation: how long it will take, and whether it is worth it."""
+"""What a light field on disk, and an executor, add to an explanation: blocks, time, and whether it is worth it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from vcc.advice.explain_footprints import some_views
-from vcc.advice.explain_store import traced_for
+from vcc.advice.explain_footprints import seconds_from_store, some_views
 from vcc.fields.grid import Block
 from vcc.run.drive import Counted, Drive, begun
 from vcc.run.executors import Work
@@ -18,7 +17,29 @@ WORTH_IT = 0.8
 """Of the time here, which an executor must take less than to be worth its trouble."""
 
 
-def section(run: Drive, here: float | None) -> tuple[str, float | None]:
+def _traced_for(run: Drive) -> str:
+    """For which blocks rays are traced, as text."""
+    if run.need.bands > 1 and run.blocks.pixel_rows_each < run.blocks.pixel_rows:
+        return "rays are traced for the blocks that they look at"
+    return "all rays are traced once for each block"
+
+
+def of_store(run: Drive) -> tuple[str, float | None]:
+    """The section of `vcc.Camera.explain`, and the seconds expected.
+
+    Args:
+        run: of which a few views are read, to foretell the time.
+    """
+    lines = [f"  read in {run.blocks.words}", f"  {run.given.stored_bytes / 1e6:.0f} MB on disk, as packed"]
+    if run.plan.by_rays:
+        lines.append(f"  {_traced_for(run)}; the time is not foretold")
+        return "Light field on disk\n" + "\n".join(lines), None
+    seconds = seconds_from_store(run)
+    lines.append(f"  about {seconds:.2g} s expected (some views were read and timed on this machine)")
+    return "Light field on disk\n" + "\n".join(lines), seconds
+
+
+def of_executor(run: Drive, here: float | None) -> tuple[str, float | None]:
     """The section of `vcc.Camera.explain`, and the seconds expected.
 
     Args:
@@ -32,7 +53,7 @@ def section(run: Drive, here: float | None) -> tuple[str, float | None]:
     lines = [f"  {run.blocks.words}, {places} at once, {each}"]
     seconds = None
     if run.plan.by_rays:
-        lines.append(f"  {traced_for(run)}; the time is not foretold")
+        lines.append(f"  {_traced_for(run)}; the time is not foretold")
     else:
         seconds = expected_seconds(run, blocks, max(places, 1))
         lines.append(f"  about {seconds:.2g} s expected (some views were run there and timed)")
