@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from array_api_compat import array_namespace, device
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.progress import Progress, tell
 from vcc.fields.sampled import to_dtype
 from vcc.plan.protocol import Partial
@@ -41,7 +43,7 @@ def traced(core: Rays, values: Any, double: bool, beside: int, progress: Progres
     rows, columns = core.raster_shape
     halves: tuple[list[Any], list[Any]] = [], []
     rays = 0
-    for pixel in _pieces(core):
+    for pixel in pieces(core, RAYS_AT_ONCE):
         index, share = core.looked_up(pixel, core.block(pixel) ^ beside)
         inside = core.inside(index)
         rays += int(np.count_nonzero(share))
@@ -70,7 +72,7 @@ def scattered(
     channels = raster.shape[2]
     weights = np.reshape(raster, (rows * columns, channels)).astype(np.float64) * core.scale
     samples = np.zeros((channels, math.prod(core.views)))
-    for pixel in _pieces(core):
+    for pixel in pieces(core, RAYS_AT_ONCE):
         index, share = core.looked_up(pixel, core.block(pixel) ^ beside)
         inside = core.inside(index)
         for at, weight in _looked_at(core, index, share * inside):
@@ -89,9 +91,9 @@ def memory_of_rays(core: Rays) -> int:
     )  # places, slopes, indices, what is looked up
 
 
-def _pieces(core: Rays) -> Iterator[NDArray[np.int64]]:
-    """Numbers of pixels, some at a time."""
-    at_once = max(RAYS_AT_ONCE // (core.samples * core.most_cells), 1)
+def pieces(core: Rays, rays: int) -> Iterator[NDArray[np.int64]]:
+    """Numbers of pixels, as many at a time as have about so many rays."""
+    at_once = max(rays // (core.samples * core.most_cells), 1)
     total = core.raster_shape[0] * core.raster_shape[1]
     for first in range(0, total, at_once):
         yield np.arange(first, min(first + at_once, total))
@@ -110,28 +112,77 @@ def _found(core: Rays, xp: Any, samples: Any, index: Array, share: Array, workin
 
 def _looked_at(core: Rays, index: Array, share: Array) -> Iterator[tuple[NDArray[np.int64], Array]]:
     """The samples between which each ray falls, by their numbers, and what each of them adds to what it finds."""
-    nv, nu, nt, ns = core.views
+    for view in views_around(core, index):
+        for at, inside, (across, down), _ in samples_around(core, view):
+            yield at, share * (view.near[0] * view.near[1]) * across * down * inside
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ViewAround(Brief):
+    """One of the views between which rays fall.
+
+    Args:
+        number: of the view, in the order of memory.
+        near: its weight along (i, j).
+        steep: the derivatives of these weights.
+        away: (2, …), how far rays fall from it, in views (i, j).
+        place: (2, …), where they fall on its pixels (k, l), followed along the parallax.
+    """
+
+    number: NDArray[np.int64]
+    near: tuple[Array, Array]
+    steep: tuple[Array, Array]
+    away: Array
+    place: Array
+
+
+def views_around(core: Rays, index: Array) -> Iterator[ViewAround]:
+    """The views between which rays fall, or the nearest one where they are not interpolated.
+
+    Args:
+        core: by which they are looked at.
+        index: places in the light field, (…, 4).
+    """
+    nv, nu = core.views[:2]
     i, j, k, l = np.moveaxis(index, -1, 0)
-    ci, cj = np.clip(i, 0, nu - 1), np.clip(j, 0, nv - 1)
-    if core.between_views:
-        i0 = np.minimum(ci.astype(np.int64), max(nu - 2, 0))
-        j0 = np.minimum(cj.astype(np.int64), max(nv - 2, 0))
-        corners = [
-            (i0 + di, j0 + dj, np.abs(1 - di - (ci - i0)) * np.abs(1 - dj - (cj - j0)))
-            for di in range(min(nu, 2))
-            for dj in range(min(nv, 2))
-        ]
-    else:
-        corners = [((ci + 0.5).astype(np.int64), (cj + 0.5).astype(np.int64), np.ones_like(ci))]
-    for view_i, view_j, weight in corners:
-        away = np.stack([i - view_i, j - view_j])
-        moved = np.tensordot(core.motion, away, axes=1) if core.between_views else np.zeros_like(away)
-        place = np.clip(np.stack([k, l]) + moved, -1e9, 1e9)
-        first = np.floor(place).astype(np.int64)
-        part = place - first
-        for dk in range(2):
-            for dl in range(2):
-                c, r = first[0] + dk, first[1] + dl
-                w = share * weight * np.abs(1 - dk - part[0]) * np.abs(1 - dl - part[1])
-                w = w * ((c >= 0) & (c < ns) & (r >= 0) & (r < nt))
-                yield ((view_j * nu + view_i) * nt + np.clip(r, 0, nt - 1)) * ns + np.clip(c, 0, ns - 1), w
+    along_v = _along(j, nv, core.between_views)
+    for view_i, near_i, steep_i in _along(i, nu, core.between_views):
+        for view_j, near_j, steep_j in along_v:
+            away = np.stack([i - view_i, j - view_j])
+            moved = np.tensordot(core.motion, away, axes=1) if core.between_views else np.zeros_like(away)
+            place = np.clip(np.stack([k, l]) + moved, -1e9, 1e9)
+            yield ViewAround(view_j * nu + view_i, (near_i, near_j), (steep_i, steep_j), away, place)
+
+
+def _along(at: Array, number: int, between: bool) -> list[tuple[NDArray[np.int64], Array, Array]]:
+    """The views that rays lie between along one axis: (which, weight, derivative of the weight)."""
+    held = np.clip(at, 0, number - 1)
+    if not between or number == 1:
+        return [((held + 0.5).astype(np.int64), np.ones_like(at), np.zeros_like(at))]
+    first = np.minimum(held.astype(np.int64), number - 2)
+    inside = np.where((at >= 0) & (at <= number - 1), 1.0, 0.0)
+    return [(first, 1 - (held - first), -inside), (first + 1, held - first, inside)]
+
+
+Weights = tuple[Array, Array]
+
+
+def samples_around(
+    core: Rays, view: ViewAround
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.bool_], Weights, tuple[int, int]]]:
+    """The four samples of a view between which rays fall, dark outside.
+
+    Yields:
+        The sample's number, in the order of memory; whether it is one of the view's; its weights (across, down);
+        and the signs of their derivatives.
+    """
+    _, _, nt, ns = core.views
+    first = np.floor(view.place).astype(np.int64)
+    part = view.place - first
+    for dk in range(2):
+        for dl in range(2):
+            c, r = first[0] + dk, first[1] + dl
+            inside = (c >= 0) & (c < ns) & (r >= 0) & (r < nt)
+            at = (view.number * nt + np.clip(r, 0, nt - 1)) * ns + np.clip(c, 0, ns - 1)
+            weights = np.abs(1 - dk - part[0]), np.abs(1 - dl - part[1])
+            yield at, inside, weights, (2 * dk - 1, 2 * dl - 1)

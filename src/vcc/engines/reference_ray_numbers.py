@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.progress import Progress, tell
+from vcc.engines.rays import ViewAround, pieces, samples_around, views_around
 from vcc.plan.numbers import numbers
 from vcc.plan.rays import edges
 from vcc.plan.rays.aim_backwards import aim_back
 from vcc.plan.rays.backwards import Numbers, back, moved_back
-from vcc.plan.rays.bounds.windows import CellWindows
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.steps import Bundle
 
@@ -63,21 +63,12 @@ def ray_numbers_back(
     samples = values.reshape(-1, channels).astype(np.float64)
     found = {name: np.zeros_like(number) for name, number in numbers(core).items() if name in set(wanted)}
     weights = raster.reshape(-1, channels).astype(np.float64)
-    for pixel in _pieces(core):
+    for pixel in pieces(core, RAYS_AT_ONCE):
         for name, number in _of_pixels(core, samples, weights[pixel], pixel, core.block(pixel) ^ beside):
             if name in found:
                 found[name] = found[name] + number
         tell(progress, int(pixel[-1]) + 1, len(weights))
     return {name: found[name] for name in wanted}
-
-
-def _pieces(core: Rays) -> Iterator[NDArray[np.int64]]:
-    """Numbers of pixels, some at a time."""
-    cells = np.prod([2 * reach + 1 for reach in core.aim.reach]) if isinstance(core.aim, CellWindows) else 1
-    at_once = max(RAYS_AT_ONCE // (core.samples * int(cells)), 1)
-    total = core.raster_shape[0] * core.raster_shape[1]
-    for first in range(0, total, at_once):
-        yield np.arange(first, min(first + at_once, total))
 
 
 def _of_pixels(
@@ -156,54 +147,28 @@ def _found(core: Rays, samples: Array, weights: Array, index: Array, carried: Ar
         index: (…, 4), places in the light field.
         carried: what each ray carries.
     """
-    nv, nu = core.views[:2]
-    i, j, k, l = np.moveaxis(index, -1, 0)
-    value, to_index, to_motion = np.zeros_like(i), np.zeros_like(index), np.zeros((2, 2))
-    along_u, along_v = _views(i, nu, core.between_views), _views(j, nv, core.between_views)
-    for view_i, near_i, steep_i in along_u:
-        for view_j, near_j, steep_j in along_v:
-            away = np.stack([i - view_i, j - view_j])
-            moved = np.tensordot(core.motion, away, axes=1) if core.between_views else np.zeros_like(away)
-            place = np.clip(np.stack([k, l]) + moved, -1e9, 1e9)
-            here, to_k, to_l = _in_view(core, samples, weights, view_j * nu + view_i, place)
-            value += near_i * near_j * here
-            of_view = near_i * near_j * np.stack([to_k, to_l])
-            to_index[..., 0] += steep_i * near_j * here
-            to_index[..., 1] += near_i * steep_j * here
-            to_index[..., 2] += of_view[0]
-            to_index[..., 3] += of_view[1]
-            if core.between_views:
-                to_index[..., :2] += np.moveaxis(np.tensordot(core.motion.T, of_view, axes=1), 0, -1)
-                to_motion += (carried * of_view).reshape(2, -1) @ away.reshape(2, -1).T
+    value, to_index, to_motion = np.zeros(index.shape[:-1]), np.zeros_like(index), np.zeros((2, 2))
+    for view in views_around(core, index):
+        (near_i, near_j), (steep_i, steep_j) = view.near, view.steep
+        here, to_k, to_l = _in_view(core, samples, weights, view)
+        value += near_i * near_j * here
+        of_view = near_i * near_j * np.stack([to_k, to_l])
+        to_index[..., 0] += steep_i * near_j * here
+        to_index[..., 1] += near_i * steep_j * here
+        to_index[..., 2] += of_view[0]
+        to_index[..., 3] += of_view[1]
+        if core.between_views:
+            to_index[..., :2] += np.moveaxis(np.tensordot(core.motion.T, of_view, axes=1), 0, -1)
+            to_motion += (carried * of_view).reshape(2, -1) @ view.away.reshape(2, -1).T
     return _Found(value, to_index, to_motion)
 
 
-def _views(at: Array, number: int, between: bool) -> list[tuple[NDArray[np.int64], Array, Array]]:
-    """The views that rays lie between along one axis: (which, weight, derivative of the weight)."""
-    held = np.clip(at, 0, number - 1)
-    if not between or number == 1:
-        return [((held + 0.5).astype(np.int64), np.ones_like(at), np.zeros_like(at))]
-    first = np.minimum(held.astype(np.int64), number - 2)
-    inside = np.where((at >= 0) & (at <= number - 1), 1.0, 0.0)
-    return [(first, 1 - (held - first), -inside), (first + 1, held - first, inside)]
-
-
-def _in_view(
-    core: Rays, samples: Array, weights: Array, view: NDArray[np.int64], place: Array
-) -> tuple[Array, Array, Array]:
-    """What a view holds at places (k, l), dark outside, times weights, and its derivatives to both."""
-    _, _, nt, ns = core.views
-    first = np.floor(place).astype(np.int64)
-    part = place - first
-    value, to_k, to_l = (np.zeros(view.shape) for _ in range(3))
-    for dk in range(2):
-        for dl in range(2):
-            c, r = first[0] + dk, first[1] + dl
-            inside = (c >= 0) & (c < ns) & (r >= 0) & (r < nt)
-            at = (view * nt + np.clip(r, 0, nt - 1)) * ns + np.clip(c, 0, ns - 1)
-            sample = np.sum(weights * samples[at], axis=-1) * inside
-            across, down = np.abs(1 - dk - part[0]), np.abs(1 - dl - part[1])
-            value += across * down * sample
-            to_k += (2 * dk - 1) * down * sample
-            to_l += (2 * dl - 1) * across * sample
+def _in_view(core: Rays, samples: Array, weights: Array, view: ViewAround) -> tuple[Array, Array, Array]:
+    """What a view holds where rays fall, dark outside, times weights, and its derivatives to (k, l)."""
+    value, to_k, to_l = (np.zeros(view.number.shape) for _ in range(3))
+    for at, inside, (across, down), (sign_k, sign_l) in samples_around(core, view):
+        sample = np.sum(weights * samples[at], axis=-1) * inside
+        value += across * down * sample
+        to_k += sign_k * down * sample
+        to_l += sign_l * across * sample
     return value, to_k, to_l
