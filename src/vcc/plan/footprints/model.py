@@ -130,7 +130,7 @@ class Footprints(Value):
         known = numbers(self) if wanted else {}
         for name in wanted:
             if name == "sharpen_samples":
-                raise InputError("there is no derivative to sharpen_samples: the filter of samples is a choice")
+                raise InputError("there is no derivative to sharpen_samples: the filter of samples is a decision")
             if name not in known:
                 raise InputError(f"footprints have no number {name!r}: {', '.join(known)} are theirs")
             if self.interpolation == "nearest" and name in ("x", "y", "step", "opening"):
