@@ -27,6 +27,9 @@ _through_cell = device(shared.through_cell)
 _take_steps = device(shared.take_steps)
 _to_indices = device(shared.to_indices)
 _add_view = device(shared.add_view)
+_views_of_ray = device(shared.views_of_ray)
+_dark_from = device(shared.dark_from)
+_may_find_light = device(shared.may_find_light)
 
 
 @cache
@@ -95,27 +98,20 @@ def trace(channels: int, by_cell: bool) -> Any:
 def look_up(field, samples, rays, found):  # type: ignore[no-untyped-def]
     """Add what a ray finds to ``found`` (channels), as `vcc.engines.ray_kernels.add_rays` does for many."""
     _, _, index_from_ray, motion, between = field
-    _, (nv, nu, nt, ns), channels = samples
+    _, views, channels = samples
+    nv, nu, nt, ns = views
     weight = rays.share[0]
     if weight == 0:
         return
     _to_indices(index_from_ray, rays, 1)
     i, j, k, l = rays.x[0], rays.y[0], rays.s[0], rays.t[0]
-    if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
-        return
-    # So far outside the pictures all views that a ray is between are dark.
-    dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
-    dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
-    if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
+    if not _may_find_light(i, j, k, l, views, _dark_from(motion)):
         return
     picture = nt * ns * channels
-    ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
+    i0, j0, fi, fj = _views_of_ray(i, j, nu, nv, between)
     if not between:
-        base = (int64(cj + 0.5) * nu + int64(ci + 0.5)) * picture
-        _add_view(samples, base, k, l, float32(weight), found)
+        _add_view(samples, (j0 * nu + i0) * picture, k, l, float32(weight), found)
         return
-    i0, j0 = min(int64(ci), max(nu - 2, 0)), min(int64(cj), max(nv - 2, 0))
-    fi, fj = ci - i0, cj - j0
     for dj in range(2):
         for di in range(2):
             w = weight * (fj if dj == 1 else 1.0 - fj) * (fi if di == 1 else 1.0 - fi)

@@ -307,6 +307,74 @@ def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def
 
 
 @_inlined
+def corners_in_four_views(base, across, down, picture, row_of_views):  # type: ignore[no-untyped-def]
+    """Where the first of the samples around a ray stands in each of the four views that it lies between.
+
+    Args:
+        base: where the first view begins.
+        across: where its column begins in a row of samples, in the left views and in the right ones.
+        down: where its row begins, in the upper views and in the lower ones.
+        picture: values from a view to the next one in its row.
+        row_of_views: values from a row of views to the next.
+    """
+    (c0, c1), (r0, r1) = across, down
+    upper = base + r0 + c0, base + picture + r0 + c1
+    lower = base + row_of_views + r1 + c0, base + row_of_views + picture + r1 + c1
+    return upper[0], upper[1], lower[0], lower[1]
+
+
+@_inlined
+def weights_in_four_views(weight, fi, fj, parts):  # type: ignore[no-untyped-def]
+    """What two rows and two columns of samples in each of four views count for a ray, where its axes part.
+
+    Args:
+        weight: of the ray.
+        fi: how near it is to the right views, 0 to 1.
+        fj: to the lower ones.
+        parts: of a sample by which it lies beyond the first: columns (left views, right), rows (upper, lower).
+
+    Returns:
+        Rows (two of the upper views, two of the lower) and columns (two of the left, two of the right), float32.
+    """
+    one = np.float32(1)
+    (fk0, fk1), (fl0, fl1) = parts
+    fi, fj = np.float32(fi), np.float32(fj)
+    lower = np.float32(weight) * fj
+    upper = np.float32(weight) - lower
+    above, below = upper * np.float32(fl0), lower * np.float32(fl1)
+    left, right = (one - fi) * np.float32(fk0), fi * np.float32(fk1)
+    return (upper - above, above, lower - below, below), (one - fi - left, left, fi - right, right)
+
+
+@_inlined
+def views_of_ray(i, j, nu, nv, between):  # type: ignore[no-untyped-def]
+    """The first of the views that a ray lies between, (i0, j0), and how near it is to the next ones, (fi, fj).
+
+    Where views are not interpolated, the one that it lies in, and 0.
+    """
+    ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
+    if between:
+        i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
+        return i0, j0, ci - i0, cj - j0
+    return int(ci + 0.5), int(cj + 0.5), 0.0, 0.0
+
+
+@_inlined
+def dark_from(motion):  # type: ignore[no-untyped-def]
+    """How far outside the pictures, in samples (k, l), all views that a ray is between are dark."""
+    return 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1])), 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
+
+
+@_inlined
+def may_find_light(i, j, k, l, views, dark):  # type: ignore[no-untyped-def]
+    """Whether a ray meets the grid of views, and their pictures or what is less than ``dark`` beside them."""
+    nv, nu, nt, ns = views
+    if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
+        return False
+    return k > -dark[0] and k < ns - 1 + dark[0] and l > -dark[1] and l < nt - 1 + dark[1]
+
+
+@_inlined
 def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-def]
     """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
 
@@ -322,27 +390,16 @@ def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-de
     vectors = parted and (channels == 1 or channels == 3 or channels == 4)
     line, picture, row_of_views = wide * channels, high * wide * channels, nu * high * wide * channels
     last = len(values) - LANES
-    one = np.float32(1)
-    # So far outside the pictures all views that a ray is between are dark.
-    dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
-    dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
+    views, dark = (nv, nu, nt, ns), dark_from(motion)
     for p in range(n):
         weight = share[p]
         if weight == 0.0:
             continue
         half = 1 if p >= second else 0
         i, j, k, l = x[p], y[p], s[p], t[p]
-        if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
+        if not may_find_light(i, j, k, l, views, dark):
             continue
-        if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
-            continue
-        ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
-        if between:
-            i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
-            fi, fj = ci - i0, cj - j0
-        else:  # one view; there is no motion then
-            i0, j0 = int(ci + 0.5), int(cj + 0.5)
-            fi, fj = 0.0, 0.0
+        i0, j0, fi, fj = views_of_ray(i, j, nu, nv, between)  # without motion where they are not interpolated
         if vectors:
             k0, l0 = k + motion[0, 0] * (i - i0), l + motion[1, 1] * (j - j0)
             k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
@@ -353,18 +410,9 @@ def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-de
             c0, c1, r0, r1 = c0 * channels, c1 * channels, r0 * line, r1 * line
             base = j0 * row_of_views + i0 * picture
             if inside and base + row_of_views + picture + max(r0, r1) + line + max(c0, c1) <= last:
-                fi, fj = np.float32(fi), np.float32(fj)
-                fk0, fk1 = np.float32(k0 - kf0), np.float32(k1 - kf1)
-                fl0, fl1 = np.float32(l0 - lf0), np.float32(l1 - lf1)
-                lower = np.float32(weight) * fj
-                upper = np.float32(weight) - lower
-                above_1, below_1 = upper * fl0, lower * fl1
-                left_1, right_1 = (one - fi) * fk0, fi * fk1
-                upper_corners = base + r0 + c0, base + picture + r0 + c1
-                lower_corners = base + row_of_views + r1 + c0, base + row_of_views + picture + r1 + c1
-                corners = upper_corners + lower_corners
-                rows = upper - above_1, above_1, lower - below_1, below_1
-                columns = one - fi - left_1, left_1, fi - right_1, right_1
+                parts = (k0 - kf0, k1 - kf1), (l0 - lf0, l1 - lf1)
+                corners = corners_in_four_views(base, (c0, c1), (r0, r1), picture, row_of_views)
+                rows, columns = weights_in_four_views(weight, fi, fj, parts)
                 at = half * sums.shape[1]
                 if channels == 3:
                     add_views_of_3(values, corners, line, rows, columns, sums, at)

@@ -22,8 +22,10 @@ from vcc.engines.ray_kernels import (
     cell_of,
     cells_at,
     corner,
+    dark_from,
     hashed,
     kind_of,
+    may_find_light,
     middle_of,
     mixed,
     room,
@@ -33,6 +35,7 @@ from vcc.engines.ray_kernels import (
     to_indices,
     turn_to,
     unit,
+    views_of_ray,
 )
 from vcc.engines.ray_tables import Drawn, Packet, Steps
 
@@ -457,27 +460,20 @@ def image_back(images, cells, cell, sums, own, kinds):  # type: ignore[no-untype
 @_compiled
 def field_back(field, weights, n, index, lit, bar, to_motion, to_scale):  # type: ignore[no-untyped-def]
     """Fill cotangents ``bar`` (5, rays) of indices and shares of rays, by what they find in the light field."""
-    (values, (nv, nu, nt, ns), channels), _, _, motion, between = field
+    (values, views, channels), _, _, motion, between = field
+    nv, nu, nt, ns = views
     line, picture = ns * channels, nt * ns * channels
     m00, m01, m10, m11 = motion[0, 0], motion[0, 1], motion[1, 0], motion[1, 1]
-    dark_k, dark_l = 1.0 + 1.5 * (abs(m00) + abs(m01)), 1.0 + 1.5 * (abs(m10) + abs(m11))
+    dark = dark_from(motion)
     along_i, along_j = (min(nu, 2), min(nv, 2)) if between else (1, 1)
     t00 = t01 = t10 = t11 = total = 0.0
     for p in range(n):
         i, j, k, l, share = index[0, p], index[1, p], index[2, p], index[3, p], index[4, p]
         for q in range(5):
             bar[q, p] = 0.0
-        if lit[p] == 0.0 or not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
+        if lit[p] == 0.0 or not may_find_light(i, j, k, l, views, dark):
             continue
-        if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
-            continue
-        ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
-        if between:
-            i0, j0 = min(int(ci), max(nu - 2, 0)), min(int(cj), max(nv - 2, 0))
-            fi, fj = ci - i0, cj - j0
-        else:  # one view, in place
-            i0, j0 = int(ci + 0.5), int(cj + 0.5)
-            fi = fj = 0.0
+        i0, j0, fi, fj = views_of_ray(i, j, nu, nv, between)
         value = of_i = of_j = of_k = of_l = 0.0
         for dj in range(along_j):
             wj, sj, away_j = (fj, 1.0, j - j0 - 1) if dj else (1.0 - fj, -1.0, j - j0)

@@ -16,7 +16,10 @@ from vcc.engines.ray_kernels import (
     PACKET,
     at_pixel,
     cells_at,
+    corners_in_four_views,
+    dark_from,
     hashed,
+    may_find_light,
     middle_of,
     room,
     take_steps,
@@ -24,6 +27,8 @@ from vcc.engines.ray_kernels import (
     through_window,
     to_indices,
     turn_to,
+    views_of_ray,
+    weights_in_four_views,
 )
 from vcc.engines.ray_tables import Drawn
 from vcc.engines.vector_scatter import spread_views_of_1, spread_views_of_3, spread_views_of_4
@@ -39,24 +44,17 @@ def keep_rays(look, rays, n, pixel, found, filled):  # type: ignore[no-untyped-d
 
     Which do is said by `ray_kernels.add_rays`. Places are replaced by indices.
     """
-    (nv, nu, nt, ns), index_from_ray, motion, between = look
+    all_views, index_from_ray, motion, between = look
+    nv, nu, _, _ = all_views
     x, y, s, t, share = rays
     places, views = found.places, found.views
     to_indices(index_from_ray, rays, n)
-    # So far outside the pictures all views that a ray is between are dark.
-    dark_k = 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1]))
-    dark_l = 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
+    dark = dark_from(motion)
     for p in range(n):
         i, j, k, l = x[p], y[p], s[p], t[p]
-        if share[p] == 0.0 or not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
+        if share[p] == 0.0 or not may_find_light(i, j, k, l, all_views, dark):
             continue
-        if not (k > -dark_k and k < ns - 1 + dark_k and l > -dark_l and l < nt - 1 + dark_l):
-            continue
-        i, j = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
-        if between:
-            i0, j0 = min(int(i), max(nu - 2, 0)), min(int(j), max(nv - 2, 0))
-        else:
-            i0, j0 = int(i + 0.5), int(j + 0.5)
+        i0, j0, _, _ = views_of_ray(i, j, nu, nv, between)
         places[filled, 0], places[filled, 1], places[filled, 2] = x[p], y[p], k
         places[filled, 3], places[filled, 4], places[filled, 5] = l, share[p], pixel
         views[filled] = j0 * nu + i0
@@ -168,7 +166,6 @@ def spread_row(grown, weights, ordered, begin, row):  # type: ignore[no-untyped-
     parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
     vectors = parted and (channels == 1 or channels == 3 or channels == 4)
     line, picture, row_of_views = ns * channels, nt * ns * channels, nu * nt * ns * channels
-    one = np.float32(1)
     for tile in range(len(ordered)):
         places = ordered[tile]
         for column in range(nu):
@@ -194,18 +191,9 @@ def spread_row(grown, weights, ordered, begin, row):  # type: ignore[no-untyped-
                     if inside:
                         c0, c1 = int(kf0) * channels, int(kf1) * channels
                         r0, r1 = int(lf0) * line, int(lf1) * line
-                        fi, fj = np.float32(fi), np.float32(fj)
-                        fk0, fk1 = np.float32(k0 - kf0), np.float32(k1 - kf1)
-                        fl0, fl1 = np.float32(l0 - lf0), np.float32(l1 - lf1)
-                        lower = np.float32(weight) * fj
-                        upper = np.float32(weight) - lower
-                        above_1, below_1 = upper * fl0, lower * fl1
-                        left_1, right_1 = (one - fi) * fk0, fi * fk1
-                        upper_corners = base + r0 + c0, base + picture + r0 + c1
-                        lower_corners = base + row_of_views + r1 + c0, base + row_of_views + picture + r1 + c1
-                        corners = upper_corners + lower_corners
-                        rows = upper - above_1, above_1, lower - below_1, below_1
-                        columns = one - fi - left_1, left_1, fi - right_1, right_1
+                        parts = (k0 - kf0, k1 - kf1), (l0 - lf0, l1 - lf1)
+                        corners = corners_in_four_views(base, (c0, c1), (r0, r1), picture, row_of_views)
+                        rows, columns = weights_in_four_views(weight, fi, fj, parts)
                         if channels == 3:
                             spread_views_of_3(values, corners, line, rows, columns, weights, pixel)
                         elif channels == 1:
