@@ -300,6 +300,16 @@ def test_means_on_a_raster_that_is_kept_are_those_of_the_pattern(pattern):
     np.testing.assert_allclose(wide, kept, rtol=1e-9, atol=1e-12)
 
 
+def test_rectangles_too_small_and_too_far_apart_for_a_raster_are_looked_at_one_by_one():
+    """4×4 points in each: of what is smooth over a rectangle, the middle to the square of its size."""
+    pattern, size = patterns.as_pattern(hill), 1e-4
+    boxes = Boxes(np.linspace(-9, 9, 5)[None, :], np.linspace(-8, 8, 4)[:, None], size, 2 * size)
+    chosen = choose_mean(pattern, boxes)
+    assert chosen is not None
+    assert chosen.rasters is None
+    np.testing.assert_allclose(mean_over(pattern, boxes, chosen), hill(boxes.x, boxes.y), atol=10 * size**2)
+
+
 def test_rectangles_beyond_a_raster_that_is_kept_are_refused():
     x, pattern = np.linspace(-0.5, 0.5, 7)[None, :], patterns.as_pattern(hill)
     chosen = choose_mean(pattern, Boxes(x, x.T, 0.3, 0.2))

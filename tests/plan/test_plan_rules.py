@@ -28,7 +28,7 @@ from vcc.plan.footprints.diffusers import (
 )
 from vcc.plan.footprints.shares import Taps, cumulative, share_slopes, shares, weight
 from vcc.plan.how import How
-from vcc.plan.parallax_rule import index_motions
+from vcc.plan.parallax_rule import choose_between_views, index_motions
 from vcc.plan.rays.aim import _parted
 from vcc.plan.rays.bounds.cell_windows import Seen
 from vcc.plan.rays.bounds.slopes import Bound
@@ -128,6 +128,36 @@ def test_as_many_views_are_made_as_lie_a_pixel_apart(views, gap, times):
     for axis, parts in ((0, times[1]), (1, times[0]), (2, 1), (3, 1)):
         moved = field.frame(steps[axis]) - field.frame(np.zeros(4))
         np.testing.assert_allclose(made.frame(steps[axis]) - origin, moved / parts, atol=1e-15)
+
+
+def test_pixels_finer_than_samples_tell_no_more_views_apart():
+    """The scene lies two and a half samples out of focus, and the views converge elsewhere than the focus is."""
+    z, flat = 52 * mm, np.zeros((3, 3, 12, 12), np.float32)
+    focus = vcc.LightField.from_views(flat, 20 * mm, 0.01, 0.6).disparity_of(1 / (1 / (50 * mm) - 1 / z))
+    field = vcc.LightField.from_views(flat, 20 * mm, 0.01, 0.6, disparity=flat + np.float32(focus + 2.5))
+    for finer in (1, 2, 3):
+        camera = vcc.Camera([vcc.Lens(50 * mm)], vcc.Sensor(z=z, shape=(12, 12), pitch=0.01 * z / finer))
+        assert denser(camera, field.grid)[1].times == (3, 3)
+
+
+def test_gaps_are_compared_with_samples_not_with_the_steps_of_views():
+    """Samples of 1.5 pixels, and a scene that stands still in the views: gaps are their steps on the sensor."""
+    field = vcc.LightField.from_views(np.ones((3, 4, 12, 12)), 1 * mm, 0.01, 1.3, disparity_range=(0, 0))
+    for step, filled in ((4.0, True), (1.6, True), (1.4, False)):
+        found = choose_between_views(field.grid, field.frame, np.kron([step, 1.5], np.eye(2)), How())
+        wanted = (step, step) if filled else (0.0, 0.0)
+        assert found.gap_filled == pytest.approx(wanted, rel=1e-6)
+
+
+def test_without_parallax_what_is_in_focus_is_followed():
+    """Pictures that show none: no gap is known, whatever the optics do."""
+    field = vcc.LightField.from_views(np.ones((3, 4, 12, 12)), 1 * mm, 0.01, 1.3)
+    optics = np.array([[3.0, 0.2, 0.9, 0.1], [-0.1, 2.0, 0.0, 1.1]])
+    found = choose_between_views(field.grid, field.frame, optics, How())
+    np.testing.assert_allclose(found.motion, np.linalg.solve(optics[:, 2:], optics[:, :2]), rtol=1e-12)
+    assert found.gap_filled == (0.0, 0.0)
+    assert found.gap_left == pytest.approx(0, abs=1e-12)
+    assert "no parallax to measure" in found.reason
 
 
 def test_gaps_are_left_where_the_scene_lies_on_both_sides_of_the_focus():
