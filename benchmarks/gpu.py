@@ -28,7 +28,7 @@ from numba import cuda
 
 import vcc
 from vcc.engines import cuda as engine
-from vcc.engines import cuda_back, cuda_footprints, cuda_rays
+from vcc.engines import cuda_back, cuda_footprints
 from vcc.engines.cuda_arrays import SIMULATED, launch, sent, zeros
 from vcc.plan.how import How
 from vcc.run.drive import Drive
@@ -98,7 +98,7 @@ class Case:
 
     def rays(self) -> Step:
         values = self.values()
-        return lambda: cuda_rays.traced_on_gpu(self.core, values, 0)
+        return lambda: engine.traced_on_gpu(self.core, values, 0)
 
 
 def light_field(sizes: Sizes) -> vcc.LightField:
@@ -304,7 +304,7 @@ def main() -> None:
         ("rays through a mask", "rays", rays),
         ("rays through lenslets", "lenslets", lenslets),
     ):
-        traced = cuda_rays.traced(case.core, case.values(), 0).rays
+        traced = engine.traced(case.core, case.values(), 0).rays
         rate = traced / took[name] / 1e9
         line(what, took[name], f"{rate:.2f} G rays/s", "≥ 2", rate >= 2)
     if peer is None:

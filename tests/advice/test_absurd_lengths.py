@@ -8,7 +8,7 @@ import pytest
 
 import vcc
 from vcc import patterns
-from vcc.advice.absurd_lengths import light_share
+from vcc.advice.of_images import light_share
 from vcc.units import m, mm, um
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.advice import explain_runs
+from vcc.advice import explain
 from vcc.plan.how import How
 from vcc.run.drive import Drive
 from vcc.store import save_store
@@ -32,7 +32,7 @@ def test_both_times_are_told_and_which_to_take(stored):
         assert all(len(line) <= 80 for line in words.splitlines())
         run = Drive(CAMERA.compile(stored), stored, How(), pool)
         for here, verdict in ((1e-9, "leave the executor out"), (1e9, "the executor is worth it")):
-            said, seconds = explain_runs.of_executor(run, here)
+            said, seconds = explain.of_executor(run, here)
             assert said.endswith(verdict)
             assert 0 < seconds < 1e9
         rays = CAMERA.explain(stored, executor=pool, method="rays")
@@ -44,10 +44,10 @@ def test_both_times_are_told_and_which_to_take(stored):
 def test_time_is_that_of_as_many_rounds_as_there_are(stored, monkeypatch):
     """Counted by hand: 10 blocks of which 4 run at once take 3 rounds; a clock that ticks when it is looked at."""
     ticks = iter(range(100))
-    monkeypatch.setattr(explain_runs.time, "perf_counter", lambda: float(next(ticks)))
-    monkeypatch.setattr(explain_runs, "_ask", lambda run, blocks, first=False: [0.25])
+    monkeypatch.setattr(explain.time, "perf_counter", lambda: float(next(ticks)))
+    monkeypatch.setattr(explain, "_ask", lambda run, blocks, first=False: [0.25])
     with ThreadPoolExecutor(4) as pool:
         run = Drive(CAMERA.compile(stored), stored, How(), pool)
-        _, share = explain_runs.some_views(run)
-        found = explain_runs.expected_seconds(run, 10, 4)
+        _, share = explain.some_views(run)
+        found = explain.expected_seconds(run, 10, 4)
     assert found == pytest.approx(1 + 3 * (0.25 / share / 10 + 0.75))

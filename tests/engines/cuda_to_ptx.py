@@ -77,7 +77,6 @@ def main() -> None:
         setattr(cuda_arrays, name, function)
     from tests.engines.test_agreement import LENS, field, samples, turned
     from vcc.engines import cuda as engine
-    from vcc.engines import cuda_sharpening
 
     values = samples((2, 2, 4, 4, 3), "uint8")
     mask = vcc.Mask(np.eye(3), width=6 * mm, z=20 * mm)
@@ -100,8 +99,8 @@ def main() -> None:
         compiled(cuda_arrays._arrange, None, 0, plain, True, values)
     compiled(cuda_arrays._set_to_zero, None, 0, np.zeros(1, np.float32))
     sharpen = SharpenViews.of("mean")
-    cuda_sharpening.sharpened(sharpen, values)
-    cuda_sharpening.sharpened(sharpen, samples((2, 2, 4, 4, 3)))
+    engine.sharpened(sharpen, values)
+    engine.sharpened(sharpen, samples((2, 2, 4, 4, 3)))
     for (kernel, _), text in made.items():
         room = re.findall(r"__local_depot\d+\[(\d+)\]", text)
         print(kernel.py_func.__module__.rsplit(".", 1)[1], kernel.py_func.__qualname__, "local memory", room)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import vcc
+from vcc.cli.decode_lenslets import _listed
 from vcc.cli.info import describe
-from vcc.cli.lenslet_centres import _listed
 from vcc.files.pictures import read_grey
 from vcc.formats import read_ground_truth, read_lytro
 from vcc.motion import load_moving_camera

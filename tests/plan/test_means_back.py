@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from vcc.base.units import mm
-from vcc.plan.footprints.means import Boxes, choose_mean, mean_over
-from vcc.plan.footprints.means_back import mean_back
+from vcc.plan.footprints.means import Boxes, choose_mean, mean_back, mean_over
 from vcc.shapes.mean_back import holds
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, as_pattern
 from vcc.shapes.sheets import Product, Shifted, in_one_plane

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
+import time
+from collections.abc import Sequence
 from typing import Any
 
-from vcc.advice import explain_footprints, explain_rays, explain_runs
+from vcc.advice import explain_footprints, explain_rays
+from vcc.advice.explain_footprints import seconds_from_store, some_views
 from vcc.advice.limits import sampling_limits
 from vcc.advice.words import in_words
 from vcc.base.showing import Shown
-from vcc.fields.grid import SAMPLES_IN_WORDS, Grid
+from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid
 from vcc.fields.samples import Samples
 from vcc.optics.train import Train
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.parallax_rule import vergences
-from vcc.run.drive import Drive
+from vcc.run.drive import Counted, Drive, begun
+from vcc.run.executors import Work
 from vcc.run.needed import needed
+from vcc.run.sent import Sent
 
 COLUMNS = 80
 """Into which an explanation's lines fit, but for words that are longer."""
@@ -56,11 +62,11 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: An
     limits = _limits(train, samples.grid, how.scene_distance)
     text = wrapped("\n\n".join([_what(train, samples.grid), made, limits, *parts]))
     if samples.whole() is None:
-        more, seconds = explain_runs.of_store(Drive(*needed(plan, samples), how))
+        more, seconds = of_store(Drive(*needed(plan, samples), how))
         text = f"{text}\n\n{more}"
     by_executor = None
     if executor is not None:
-        more, by_executor = explain_runs.of_executor(Drive(*needed(plan, samples), how, executor), seconds)
+        more, by_executor = of_executor(Drive(*needed(plan, samples), how, executor), seconds)
         text = f"{text}\n\n{wrapped(more)}"
     result = Explanation(text)
     result.plan, result.expected_seconds, result.expected_seconds_by_executor = plan, seconds, by_executor
@@ -98,3 +104,89 @@ def _limits(train: Train, grid: Grid, scene_distance: float | None) -> str:
     shown = vergences(grid, scene_distance)
     scene = None if shown is None else (float(shown.min()), float(shown.max()))
     return "What the samples can carry\n" + in_words(sampling_limits(train, grid, scene))
+
+
+# --- what a light field on disk, and an executor, add: blocks, time, whether it is worth it ---
+
+
+WORTH_IT = 0.8
+"""Of the time here, which an executor must take less than to be worth its trouble."""
+
+
+def _traced_for(run: Drive) -> str:
+    """For which blocks rays are traced, as text."""
+    if run.need.bands > 1 and run.blocks.pixel_rows_each < run.blocks.pixel_rows:
+        return "rays are traced for the blocks that they look at"
+    return "all rays are traced once for each block"
+
+
+def of_store(run: Drive) -> tuple[str, float | None]:
+    """The section of `vcc.Camera.explain`, and the seconds expected.
+
+    Args:
+        run: of which a few views are read, to foretell the time.
+    """
+    lines = [f"  read in {run.blocks.words}", f"  {run.given.stored_bytes / 1e6:.0f} MB on disk, as packed"]
+    if run.plan.by_rays:
+        lines.append(f"  {_traced_for(run)}; the time is not foretold")
+        return "Light field on disk\n" + "\n".join(lines), None
+    seconds = seconds_from_store(run)
+    lines.append(f"  about {seconds:.2g} s expected (some views were read and timed on this machine)")
+    return "Light field on disk\n" + "\n".join(lines), seconds
+
+
+def of_executor(run: Drive, here: float | None) -> tuple[str, float | None]:
+    """The section of `vcc.Camera.explain`, and the seconds expected.
+
+    Args:
+        run: by an executor, which runs a few views to foretell the time.
+        here: seconds that all takes without it; None where that is not foretold.
+    """
+    assert run.crew is not None
+    blocks, places = len(list(run.blocks)), run.crew.places
+    threads = run.sent.how.workers
+    each = f"each by {threads} thread{'' if threads == 1 else 's'} and within {run.limit / 1e6:.0f} MB"
+    lines = [f"  {run.blocks.words}, {places} at once, {each}"]
+    seconds = None
+    if run.plan.by_rays:
+        lines.append(f"  {_traced_for(run)}; the time is not foretold")
+    else:
+        seconds = expected_seconds(run, blocks, max(places, 1))
+        lines.append(f"  about {seconds:.2g} s expected (some views were run there and timed)")
+        if here is not None:
+            worth = "the executor is worth it" if seconds < WORTH_IT * here else "leave the executor out"
+            lines.append(f"  about {here:.2g} s without it, by all cores of this machine: {worth}")
+    return "Run by an executor\n" + "\n".join(lines), seconds
+
+
+def expected_seconds(run: Drive, blocks: int, places: int) -> float:
+    """How long an executor will take: it begins, runs some views and gives a raster back, and each is timed.
+
+    Args:
+        run: by the executor.
+        blocks: how many there are.
+        places: how many run at once.
+    """
+    block, share = some_views(run)
+    began = time.perf_counter()
+    _ask(run, [block], first=True)
+    beginning = time.perf_counter() - began
+    asked = time.perf_counter()
+    (running,) = _ask(run, [block])
+    asking = max(time.perf_counter() - asked - running, 0.0)
+    rounds = math.ceil(blocks / places)
+    return beginning + rounds * (running / share / blocks + asking)
+
+
+def _ask(run: Drive, blocks: Sequence[Block], first: bool = False) -> list[float]:
+    assert run.crew is not None
+    work = Work(_seconds, run.sent, first=begun if first else None)
+    return [result[0] for _, result in run.crew.each(work, blocks)]
+
+
+def _seconds(sent: Sent, block: Block) -> tuple[float, Any]:
+    """How long a block takes where this runs, and its raster, so that it is sent."""
+    drive = Drive(sent.plan, sent.samples, sent.how)
+    start = time.perf_counter()
+    part = drive.part(block, 0, Counted(None, 0))
+    return time.perf_counter() - start, part

@@ -1,9 +1,13 @@
 """``vcc convert``: a light field into a store, or into files of another format."""
 
+from __future__ import annotations
+
 import dataclasses
+import re
 import warnings
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,8 +15,9 @@ from cyclopts import Group, Parameter
 
 from vcc import __version__
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.reading import check_path, expanded
+from vcc.base.words import first_few
 from vcc.cli.console import free_output, progress, show
-from vcc.cli.numbered_frames import numbered_frames
 from vcc.cli.options import (
     Arrangement,
     FileKind,
@@ -210,3 +215,52 @@ def _provenance(source: Path, assumed: list[str]) -> dict[str, Any]:
         "converted_at": datetime.now(UTC).isoformat(timespec="seconds"),
         "assumed": assumed,
     }
+
+
+# --- the light fields of a folder that are frames of a video, in the order of the numbers in their names ---
+
+
+_NUMBERED = re.compile(r"(.*?)([0-9]+)((?:\.[A-Za-z]\w*)*)")
+
+
+def numbered_frames(folder: Path) -> list[Path]:
+    """The folders and files whose names differ in a number alone, ``frame_0001``, by that number.
+
+    Args:
+        folder: that holds them; what has no number in its name is passed over.
+
+    Raises:
+        InputError: no folder, nothing numbered in it, several kinds of names, or numbers that are missing or there
+            twice.
+    """
+    folder = expanded(folder)
+    if not check_path(folder, "folder of frames"):
+        raise InputError(
+            f"{folder} is a file: --frame-rate is for a folder that holds a light field for each frame"
+        )
+    kinds: dict[tuple[str, str], dict[int, Path]] = {}
+    for path in sorted(folder.iterdir()):
+        match = None if path.name.startswith(".") else _NUMBERED.fullmatch(path.name)
+        if match is None:
+            continue
+        same = kinds.setdefault((match[1], match[3]), {})
+        other = same.setdefault(int(match[2]), path)
+        if other is not path:
+            raise InputError(f"{other} and {path.name} are both frame {int(match[2])}: take one of them away")
+    if len(kinds) != 1:
+        named = [next(iter(same.values())).name for same in kinds.values()]
+        found = (
+            f"several kinds of numbered names, {first_few(named, len(named), 4)}" if named else "nothing numbered"
+        )
+        raise InputError(
+            f"{folder} holds {found}: the frames of a video are folders or files of one kind, frame_0001, "
+            "frame_0002, …"
+        )
+    frames = next(iter(kinds.values()))
+    for before, after in pairwise(sorted(frames)):
+        if after != before + 1:
+            raise InputError(
+                f"{folder}: frame {before + 1} is missing between {frames[before].name} and {frames[after].name}. "
+                "Frames at times of their own are appended from Python, by vcc.store.create_video"
+            )
+    return [frames[number] for number in sorted(frames)]

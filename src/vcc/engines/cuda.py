@@ -11,6 +11,7 @@ Loading this module is refused where there is no GPU, with what to do.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from functools import partial
 from typing import Any
@@ -19,10 +20,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
-from vcc.engines import cuda_arrays, cuda_back, cuda_footprints, cuda_rays, cuda_sharpening, numba_cpu
+from vcc.base.progress import Progress, tell
+from vcc.engines import cuda_arrays, cuda_back, cuda_footprints, numba_cpu
+from vcc.engines import cuda_ray_kernels as kernels
+from vcc.engines.cuda_arrays import (
+    LastUsed,
+    arranged,
+    brought,
+    cuda,
+    float32,
+    given_back,
+    int32,
+    launch,
+    sent_all,
+    taken,
+)
+from vcc.engines.rays_compiled import given, looked_up_as
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
+from vcc.plan.operators import KEPT_DIGITS, REACH, WEIGHT_DIGITS, SharpenViews
 from vcc.plan.protocol import Gradient, Partial
 from vcc.plan.rays.model import Rays
 
@@ -44,7 +60,7 @@ def run(
     """The raster of samples (v, u, t, s[, channels]), float32; see `vcc.plan.protocol.Engine`."""
     with cuda_arrays.in_turn_with(values):
         if isinstance(core, Rays):
-            return cuda_rays.traced(core, values, beside, progress)
+            return traced(core, values, beside, progress)
         return Partial(cuda_footprints.raster_of(core, values, progress, threads))
 
 
@@ -94,7 +110,7 @@ def prepared(
         elif isinstance(operator, operators.SwapPixelAxes):
             values = cuda_arrays.swapped(values)
         elif isinstance(operator, operators.SharpenViews):
-            values = cuda_sharpening.sharpened(operator, values)
+            values = sharpened(operator, values)
         else:
             raise InputError(
                 f"this picture begins with {type(operator).__name__}, which engine 'cuda' does not do with "
@@ -117,3 +133,103 @@ def finished(after: Sequence[operators.After], raster: Any, threads: int) -> Any
 def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
     """Bytes of main memory that a run takes beside the samples and the raster, estimated: two pinned pieces."""
     return 2 * cuda_footprints.SENT_AT_ONCE
+
+
+# --- rays ---
+
+
+def traced(core: Rays, values: Any, beside: int, progress: Progress | None = None) -> Partial:
+    """The raster by one round of rays, in the library of the samples.
+
+    Args:
+        core: what is traced.
+        values: samples (v, u, t, s[, channels]), of NumPy (which are sent as a whole) or on the GPU.
+        beside: 0, or 1 for the blocks of points beside those of the first round.
+        progress: called with (done, total).
+    """
+    tell(progress, 0, 1)
+    pictures, of_columns = traced_on_gpu(core, values, beside)
+    rays = int(brought(of_columns).sum())
+    tell(progress, 1, 1)
+    return Partial(given_back(pictures[0], values), given_back(pictures[1], values), rays, core.samples)
+
+
+def traced_on_gpu(core: Rays, values: Any, beside: int) -> tuple[Any, Any]:
+    """The pictures of `vcc.engines.ray_kernels.add_pixels`, and the rays of each column of pixels, on the GPU."""
+    there = arranged(taken(cuda_arrays.resident(values)))
+    rows, columns = core.raster_shape
+    channels = there.shape[4]
+    field = looked_up_as(core, there.reshape(math.prod(there.shape)), channels)
+    sensor, points, aim, steps = _last_used.of(core)
+    pictures = cuda.device_array((2, rows, columns, channels), np.float32)
+    tallies, of_columns = cuda.device_array((rows, columns), np.int64), cuda.device_array(columns, np.int64)
+    tables = sent_all(field), sensor, points._replace(beside=beside), aim, steps
+    launch(kernels.trace(channels, bool(aim.by_cell)), (columns, rows), 0, *tables, pictures, tallies)
+    halves = pictures.reshape(2, rows * columns * channels)
+    launch(kernels.put_together, halves.shape[1:], 0, halves)
+    launch(kernels.count, (columns,), 0, tallies, of_columns)
+    return pictures, of_columns
+
+
+_last_used = LastUsed(lambda core: tuple(map(sent_all, given(core, 0))))
+
+
+# --- views sharpened, for samples that are kept there; see `vcc.plan.operators.SharpenViews` ---
+
+LEFT = 2 * WEIGHT_DIGITS - KEPT_DIGITS
+"""Binary digits by which sums of whole numbers are rounded off."""
+
+
+def sharpened(operator: SharpenViews, values: Any) -> Any:
+    """Samples (v, u, t, s[, channels]), Numba's, sharpened: 8 bits as whole numbers of 16 bits, exactly; else
+    float32."""
+    there = arranged(values)
+    nv, nu, nt, ns, channels = there.shape
+    exact = there.dtype == np.uint8
+    made = cuda.device_array(there.shape, np.int16 if exact else np.float32)
+    launch(_exactly if exact else _in_floats, (ns * channels, nt, nv * nu), 0, there, operator.weights, made)
+    return made.reshape(tuple(values.shape))
+
+
+@cuda.jit
+def _exactly(values, weights, made):  # type: ignore[no-untyped-def]
+    """made = values filtered by whole numbers along k and along l, rounded once; beyond borders the last ones go
+    on."""
+    x, y, z = cuda.grid(3)
+    wide, high, deep = cuda.gridsize(3)
+    nv, nu, nt, ns, channels = values.shape
+    for view in range(z, nv * nu, deep):
+        v, u = view // nu, view % nu
+        for l in range(y, nt, high):
+            for n in range(x, ns * channels, wide):
+                k, c = n // channels, n % channels
+                total = int32(1 << (LEFT - 1))
+                for down in range(-REACH, REACH + 1):
+                    row, line = min(max(l + down, 0), nt - 1), int32(0)
+                    for across in range(-REACH, REACH + 1):
+                        at = min(max(k + across, 0), ns - 1)
+                        line += weights[abs(across)] * int32(values[v, u, row, at, c])
+                    total += weights[abs(down)] * line
+                made[v, u, l, k, c] = total >> LEFT
+
+
+@cuda.jit
+def _in_floats(values, weights, made):  # type: ignore[no-untyped-def]
+    """The same in single precision, not rounded."""
+    x, y, z = cuda.grid(3)
+    wide, high, deep = cuda.gridsize(3)
+    nv, nu, nt, ns, channels = values.shape
+    one = float32(2.0**-WEIGHT_DIGITS)
+    for view in range(z, nv * nu, deep):
+        v, u = view // nu, view % nu
+        for l in range(y, nt, high):
+            for n in range(x, ns * channels, wide):
+                k, c = n // channels, n % channels
+                total = float32(0)
+                for down in range(-REACH, REACH + 1):
+                    row, line = min(max(l + down, 0), nt - 1), float32(0)
+                    for across in range(-REACH, REACH + 1):
+                        at = min(max(k + across, 0), ns - 1)
+                        line += weights[abs(across)] * one * float32(values[v, u, row, at, c])
+                    total += weights[abs(down)] * one * line
+                made[v, u, l, k, c] = total

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.engines.cuda_arrays import cuda, float32, int32, uint32
+from vcc.engines.interpolation import dark_outside, three_around
 from vcc.engines.numba_kernels import farthest, share_at
-from vcc.engines.splines import dark_outside, three_around
 
 ROWS = 4
 """Rows of the raster that a thread sums at once."""
@@ -183,7 +183,7 @@ def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
 
 @cuda.jit(device=True)
 def mask_at(masks, m, b, a, l, k):  # type: ignore[no-untyped-def]
-    """What mask m lets pass at sample (k, l) of view tap (b, a); see `vcc.engines.splines.three_around`."""
+    """What mask m lets pass at sample (k, l) of view tap (b, a); see `vcc.engines.interpolation.three_around`."""
     width = uint32(masks.width)
     line, off, half = uint32(masks.begin[m, b, a] + masks.near[m, b, a, l]), masks.off[m, b, a, l], float32(0.5)
     at = np.uint64(line * width) + np.uint64(k)

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from vcc.engines.bilinear import around, bilinear
 from vcc.engines.compiled import compiled
+from vcc.engines.interpolation import around, bilinear
 
 _compiled = compiled(fastmath={"contract", "nsz"})
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from vcc.engines.compiled import compiled
 from vcc.engines.footprint_tables import EntryMasks
+from vcc.engines.interpolation import dark_outside
 from vcc.engines.numba_kernels import farthest, masks_at, share_at
-from vcc.engines.splines import dark_outside
 from vcc.engines.vector_sums import EIGHT, mix_eight
 
 # Sums may be reordered so that they vectorise; NaN and infinity keep their meaning.

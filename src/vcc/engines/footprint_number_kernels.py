@@ -12,8 +12,8 @@ import numpy as np
 
 from vcc.engines.compiled import compiled
 from vcc.engines.footprint_tables import EntryMasks
+from vcc.engines.interpolation import slopes_around
 from vcc.engines.numba_kernels import columns_around, divide, farthest, masks_at, share_at
-from vcc.engines.splines import slopes_around
 from vcc.engines.vector_rows import (
     first_four_rows,
     four_dots,

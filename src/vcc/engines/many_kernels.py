@@ -11,8 +11,8 @@ import numpy as np
 
 from vcc.engines.compiled import compiled
 from vcc.engines.footprint_tables import Entries, EntryMasks
+from vcc.engines.interpolation import three_around
 from vcc.engines.numba_kernels import masks_at, mix_columns, rows_of, sort_by_range
-from vcc.engines.splines import three_around
 from vcc.engines.vector_sums import (
     EIGHT,
     LANES,

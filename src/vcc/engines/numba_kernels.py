@@ -10,7 +10,7 @@ import numpy as np
 
 from vcc.engines.compiled import compiled
 from vcc.engines.footprint_tables import Entries, EntryMasks, Lines
-from vcc.engines.splines import dark_outside, three_around
+from vcc.engines.interpolation import dark_outside, three_around
 from vcc.engines.vector_sums import (
     EIGHT,
     ROWS,

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from vcc.engines.bilinear import around, bilinear
 from vcc.engines.compiled import compiled
+from vcc.engines.interpolation import around, bilinear
 from vcc.engines.ray_tables import Drawn, Packet
 from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add_views_of_4
 from vcc.plan.rays.points import DIGITS

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from vcc.engines.bilinear import around
 from vcc.engines.compiled import compiled
+from vcc.engines.interpolation import around
 from vcc.engines.ray_kernels import (
     DIGITS_BELOW,
     PACKET,

@@ -31,7 +31,7 @@ from vcc.engines.ray_kernels import (
     weights_in_four_views,
 )
 from vcc.engines.ray_tables import Drawn
-from vcc.engines.vector_scatter import spread_views_of_1, spread_views_of_3, spread_views_of_4
+from vcc.engines.vector_gather import spread_views_of_1, spread_views_of_3, spread_views_of_4
 
 _compiled = compiled(borrowing=True, fastmath={"contract", "nsz"})
 _inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")

@@ -103,3 +103,79 @@ def _add_views(channels: int) -> Any:
 add_views_of_1 = _add_views(1)
 add_views_of_3 = _add_views(3)
 add_views_of_4 = _add_views(4)
+
+
+# --- the other way: handing what a ray carries to samples of four views ---
+
+
+def _spread_views(channels: int) -> Any:
+    """The intrinsic for a number of channels: what four views hold += weights of a pixel's values, shared out."""
+    lanes = 2 * channels
+
+    @intrinsic
+    def spread_views(typing_context, values, corners, line, rows, columns, weights, pixel):  # type: ignore[no-untyped-def]
+        """Add to two by two pixels of two by two views what they add to a pixel's value.
+
+        Nothing else is written: other threads may work on samples beside these.
+
+        Args:
+            typing_context: Numba's.
+            values: flat float32 or float64, to be added to.
+            corners: (4,) where the upper left pixel of the upper left view begins, of the upper right, the lower
+                left and the lower right view.
+            line: samples in a row of pixels.
+            rows: (4,) float32, weights of the upper and the lower row of pixels in the upper views, and in the
+                lower views.
+            columns: (4,) float32, weights of the left and the right column of pixels in the left views, and in the
+                right views.
+            weights: flat float32.
+            pixel: where in ``weights`` the pixel's begin, one for each channel.
+        """
+        place, four = types.int64, types.UniTuple(types.float32, 4)
+        signature = types.void(values, types.UniTuple(place, 4), place, four, four, weights, place)
+
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+            given = context.make_array(signature.args[5])(context, builder, arguments[5]).data
+            corners, rows, columns = (cgutils.unpack_tuple(builder, arguments[n]) for n in (1, 3, 4))
+            line, pixel = arguments[2], arguments[6]
+            number = ir.IntType(32)
+            wide = ir.VectorType(ir.FloatType(), lanes)
+            kept = ir.VectorType(context.get_value_type(values.dtype), lanes)
+
+            def lined_up(scalars: list[Any]) -> Any:
+                vector = ir.Constant(wide, ir.Undefined)
+                for lane, scalar in enumerate(scalars):
+                    vector = builder.insert_element(vector, scalar, ir.Constant(number, lane))
+                return vector
+
+            carried = [
+                builder.load(builder.gep(given, [builder.add(pixel, ir.Constant(pixel.type, channel))]))
+                for channel in range(channels)
+            ]
+            both = lined_up(carried + carried)
+
+            def add_at(offset: Any, share: Any) -> None:
+                to = builder.bitcast(builder.gep(data, [offset]), kept.as_pointer())
+                share = builder.fpext(share, kept) if values.dtype.bitwidth == 64 else share
+                total = builder.fadd(builder.load(to, align=values.dtype.bitwidth // 8), share, flags=["contract"])
+                builder.store(total, to, align=values.dtype.bitwidth // 8)
+
+            for column in range(2):
+                left, right = columns[2 * column : 2 * column + 2]
+                across = builder.fmul(lined_up([left] * channels + [right] * channels), both)
+                for row in range(2):
+                    above = corners[2 * row + column]
+                    upper, lower = (lined_up([weight] * lanes) for weight in rows[2 * row : 2 * row + 2])
+                    add_at(above, builder.fmul(upper, across, flags=["contract"]))
+                    add_at(builder.add(above, line), builder.fmul(lower, across, flags=["contract"]))
+            return context.get_dummy_value()
+
+        return signature, generate
+
+    return spread_views
+
+
+spread_views_of_1 = _spread_views(1)
+spread_views_of_3 = _spread_views(3)
+spread_views_of_4 = _spread_views(4)

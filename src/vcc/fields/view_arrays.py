@@ -6,8 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcc.base.errors import InputError, warn_of_result
+from vcc.fields.grid import Block
+from vcc.fields.sampled import to_numpy
+from vcc.fields.samples import Samples
 
 NARROWEST = 16
 """Pixels: an array (n, a, b, 3) with a and b of at least so many is more likely n pictures in colour."""
@@ -79,3 +83,33 @@ def warn_of_codes(values: Any) -> None:
         "codes are: taken as radiance, pictures are up to 255 times as bright. Divide by 255, or give uint8, "
         "which is taken as fractions of 255"
     )
+
+
+# --- the samples of a light field, in memory or not, as NumPy arrays: what is written to files ---
+
+
+def all_samples(light_field: Samples) -> NDArray[Any]:
+    """All samples, (v, u, t, s[, channels]), read now where they are not in memory.
+
+    Raises:
+        InputError: what reading them refuses.
+    """
+    whole = light_field.whole()
+    return to_numpy(light_field.read(Block.all_of(light_field.grid.shape)) if whole is None else whole)
+
+
+def one_view(light_field: Samples, row: int, column: int) -> NDArray[Any]:
+    """The samples of one view, (t, s[, channels]); nothing else is read.
+
+    Args:
+        light_field: whose.
+        row: of views, 0 at the top.
+        column: of views, 0 at the left.
+
+    Raises:
+        InputError: what reading them refuses.
+    """
+    height, width = light_field.grid.shape[2:4]
+    view = Block((row, row + 1), (column, column + 1), (0, height), (0, width))
+    samples: NDArray[Any] = to_numpy(light_field.read(view))[0, 0]
+    return samples

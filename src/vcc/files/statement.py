@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.base.fingerprint import Untold, fingerprint
 from vcc.base.reading import check_file, shown
+from vcc.base.values import Untold, fingerprint
 from vcc.base.version import VERSION
 from vcc.files import npy
 from vcc.optics.train import Train

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.fields.arrays import all_samples
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
+from vcc.fields.view_arrays import all_samples
 from vcc.files.atomic import atomic_path
 from vcc.files.claims import LIGHT_FIELD, check_claim
 from vcc.files.npy import read_npy

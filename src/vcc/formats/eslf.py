@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.fields.arrays import all_samples
 from vcc.fields.samples import Samples
+from vcc.fields.view_arrays import all_samples
 from vcc.files import transfer as curves
 from vcc.files.atomic import atomic_path
 from vcc.files.pictures import read_picture, read_stored, write_codes

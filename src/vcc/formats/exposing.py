@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.fields.arrays import one_view
 from vcc.fields.samples import Samples
+from vcc.fields.view_arrays import one_view
 from vcc.files import transfer
 from vcc.files.pictures import Exposure, auto_exposure, checked_exposure
 

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.fields.arrays import all_samples
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
+from vcc.fields.view_arrays import all_samples
 from vcc.files.atomic import atomic_path
 from vcc.formats import hdf5, hdf5_reading
 from vcc.formats.grid import Decoded, Geometry, weights_apart

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vcc.advice.explain import explained
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.fingerprint import Untold, fingerprint
+from vcc.base.values import Untold, fingerprint
 from vcc.engines import abilities, chosen
 from vcc.fields.grid import Grid
 from vcc.fields.samples import InMemory, Samples

@@ -1,6 +1,5 @@
 """Optical elements: each a frozen dataclass with parameters and one method, `faces`."""
 
-from vcc.optics.biprism import Biprism, Pyramid
 from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection, SlopeFunction
 from vcc.optics.diffuser import CodedDiffuser, Diffuser
 from vcc.optics.faces import Element, Faces, Part
@@ -9,7 +8,7 @@ from vcc.optics.lens import Lens
 from vcc.optics.lens_array import LensArray, PrismArray
 from vcc.optics.mask import Mask
 from vcc.optics.phase_plate import PhasePlate, SurfaceDeflection
-from vcc.optics.prism import Prism
+from vcc.optics.prisms import Biprism, Prism, Pyramid
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.shapes.lattice import Lattice
 

@@ -25,9 +25,11 @@ from vcc.plan.rays.compile import steps_met
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.path import Path, mixes_axes
 from vcc.plan.rays.points import table
+from vcc.plan.rays.steps import Move
 from vcc.shapes.patterns import Cells
 
 Array = NDArray[np.float64]
+Held = NDArray[np.bool_]
 
 RAYS = 2**16
 """Evenly spread over the sensor and over what bounds the light: shares are right to 0.1 %."""
@@ -114,7 +116,7 @@ class AskedLight(Brief):
         """What of it the light field lacks."""
         if self.aimed is None or self._bounds_are_held():
             return Missing(0.0, "")
-        (_, share), (in_views, in_pictures) = self._traced, self._held
+        share, in_views, in_pictures = self._traced
         share = share * in_views if self.by_views else share
         amounts = np.array([share.sum(), share[in_views].sum(), share[in_views & in_pictures].sum()])
         return Missing.of(amounts, self._stop)
@@ -128,7 +130,7 @@ class AskedLight(Brief):
         """
         if self.aimed is None or self._bounds_are_held():
             return [Missing(0.0, "")] * len(cells)
-        (_, share), (in_views, in_pictures) = self._traced, self._held
+        share, in_views, in_pictures = self._traced
         element = self.path.train.elements[number]
         leg = next(leg for leg in self.path.legs if leg.stage.element is element)
         x, y = leg.from_sensor(self._rays)[:, :2].T - np.array(element.decentre)[:, None]
@@ -172,10 +174,18 @@ class AskedLight(Brief):
 
     @property
     @cached
-    def _traced(self) -> tuple[Array, Array]:
-        """Indices (i, j, k, l) of the light field that rays come from, (n, 4), and what passes of each, (n,)."""
-        index, share = self._core.looked_up(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
-        return index.reshape(-1, 4), share.reshape(-1)
+    def _traced(self) -> tuple[Array, Held, Held]:
+        """What passes of each ray, and whether it comes from within the grid of views, and within the pictures."""
+        rays = self._core.traced(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
+        Move(self._core.index_from_ray)(rays)
+        within = [
+            (np.abs(index - (size - 1) / 2) <= size / 2 + BORDER).ravel()
+            for index, size in zip((rays.x, rays.y, rays.s, rays.t), self.path.size, strict=True)
+        ]
+        in_pictures = within[2] & within[3]
+        if not self.path.index_from_sensor.matrix[:2, 2:4].any():  # a pixel sees one view, whatever it shows
+            in_pictures = np.ones_like(in_pictures)
+        return rays.share.ravel(), within[0] & within[1], in_pictures
 
     @property
     @cached
@@ -183,17 +193,6 @@ class AskedLight(Brief):
         """The rays on the sensor, (n, 4) of (x, y, s, t)."""
         rays, _ = self._core.aimed(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
         return np.stack([each.ravel() for each in np.broadcast_arrays(rays.x, rays.y, rays.s, rays.t)], axis=-1)
-
-    @property
-    @cached
-    def _held(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Which rays fall into the grid of views, and which into the views' pictures."""
-        index, size = self._traced[0], self.path.size
-        inside = np.abs(index - (size - 1) / 2) <= size / 2 + BORDER
-        in_views, in_pictures = (np.asarray(inside[:, some].all(axis=1)) for some in (slice(2), slice(2, 4)))
-        if not self.path.index_from_sensor.matrix[:2, 2:4].any():  # a pixel sees one view, whatever it shows
-            in_pictures = np.ones_like(in_pictures)
-        return in_views, in_pictures
 
     def _bounds_are_held(self) -> bool:
         """Whether the light field holds all light, by bounds of it that are quickly found."""

@@ -4,7 +4,6 @@ stacks, deblurring, decoding of plenoptic and mask-modulated recordings, depth.
 
 from __future__ import annotations
 
-from vcc.recover.aberration import without_aberration
 from vcc.recover.blur import blurred
 from vcc.recover.deblur import Deblurred, richardson_lucy, sparse_gradients, wiener
 from vcc.recover.decoding import Decoder
@@ -14,6 +13,7 @@ from vcc.recover.focal_stack import AllInFocus, FocalStack, focal_stack, focus_d
 from vcc.recover.heterodyne import HeterodyneGeometry, decode_heterodyne, heterodyne_calibration
 from vcc.recover.heterodyne_band import band_limited, true_views
 from vcc.recover.lenslet_grid import LensletGrid
+from vcc.recover.lenslet_optics import without_aberration
 from vcc.recover.plenoptic import decode_plenoptic
 from vcc.recover.refocus import ideal_camera, novel_view, refocused
 from vcc.recover.stereo import BiprismStereo, StereoDepth, depth_by_biprism

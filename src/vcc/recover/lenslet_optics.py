@@ -8,8 +8,11 @@ import numpy as np
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.fields.sampled import to_numpy
+from vcc.light_field import LightField
 from vcc.optics import LensArray
 from vcc.optics.train import Train
+from vcc.shapes.surfaces import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,3 +66,57 @@ class LensletOptics:
         """From steps along the lattice of lenslets to the centres of micro-images on the sensor, metres."""
         array = self.array
         return self.sensor_from_array @ Affine.translation(*array.decentre) @ array.lattice.place_from_steps
+
+
+# --- aberrations taken out of a light field after it was recorded (Ng and Hanrahan 2006) ---
+
+
+_TURNED = 1e-9
+"""Share of a pixel's step in slope by which it may leave its axis: rounding."""
+
+
+def without_aberration(light_field: LightField, surface: Surface) -> LightField:
+    """Each view moved back by the slopes that a known plate at the views' plane has added to its rays.
+
+    A ray that came at the slope s to the place u of the plate is recorded at s + Δs(u) by a camera that takes
+    its lens for perfect. A light field tells the places apart, and each view can be put right by itself (R. Ng and
+    P. Hanrahan, *Digital correction of lens aberrations in light field photography*, 2006). Views are read by
+    cubic splines between pixels, go on beyond their borders as they end there, and stay 0 or more.
+
+    Args:
+        light_field: in memory, at the plane of the plate, its pixels along s and t. A view is taken as one place:
+            its middle.
+        surface: of the plate, a `vcc.surfaces.Surface`, whose gradient is Δs.
+
+    Returns:
+        Float32 samples in the same frame.
+
+    Raises:
+        InputError: a light field on disk or with turned pixels, or a plate that moves a view by more than its
+            width.
+    """
+    from scipy.ndimage import shift
+
+    if not isinstance(light_field, LightField):
+        raise InputError("an aberration is taken out of samples in memory: pass stored.read(), or a part of it")
+    linear = light_field.frame.linear
+    steps = np.array([linear[3, 3], linear[2, 2]])  # of a row and of a column
+    if not steps.all() or max(abs(linear[2, 3]), abs(linear[3, 2])) > _TURNED * np.abs(steps).min():
+        raise InputError(
+            "the pixels of this light field do not lie along the slopes s and t: take the aberration out where it "
+            "was decoded, before other optics"
+        )
+    values = np.array(to_numpy(light_field.values), dtype=np.float32)
+    nv, nu, nt, ns = values.shape[:4]
+    for row, column in np.ndindex(nv, nu):
+        u, v = light_field.frame([column, row, (ns - 1) / 2, (nt - 1) / 2])[:2]
+        across, down = surface.slopes(u, v)
+        moved = -np.array([float(down), float(across)]) / steps
+        if not (np.abs(moved) < (nt, ns)).all():
+            raise InputError(
+                f"at u = {u:.4g} m, v = {v:.4g} m this plate moves the view by {np.abs(moved).max():.4g} pixels, "
+                "more than its width: is it the plate of this camera, in metres?"
+            )
+        away = (*moved, 0.0)[: values.ndim - 2]
+        values[row, column] = shift(values[row, column], away, order=3, mode="nearest")
+    return light_field.replaced(np.maximum(values, 0))

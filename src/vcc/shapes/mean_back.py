@@ -2,7 +2,7 @@
 
 A pattern's mean over a rectangle is linear in the values of each array of cells in it, whatever it is multiplied
 with on its sheet. Here is the transpose of that linear map, rectangle by rectangle: from weights of the means to
-weights of the cells. It is what a mask's cells are learned by (`vcc.plan.footprints.means_back`).
+weights of the cells. It is what a mask's cells are learned by (`vcc.plan.footprints.means`).
 """
 
 from __future__ import annotations

@@ -14,9 +14,9 @@ from numpy.typing import DTypeLike, NDArray
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
-from vcc.fields.arrays import one_view
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples
+from vcc.fields.view_arrays import one_view
 from vcc.files.transfer import decode, encode
 from vcc.store.attributes import DTYPES, Transfer, written_here
 from vcc.store.compression import Compression, Pixels

@@ -23,10 +23,10 @@ from vcc.base.measures import decibels
 from vcc.base.progress import Progress, tell
 from vcc.base.words import first_few
 from vcc.base.workers import uninterrupted
-from vcc.fields.arrays import one_view
 from vcc.fields.disparity import DisparityMaps
 from vcc.fields.grid import Grid, Sample
 from vcc.fields.samples import Samples, check_is_light_field
+from vcc.fields.view_arrays import one_view
 from vcc.files.atomic import refusal
 from vcc.files.parts import check_name, clear_leftovers, part_of, put_in_place
 from vcc.files.writer_lock import WriterLock, in_turn

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vcc.base.fingerprint import Untold, fingerprint
+from vcc.base.values import Untold, fingerprint
 from vcc.base.version import VERSION
 from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import Samples

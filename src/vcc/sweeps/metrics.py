@@ -16,8 +16,8 @@ from vcc.analysis.point_spread import psf
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
-from vcc.base.fingerprint import Untold, fingerprint
 from vcc.base.measures import psnr
+from vcc.base.values import Untold, fingerprint
 from vcc.camera import Camera
 from vcc.image import Image
 

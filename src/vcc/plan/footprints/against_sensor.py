@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.optics.sensor import Sensor
 from vcc.plan.following import NONE_KEPT, Parts
-from vcc.plan.footprints.means import Boxes, MeanChoice, choose_mean, mean_over
-from vcc.plan.footprints.means_back import mean_back
+from vcc.plan.footprints.means import Boxes, MeanChoice, choose_mean, mean_back, mean_over
 from vcc.plan.footprints.planes import Plane
 from vcc.shapes.mean_back import holds
 from vcc.shapes.patterns import Cells

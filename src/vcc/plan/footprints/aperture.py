@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.base.values import content
 from vcc.plan.following import NONE_KEPT, Parts, choice
-from vcc.plan.footprints.means import Boxes, MeanChoice, choose_mean, mean_over
-from vcc.plan.footprints.means_back import mean_back
+from vcc.plan.footprints.means import Boxes, MeanChoice, choose_mean, mean_back, mean_over
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import Mesh, Taps
 from vcc.shapes.mean_back import holds

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.base.values import content
 from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, choice, plan_again
-from vcc.plan.footprints.means import Boxes, MeanChoice, choose_mean, mean_over
-from vcc.plan.footprints.means_back import mean_back
+from vcc.plan.footprints.means import Boxes, MeanChoice, choose_mean, mean_back, mean_over
 from vcc.plan.footprints.model import MaskLookup
 from vcc.plan.footprints.planes import Plane, along_axes, tap_origin
 from vcc.plan.footprints.taps import Taps

@@ -19,12 +19,14 @@ from vcc.base.lookup import smooth, three_around
 from vcc.base.values import content
 from vcc.plan.following import NONE_KEPT, Parts, plan_again
 from vcc.shapes.lattice import CellApertures
+from vcc.shapes.mean_back import OnSheet, cells_back, tiles_back
 from vcc.shapes.patterns import (
     FEWEST_PER_CELL,
     LONGEST_RASTER,
     RASTER_LIMIT,
     RASTER_PER_CELL,
     Bounded,
+    Cells,
     Pattern,
     Raster,
     is_grid,
@@ -270,3 +272,49 @@ def _raster(centre: Array, length: float, bound: float) -> Raster | None:
         return None
     first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
     return Raster(np.asarray((np.arange(first, last) + 0.5) * step), first * step, last * step)
+
+
+# --- `mean_over` transposed: from weights of means of a pattern to weights of the cells that it is made of ---
+
+
+def mean_back(pattern: Pattern, boxes: Boxes, chosen: MeanChoice | None, weights: Array, cells: Cells) -> Array:
+    """What each value of an array of cells adds to Σ weights · mean of a pattern.
+
+    Args:
+        pattern: of which the cells are a part, once (`vcc.shapes.mean_back.holds`).
+        boxes: the rectangles that the pattern is averaged over.
+        chosen: how (`choose_mean`).
+        weights: of the means, of the shape that the boxes' places broadcast to.
+        cells: the very object.
+
+    Returns:
+        (rows, columns) of the cells.
+    """
+    x, y, width, height = boxes
+    if isinstance(pattern, Cells):
+        return cells_back(cells, (x, y), (width, height), weights)
+    if isinstance(pattern, Shifted):
+        moved = boxes._replace(x=x - pattern.middle[0], y=y - pattern.middle[1])
+        return mean_back(pattern.pattern, moved, chosen, weights, cells)
+    if isinstance(pattern, Bounded):
+        share_x = overlap_share(x, max(width, pattern.width * 1e-5), pattern.width)
+        share_y = overlap_share(y, max(height, pattern.height * 1e-5), pattern.height)
+        return mean_back(pattern.pattern, boxes, chosen, weights * share_x * share_y, cells)
+    assert isinstance(pattern, Product)
+    sheet = OnSheet.of(pattern, cells)
+    if not sheet.others:
+        return sheet.back(tiles_back(sheet.tiles, (x, y), (width, height), weights))
+
+    assert chosen is not None  # several patterns together have no mean in closed form
+    of_factors = {content(factor): its for factor, its in zip(pattern.factors, chosen.factors, strict=True)}
+
+    def back(points: Boxes, share: Array) -> Array:
+        factors = [mean_or_value(other, points, of_factors.get(content(other))) for other in sheet.others]
+        around = math.prod(factors, start=np.ones(1))
+        return tiles_back(sheet.tiles, (points.x, points.y), (points.width, points.height), share * around)
+
+    check_within(pattern, boxes, chosen)
+    if chosen.rasters is None:
+        parts = parts_of(boxes)
+        return sheet.back(np.sum([back(points, weights / len(parts)) for points in parts], axis=0))
+    return sheet.back(back(points_of(chosen.rasters), of_raster_back(weights, chosen.rasters, boxes)))

@@ -189,11 +189,15 @@ class Rays(Value):
             units of slope squared, (pixels, cells, samples); their sum over a pixel is its irradiance under
             radiance 1. The first half of the samples is as good a set as the second.
         """
+        rays = self.traced(pixel, block)
+        return self.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1)), rays.share
+
+    def traced(self, pixel: NDArray[np.int64], block: NDArray[np.int64]) -> Bundle:
+        """The rays of pixels where the light field's frame stands, after all steps; see `looked_up`."""
         rays, _ = self.aimed(pixel, block)
         for step in self.steps:
             step(rays)
-        index = self.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
-        return index, rays.share
+        return rays
 
     def aimed(self, pixel: NDArray[np.int64], block: NDArray[np.int64]) -> tuple[Bundle, Cell | None]:
         """The rays of pixels at the sensor, and (row, column) of the cells aimed through, (pixels, cells, 1) each.
