@@ -84,12 +84,12 @@ def smooth_back(
         values: see `smooth`.
         row: see `smooth`.
         column: see `smooth`.
-        weights: shape S.
+        weights: shape S, to which ``row`` and ``column`` broadcast.
 
     Returns:
         (rows, columns); S; S.
     """
-    at_row, at_column = np.broadcast_arrays(row, column)
+    at_row, at_column = (np.broadcast_to(place, weights.shape) for place in (row, column))
     (r, down, steep), (c, across, along) = (
         three_around(place, n) for place, n in zip((at_row, at_column), values.shape, strict=True)
     )

@@ -149,8 +149,9 @@ class _Run:
         (r, down, _), (c, across, _) = three_around(row, rows), three_around(column, columns)
         total = 0
         for m, n in np.ndindex(3, 3):
-            flat = xp.asarray((r[m] * columns + c[n]).reshape(-1), device=self.device)
-            values = xp.reshape(xp.take(texture, flat, axis=0), row.shape)
+            at = r[m] * columns + c[n]
+            flat = xp.asarray(at.reshape(-1), device=self.device)
+            values = xp.reshape(xp.take(texture, flat, axis=0), at.shape)
             total = total + values * self.constant(down[m] * across[n])
         return total
 

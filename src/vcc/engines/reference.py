@@ -118,7 +118,8 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
     rows, columns = (core.refine * count for count in core.samples)
     high, wide = core.raster_shape
     view = 16 * channels * rows * columns  # in double precision, and times its weights
-    lookup = 280 * rows * columns if core.masks else 0
+    turned = any(mask.step[0, 1] or mask.step[1, 0] for mask in core.masks)  # each sample is looked up by itself
+    lookup = (280 if turned else 40) * rows * columns if core.masks else 0
     if core.step[1, 0] == 0 == core.shear:
         spreading = 112 * max(high * rows, wide * columns) + 8 * channels * high * columns
     else:

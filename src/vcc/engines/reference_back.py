@@ -128,9 +128,10 @@ class _Tap(Brief):
         return np.asarray(math.prod(rest, start=np.ones((len(self.l), len(self.k)))))
 
     def down(self, row: int) -> tuple[str, float, Array, float, float]:
-        """Of which samples a raster row takes shares: the arguments of `shares`, (l, k)."""
+        """Of which samples a raster row takes shares: the arguments of `shares`, (l, k) or (l, 1)."""
         core = self.core
-        y = core.y[self.b, self.a] + core.step[1, 0] * self.k[None, :] + core.step[1, 1] * self.l[:, None]
+        k = self.k if core.step[1, 0] else np.zeros(1)  # else alike for all columns of samples: (l, 1)
+        y = core.y[self.b, self.a] + core.step[1, 0] * k[None, :] + core.step[1, 1] * self.l[:, None]
         return core.interpolation, float(row), y, core.row_step / core.refine, core.opening
 
     def across(self, row: int) -> tuple[str, Array, Array, float, float]:
@@ -145,8 +146,26 @@ class _Tap(Brief):
         for row, line in enumerate(weights):
             down = shares(*self.down(row))
             if down.any():
-                met += down[..., None] * (shares(*self.across(row)).T @ line)
+                met += down[..., None] * (self.across_shares(row).T @ line)
         return met
+
+    def across_shares(self, row: int) -> Array:
+        """F along a raster row, (pixels, k): the same in all rows where nothing shears."""
+        return shares(*self.across(row)) if self.core.shear else self._shares_of_any_row
+
+    def across_slopes(self, row: int) -> tuple[Array, Array, Array]:
+        """`share_slopes` of these."""
+        return share_slopes(*self.across(row)) if self.core.shear else self._slopes_of_any_row
+
+    @property
+    @cached
+    def _shares_of_any_row(self) -> Array:
+        return np.asarray(shares(*self.across(0)))
+
+    @property
+    @cached
+    def _slopes_of_any_row(self) -> tuple[Array, Array, Array]:
+        return share_slopes(*self.across(0))
 
     def numbers_back(self, weights: Array, met: Array, light: Array, wanted: Collection[str]) -> dict[str, Array]:
         """What the raster's weights say of numbers, through this tap alone; light: L, met: H."""
@@ -187,7 +206,7 @@ class _Tap(Brief):
             down = shares(*self.down(row))
             if not down.any():
                 continue
-            mixed = shares(*self.across(row)).T @ line
+            mixed = self.across_shares(row).T @ line
             by_y, by_height, by_opening = (
                 slope * (flux * mixed).sum(axis=2) for slope in share_slopes(*self.down(row))
             )
@@ -196,7 +215,7 @@ class _Tap(Brief):
             step[1, 0] += (by_y * self.k).sum()
             step[1, 1] += (by_y.T * self.l).sum() + np.sign(core.row_step) / core.refine * by_height.sum()
             fallen = (down[..., None] * flux).sum(axis=0)
-            by_x, by_width, by_opening = (slope * (line @ fallen.T) for slope in share_slopes(*self.across(row)))
+            by_x, by_width, by_opening = (slope * (line @ fallen.T) for slope in self.across_slopes(row))
             x += by_x.sum()
             y -= core.shear * by_x.sum()
             opening += by_opening.sum()

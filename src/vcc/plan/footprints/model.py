@@ -52,13 +52,20 @@ class MaskLookup(Value):
 
     def weights(self, b: int, a: int, k: Array, l: Array) -> Array:
         """T at the samples with column indices k and row indices l of view tap (b, a): shape (l, k)."""
-        return smooth(self.texture, *self.places(b, a, k, l))
+        return np.broadcast_to(smooth(self.texture, *self.places(b, a, k, l)), (len(l), len(k)))
 
     def places(self, b: int, a: int, k: Array, l: Array) -> tuple[Array, Array]:
-        """Texture rows and columns at which samples with these indices are looked up: shapes (l, k)."""
-        column = self.column[b, a] + self.step[0, 0] * k[None, :] + self.step[0, 1] * l[:, None]
-        row = self.row[b, a] + self.step[1, 0] * k[None, :] + self.step[1, 1] * l[:, None]
-        return row, column
+        """Texture rows and columns at which samples with these indices are looked up: shapes (l, k).
+
+        Of length 1 along an axis that they do not depend on.
+        """
+
+        def place(first: Array, by_k: float, by_l: float) -> Array:
+            found = np.full((1, 1), first[b, a])
+            found = found + by_k * k[None, :] if by_k else found
+            return found + by_l * l[:, None] if by_l else found
+
+        return place(self.row, *self.step[1]), place(self.column, *self.step[0])
 
     def moved(self, k: int, l: int) -> MaskLookup:
         """Looked up by samples that begin at sample (k, l) of those that it was made for."""
