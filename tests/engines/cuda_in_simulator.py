@@ -157,8 +157,8 @@ def with_taps_twice(core: Footprints) -> Footprints:
 
 
 def few_taps_of(core: Footprints) -> Footprints:
-    """Three rows and three columns of view taps: the simulator runs a thread after the other."""
-    some = np.arange(len(core.view_rows))[4:7], np.arange(len(core.view_columns))[4:7]
+    """Two rows and two columns of view taps: the simulator runs a thread after the other."""
+    some = np.arange(len(core.view_rows))[4:6], np.arange(len(core.view_columns))[4:6]
     taps = np.ix_(*some)
     return replace(
         core,

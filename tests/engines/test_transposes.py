@@ -107,20 +107,19 @@ def assert_transposed(core: Footprints, *channels: int) -> None:
         assert abs(np.vdot(raster, y) - right) <= ROUNDING * size
 
 
-@pytest.mark.parametrize("interpolation", [None, "nearest", "linear", "cubic"])
 @pytest.mark.parametrize("kind", AFFINE)
-def test_random_cameras(kind, interpolation):
-    for seed in range(2):
+def test_random_cameras(kind):
+    for seed, interpolation in enumerate([None, "nearest", "linear", "cubic"]):
         case = drawn(kind, seed + 4 * (kind == "turned mask"), pixels=10, views=4)  # others are black
         options = {} if interpolation is None else {"interpolation": interpolation}
         core = core_of(case.camera, case.light_field, **options)
         assert core.separable or kind.startswith("turned")
-        assert_transposed(core, *([], [3])[seed])
+        assert_transposed(core, *([], [3])[seed % 2])
 
 
 @pytest.mark.parametrize("kind", AFFINE)
 def test_random_cameras_before_light_fields_that_are_turned_or_divided(kind):
-    case = drawn(kind, 5, pixels=10, views=4)
+    case = drawn(kind, 5, pixels=8, views=3)
     turned = rolled(case.light_field, 0.3)
     assert_transposed(core_of(case.camera, case.light_field, refine=2), 3)
     assert_transposed(core_of(case.camera, turned), 3)
