@@ -10,8 +10,6 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from vcc.engines import ray_kernels as shared
 from vcc.engines.cuda_arrays import cuda, device, float32, float64, int64
 from vcc.engines.ray_tables import Drawn, Packet, Samples
@@ -50,8 +48,8 @@ def trace(channels: int, by_cell: bool) -> Any:
         """
         x0, y0 = cuda.grid(2)
         wide, high = cuda.gridsize(2)
-        table, samples, beside, seed = points
-        cells, blocks = aim.cells, table.shape[1] // samples
+        table, samples, _, seed = points
+        cells = aim.cells
         there = Samples(field.samples.values, field.samples.views, channels)
         x, y, s = cuda.local.array(1, float64), cuda.local.array(1, float64), cuda.local.array(1, float64)
         t, share = cuda.local.array(1, float64), cuda.local.array(1, float64)
@@ -62,7 +60,7 @@ def trace(channels: int, by_cell: bool) -> Any:
         for row in range(y0, sensor.rows, high):
             for column in range(x0, sensor.columns, wide):
                 pixel, middle = row * sensor.columns + column, shared.middle_of(sensor, row, column)
-                first = ((np.int64(shared.hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
+                first = shared.first_point(points, pixel)
                 seen = shared.cells_at(by_cell, cells, middle, sensor.sensitive, near)
                 sent = int64(0)
                 for half in range(2):

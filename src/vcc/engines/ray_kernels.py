@@ -623,6 +623,23 @@ def room():  # type: ignore[no-untyped-def]
 
 
 @_inlined
+def first_point(points, pixel):  # type: ignore[no-untyped-def]
+    """Where in their table the points begin that a pixel takes; see `vcc.plan.rays.model.Rays.block`."""
+    table, samples, beside, seed = points
+    return ((np.int64(hashed(pixel, seed)) * (table.shape[1] // samples) >> 32) ^ beside) * samples
+
+
+@_inlined
+def aim_rays(aim, drawn, middle, sensitive, images, rays):  # type: ignore[no-untyped-def]
+    """A packet's rays at the sensor, through the window or the cell at which they are aimed."""
+    at_pixel(drawn, middle, sensitive, rays)
+    if aim.by_cell:
+        through_cell(drawn, images, aim.cells, rays)
+    else:
+        through_window(drawn, aim.window, rays)
+
+
+@_inlined
 def middle_of(sensor, row, column):  # type: ignore[no-untyped-def]
     """The place (x, y) of the middle of a pixel."""
     return sensor.first[0] + column * sensor.pitch[0], sensor.first[1] + row * sensor.pitch[1]
@@ -670,8 +687,7 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
         within: as what `room` makes.
         sums: of a packet, float32, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
     """
-    table, samples, beside, seed = points
-    blocks = table.shape[1] // samples
+    table, samples, _, seed = points
     channels = field.samples.channels
     rays, near, images, flipped = within
     share = rays.share
@@ -681,7 +697,7 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
             if ended[0]:
                 return
             pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
-            first = ((np.int64(hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
+            first = first_point(points, pixel)
             totals[:] = 0
             seen = 1
             if cells is not None:

@@ -18,20 +18,18 @@ from vcc.engines.interpolation import around
 from vcc.engines.ray_kernels import (
     DIGITS_BELOW,
     PACKET,
-    at_pixel,
+    aim_rays,
     cell_of,
     cells_at,
     corner,
     dark_from,
-    hashed,
+    first_point,
     kind_of,
     may_find_light,
     middle_of,
     mixed,
     room,
     take_steps,
-    through_cell,
-    through_window,
     to_indices,
     turn_to,
     unit,
@@ -602,8 +600,8 @@ def numbers_of_tiles(field, sensor, points, aim, steps, weights, ended, told, ti
 @_compiled
 def numbers_within(field, sensor, points, aim, steps, weights, ended, told, tiles, within, ways):  # type: ignore[no-untyped-def]
     """As `numbers_of_tiles`, within what `vcc.engines.ray_kernels.room` gives, and the ways of `packet_back`."""
-    table, samples, beside, seed = points
-    cells, blocks = aim.cells, table.shape[1] // samples
+    table, samples, _, seed = points
+    cells = aim.cells
     _, near, images, flipped = within
     at_sensor = packet_of(ways[0][0])
     for tile in range(len(tiles)):
@@ -612,14 +610,10 @@ def numbers_within(field, sensor, points, aim, steps, weights, ended, told, tile
                 if ended[0]:
                     return
                 pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
-                first = ((np.int64(hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
+                first = first_point(points, pixel)
                 for q in range(cells_at(aim.by_cell, cells, middle, sensor.sensitive, near)):
                     turn_to(aim.by_cell, cells, seed, pixel, near, q, images, flipped)
                     for done in range(0, samples, PACKET):
                         drawn = Drawn(table, first + done, min(PACKET, samples - done), flipped)
-                        at_pixel(drawn, middle, sensor.sensitive, at_sensor)
-                        if aim.by_cell:
-                            through_cell(drawn, images, cells, at_sensor)
-                        else:
-                            through_window(drawn, aim.window, at_sensor)
+                        aim_rays(aim, drawn, middle, sensor.sensitive, images, at_sensor)
                         packet_back(field, drawn, aim, images, near[q], steps, (row, column), weights, ways, told)

@@ -14,17 +14,15 @@ import numpy as np
 from vcc.engines.compiled import compiled
 from vcc.engines.ray_kernels import (
     PACKET,
-    at_pixel,
+    aim_rays,
     cells_at,
     corners_in_four_views,
     dark_from,
-    hashed,
+    first_point,
     may_find_light,
     middle_of,
     room,
     take_steps,
-    through_cell,
-    through_window,
     to_indices,
     turn_to,
     views_of_ray,
@@ -95,9 +93,8 @@ def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # t
 @_compiled
 def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, within):  # type: ignore[no-untyped-def]
     """As `find_tile`, within what `vcc.engines.ray_kernels.room` gives."""
-    table, samples, beside, seed = points
+    table, samples, _, seed = points
     cells = aim.cells
-    blocks = table.shape[1] // samples
     rays, near, images, flipped = within
     share = rays.share
     columns = min(tile.end_column, sensor.columns) - tile.first_column
@@ -109,17 +106,13 @@ def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, wit
         seen = cells_at(aim.by_cell, cells, middle, sensor.sensitive, near)
         if filled + seen * samples > len(found.places):
             break
-        first = ((np.int64(hashed(pixel, seed)) * blocks >> 32) ^ beside) * samples
+        first = first_point(points, pixel)
         for q in range(seen):
             turn_to(aim.by_cell, cells, seed, pixel, near, q, images, flipped)
             for done in range(0, samples, PACKET):
                 n = min(PACKET, samples - done)
                 drawn = Drawn(table, first + done, n, flipped)
-                at_pixel(drawn, middle, sensor.sensitive, rays)
-                if aim.by_cell:
-                    through_cell(drawn, images, cells, rays)
-                else:
-                    through_window(drawn, aim.window, rays)
+                aim_rays(aim, drawn, middle, sensor.sensitive, images, rays)
                 sent = 0
                 for p in range(n):
                     sent += share[p] > 0.0
