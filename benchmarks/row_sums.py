@@ -5,7 +5,7 @@
 
 Footprints are banded products: along an axis each pixel takes shares of a few samples. One loop over a table of
 such shares, three rows at a time, could sum the rows of views forward, and of the raster on the way back. Here it
-does so forward, on one thread, band by band as the engine does; both take turns, and times are the shortest of nine.
+does so forward, on one thread, band by band as the engine does. Both take turns; times are the shortest of nine.
 """
 
 from __future__ import annotations
