@@ -490,3 +490,32 @@ def test_the_spectrum_alone_tells_the_lattice_between_its_bins(layout, shape, ro
 def test_a_camera_without_lenslets_is_told_by_its_elements(elements, words):
     with pytest.raises(InputError, match=words):
         LensletGrid.of_camera(vcc.Camera(elements, vcc.Sensor(0.05, (9, 9), 1e-5)))
+
+
+@pytest.mark.parametrize(("size", "order"), [(52, 2), (92, 4)])
+def test_vignetting_of_a_polynomial_is_divided_out(size, order):
+    """Of second order where there are few micro-images, of fourth where there are 60 or more.
+
+    The light of a micro-image is the mean of the vignetting over its window, which is a polynomial of the same order,
+    and higher than that at the middle by half the curvature times r²/4: 0.5 % at a pitch of 10 pixels.
+    """
+    from vcc.recover.white_image import _evenly_lit
+
+    grid = LensletGrid("square", (10.5, 10.5), ((10.0, 0.0), (0.0, 10.0)))
+    y, x = (np.indices((size, size)) - (size - 1) / 2) / ((size - 1) / 2)
+    vignetting = 1 - 0.3 * (x * x + y * y) if order == 2 else 1 - 0.25 * (x**4 + 2 * x * x * y * y + y**4)
+    index = np.array(list(itertools.product(range((size - 12) // 10), repeat=2)))
+    assert (len(index) >= 60) == (order == 4)
+    even = _evenly_lit(vignetting, grid, index)[10:-10, 10:-10]
+    assert np.ptp(vignetting[10:-10, 10:-10]) > 0.1
+    assert np.ptp(even) < 0.02 * even.mean()
+
+
+def test_what_is_finer_than_lenslets_does_not_hide_them():
+    """Pixels that differ by turns, as beneath a colour filter, are brighter in the spectrum than micro-images."""
+    from vcc.recover.white_image import _from_spectrum
+
+    y, x = np.indices((90, 100))
+    lenslets = 1 + 0.2 * (np.cos(2 * np.pi * x / 9.3) + np.cos(2 * np.pi * y / 9.3))
+    found = _from_spectrum(lenslets * (1 + 0.5 * (-1.0) ** (x + y)))
+    assert found.pitch == pytest.approx(9.3, rel=0.01)
