@@ -496,8 +496,8 @@ def test_a_camera_without_lenslets_is_told_by_its_elements(elements, words):
 def test_vignetting_of_a_polynomial_is_divided_out(size, order):
     """Of second order where there are few micro-images, of fourth where there are 60 or more.
 
-    The light of a micro-image is the mean of the vignetting over its window, which is a polynomial of the same order,
-    and higher than that at the middle by half the curvature times r²/4: 0.5 % at a pitch of 10 pixels.
+    The light of a micro-image is the mean of the vignetting over its window, which is a polynomial of the same
+    order, and differs from that at the middle by half the curvature times r²/4: 0.5 % at a pitch of 10 pixels.
     """
     from vcc.recover.white_image import _evenly_lit
 
