@@ -102,11 +102,11 @@ def test_code_is_compiled_again_where_another_file_of_its_package_has_changed(
 
 def test_stamps_cost_little() -> None:
     """All of the package's kernels are stamped when they are imported: a few milliseconds."""
-    from vcc.engines import ray_number_kernels
+    from vcc.engines import ray_loops
 
     compiled._read.cache_clear()
     start = time.process_time()
-    compiled._sources(ray_number_kernels.__name__, ray_number_kernels.__file__)
+    compiled._sources(ray_loops.__name__, ray_loops.__file__)
     assert time.process_time() - start < 0.05  # it takes 0.004 s
 
 

@@ -155,7 +155,7 @@ def traced(core: Rays, values: Any, beside: int, progress: Progress | None = Non
 
 
 def traced_on_gpu(core: Rays, values: Any, beside: int) -> tuple[Any, Any]:
-    """The pictures of `vcc.engines.ray_kernels.add_pixels`, and the rays of each column of pixels, on the GPU."""
+    """The pictures of `vcc.engines.ray_loops.add_pixels`, and the rays of each column of pixels, on the GPU."""
     there = arranged(taken(cuda_arrays.resident(values)))
     rows, columns = core.raster_shape
     channels = there.shape[4]

@@ -1,8 +1,9 @@
 """The kernel of rays for the GPU: a thread traces all rays of a pixel, by the functions of the processor's kernel.
 
-Those take packets of rays; here a packet holds one. What is aimed, met and drawn is `vcc.engines.ray_kernels` word
-for word; only the light field is looked up by other words, without vector instructions. A thread adds what its
-rays find in their order, so that nobody waits, and the same bytes come out of every run.
+Those take packets of rays; here a packet holds one. What is aimed, met and drawn is `vcc.engines.ray_aims` and
+`vcc.engines.ray_steps` word for word; only the light field is looked up by other words, without vector
+instructions. A thread adds what its rays find in their order, so that nobody waits, and the same bytes come out of
+every run.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from vcc.engines import ray_kernels as shared
+from vcc.engines import ray_aims, ray_lookup, ray_steps
 from vcc.engines.cuda_arrays import cuda, device, float32, float64, int64
 from vcc.engines.ray_tables import Drawn, Packet, Samples
 
@@ -19,15 +20,15 @@ FLUSHED = 256
 CELLS = 256
 """Cells through which a pixel is traced, at most: as on the processor."""
 
-_at_pixel = device(shared.at_pixel)
-_through_window = device(shared.through_window)
-_through_cell = device(shared.through_cell)
-_take_steps = device(shared.take_steps)
-_to_indices = device(shared.to_indices)
-_add_view = device(shared.add_view)
-_views_of_ray = device(shared.views_of_ray)
-_dark_from = device(shared.dark_from)
-_may_find_light = device(shared.may_find_light)
+_at_pixel = device(ray_aims.at_pixel)
+_through_window = device(ray_aims.through_window)
+_through_cell = device(ray_aims.through_cell)
+_take_steps = device(ray_steps.take_steps)
+_to_indices = device(ray_lookup.to_indices)
+_add_view = device(ray_lookup.add_view)
+_views_of_ray = device(ray_lookup.views_of_ray)
+_dark_from = device(ray_lookup.dark_from)
+_may_find_light = device(ray_lookup.may_find_light)
 
 
 @cache
@@ -41,7 +42,7 @@ def trace(channels: int, by_cell: bool) -> Any:
 
     @cuda.jit
     def kernel(field, sensor, points, aim, steps, pictures, tallies):  # type: ignore[no-untyped-def]
-        """As `vcc.engines.ray_kernels.add_pixels`, of which the arguments are, for all pixels.
+        """As `vcc.engines.ray_loops.add_pixels`, of which the arguments are, for all pixels.
 
         pictures: (2, rows, columns, channels): what the two halves of a pixel's rays find.
         tallies: (rows, columns), how many they are.
@@ -59,16 +60,16 @@ def trace(channels: int, by_cell: bool) -> Any:
         found, total = cuda.local.array(channels, float32), cuda.local.array(channels, float64)
         for row in range(y0, sensor.rows, high):
             for column in range(x0, sensor.columns, wide):
-                pixel, middle = row * sensor.columns + column, shared.middle_of(sensor, row, column)
-                first = shared.first_point(points, pixel)
-                seen = shared.cells_at(by_cell, cells, middle, sensor.sensitive, near)
+                pixel, middle = row * sensor.columns + column, ray_aims.middle_of(sensor, row, column)
+                first = ray_aims.first_point(points, pixel)
+                seen = ray_aims.cells_at(by_cell, cells, middle, sensor.sensitive, near)
                 sent = int64(0)
                 for half in range(2):
                     for c in range(channels):
                         total[c] = 0
                         found[c] = 0
                     for q in range(seen):
-                        shared.turn_to(by_cell, cells, seed, pixel, near, q, images, flipped)
+                        ray_aims.turn_to(by_cell, cells, seed, pixel, near, q, images, flipped)
                         begin = half * (samples // 2)
                         for p in range(begin, begin + samples // 2):
                             drawn = Drawn(table, first + p, 1, flipped)
@@ -94,7 +95,7 @@ def trace(channels: int, by_cell: bool) -> Any:
 
 @cuda.jit(device=True)
 def look_up(field, samples, rays, found):  # type: ignore[no-untyped-def]
-    """Add what a ray finds to ``found`` (channels), as `vcc.engines.ray_kernels.add_rays` does for many."""
+    """Add what a ray finds to ``found`` (channels), as `vcc.engines.ray_lookup.add_rays` does for many."""
     _, _, index_from_ray, motion, between = field
     _, views, channels = samples
     nv, nu, nt, ns = views

@@ -60,7 +60,7 @@ def dark_outside(values, row, column):  # type: ignore[no-untyped-def]
     return total
 
 
-# --- linearly between the points of a grid, for all compiled kernels but `ray_kernels.add_view` ---
+# --- linearly between the points of a grid, for all compiled kernels but `ray_lookup.add_view` ---
 #
 # Inlined before compiling: an array that is handed on has its references counted, by all threads at once.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
-from vcc.engines import ray_number_kernels as kernels
+from vcc.engines import ray_loops as kernels
 from vcc.engines import ray_tables as tables
 from vcc.engines.rays_compiled import TILE, given, light_field
 from vcc.plan.numbers import numbers

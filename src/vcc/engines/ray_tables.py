@@ -1,6 +1,6 @@
 """What the compiled kernel of rays is given: numbers and arrays under names, as Numba takes them.
 
-`vcc.engines.rays_compiled` fills these from a plan, `vcc.engines.ray_kernels` reads them. All arrays are
+`vcc.engines.rays_compiled` fills these from a plan, `vcc.engines.ray_loops` reads them. All arrays are
 contiguous; pairs are along (x, y).
 """
 
@@ -221,7 +221,7 @@ class Drawn(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What the rays of some tiles say of the numbers: sums to which `vcc.engines.ray_number_kernels` adds.
+    """What the rays of some tiles say of the numbers: sums to which `vcc.engines.ray_loops.numbers_of_tiles` adds.
 
     Args:
         scale: (1,), but for the scale itself, as all that follow.

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
+from vcc.engines import ray_loops as kernels
 from vcc.engines import ray_tables as tables
-from vcc.engines import ray_transpose_kernels as kernels
 from vcc.engines.rays_compiled import TILE, given
 from vcc.plan.rays.model import Rays
 

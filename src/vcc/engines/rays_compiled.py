@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
-from vcc.engines import ray_kernels as kernels
+from vcc.engines import ray_loops as kernels
 from vcc.engines import ray_tables as tables
 from vcc.engines.compiled import read_as
 from vcc.engines.ray_patches import Patches, patches_of, rows_that_look
+from vcc.engines.ray_steps import FEW
 from vcc.engines.sharpening_kernels import Parts, ToSharpen
 from vcc.engines.vector_gather import LANES
 from vcc.plan.protocol import Partial
@@ -67,7 +68,7 @@ def traced(
         sensor, points, aim, steps = given(core, beside)
         # Numba leaves out branches by what is None.
         window, cells = (None, aim.cells) if aim.by_cell else (aim.window, None)
-        few, rare = (True, None) if kernels.FEW.issuperset(steps.codes.tolist()) else (None, True)
+        few, rare = (True, None) if FEW.issuperset(steps.codes.tolist()) else (None, True)
         rest = sensor, points, window, cells, steps, few, rare, pool.ended, pictures
         if isinstance(values, np.ndarray):
             nv, nu, nt, ns = core.views

@@ -1,0 +1,378 @@
+"""The compiled loops over pixels, packets and tiles that trace rays; see `vcc.engines.ray_tables`.
+
+One loop serves every camera: what a ray meets comes as a list of numbers, `vcc.engines.ray_steps`. A packet holds
+the rays of one pixel. Its stages are functions of their own, compiled once for all loops and all types of samples:
+inlined in each, they took three times as long to compile.
+
+`add_pixels` adds up what the rays of each pixel find. Back to samples, rays of neighbouring pixels meet the same
+ones: so they are first traced and put in the order of the views that they meet (`find_tile`), and then each row of
+views is handed what is its own, by one thread (`spread_row`): nobody waits for another, the samples of a view that
+are in use stay in the first-level cache, and every sum is taken in one order. Back to numbers, what the rays of a
+packet were before each step is kept, and they go back along their way (`numbers_of_tiles`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vcc.engines.compiled import compiled
+from vcc.engines.ray_aims import (
+    aim_rays,
+    at_pixel,
+    cell_back,
+    cells_at,
+    first_point,
+    hashed,
+    middle_of,
+    pixel_back,
+    through_cell,
+    through_window,
+    turn_to,
+    window_back,
+)
+from vcc.engines.ray_lookup import (
+    add_rays,
+    corners_in_four_views,
+    dark_from,
+    field_back,
+    may_find_light,
+    spread_view,
+    to_indices,
+    views_of_ray,
+    weights_in_four_views,
+)
+from vcc.engines.ray_steps import moved_back, packet_of, step_back, step_on, take_few_steps, take_steps
+from vcc.engines.ray_tables import Drawn, Packet
+from vcc.engines.vector_gather import spread_views_of_1, spread_views_of_3, spread_views_of_4
+from vcc.plan.rays.points import DIGITS
+
+PACKET = 256
+"""Rays at a time: six numbers each, which stay in the first-level cache."""
+
+_compiled = compiled(borrowing=True, fastmath={"contract", "nsz"})
+_inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
+_allocating = compiled(fastmath={"contract", "nsz"})
+_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
+"""Sums over the rays of a packet may be reordered, so that they run on several rays at once."""
+_inlined_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"}, inline="always")
+_allocating_back = compiled(fastmath={"contract", "nsz", "reassoc"})
+
+
+@_allocating
+def room():  # type: ignore[no-untyped-def]
+    """Where rays are traced: (rays, near, images, flipped); see `cells_at` and `turn_to`."""
+    rays = Packet(np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET))
+    return rays, np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
+
+
+@_compiled
+def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
+    """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
+
+    The first picture is what all of a pixel's rays find, the second what its two halves differ by. Once
+    ``ended[0]`` is true, nobody wants them, and the kernel returns. It is called from Python as it is:
+    a kernel around it that made the arrays took a third of the time to compile.
+
+    Args:
+        field: of whole views or of parts of them.
+        begin: where these parts begin.
+        window: where to aim, or None where there are cells: what is None is not compiled.
+        cells: through which to aim, or None.
+        steps: what rays meet.
+        few: True where all steps are among `FEW`, else None.
+        rare: the other way round.
+        within: as what `room` makes.
+        sums: of a packet, float32, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
+    """
+    table, samples, _, seed = points
+    channels = field.samples.channels
+    rays, near, images, flipped = within
+    share = rays.share
+    sums, totals, tally = sums
+    for row in range(tile.first_row, min(tile.end_row, sensor.rows)):
+        for column in range(tile.first_column, min(tile.end_column, sensor.columns)):
+            if ended[0]:
+                return
+            pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
+            first = first_point(points, pixel)
+            totals[:] = 0
+            seen = 1
+            if cells is not None:
+                seen = cells_at(True, cells, middle, sensor.sensitive, near)
+            for q in range(seen):
+                if window is not None:
+                    for number in range(4):
+                        flipped[number] = hashed(pixel, seed + 1 + number) >> np.uint32(32 - DIGITS)
+                if cells is not None:
+                    turn_to(True, cells, seed, pixel, near, q, images, flipped)
+                for done in range(0, samples, PACKET):
+                    n = min(PACKET, samples - done)
+                    drawn = Drawn(table, first + done, n, flipped)
+                    at_pixel(drawn, middle, sensor.sensitive, rays)
+                    if window is not None:
+                        through_window(drawn, window, rays)
+                    if cells is not None:
+                        through_cell(drawn, images, cells, rays)
+                    sent = 0
+                    for p in range(n):
+                        sent += share[p] > 0.0
+                    if sent == 0:
+                        continue
+                    tally[0] += sent
+                    if few is not None:
+                        take_few_steps(steps, drawn, rays)
+                    if rare is not None:
+                        take_steps(steps, drawn, rays)
+                    add_rays(field, begin, rays, n, samples // 2 - done, sums)
+                    for half in range(2):  # a packet in single precision, the packets in double
+                        for lane in range(sums.shape[1]):
+                            totals[half, lane] += sums[half, lane]
+                            sums[half, lane] = 0
+            # Where vectors left them apart, the right pixels' channels are added to the left ones'.
+            apart = channels == 1 or channels == 3 or channels == 4
+            for channel in range(channels):
+                one, two = totals[0, channel], totals[1, channel]
+                if apart:
+                    one, two = one + totals[0, channels + channel], two + totals[1, channels + channel]
+                one, two = one * field.scale / samples, two * field.scale / samples
+                pictures[0, row, column, channel] = one + two
+                pictures[1, row, column, channel] = 2 * (one - two)
+
+
+# --- back to samples ---
+
+
+@_inlined
+def keep_rays(look, rays, n, pixel, found, filled):  # type: ignore[no-untyped-def]
+    """Keep where those of n rays that meet the light field do; returns how many are kept now.
+
+    Which do is said by `ray_lookup.add_rays`. Places are replaced by indices.
+    """
+    all_views, index_from_ray, motion, between = look
+    nv, nu, _, _ = all_views
+    x, y, s, t, share = rays
+    places, views = found.places, found.views
+    to_indices(index_from_ray, rays, n)
+    dark = dark_from(motion)
+    for p in range(n):
+        i, j, k, l = x[p], y[p], s[p], t[p]
+        if share[p] == 0.0 or not may_find_light(i, j, k, l, all_views, dark):
+            continue
+        i0, j0, _, _ = views_of_ray(i, j, nu, nv, between)
+        places[filled, 0], places[filled, 1], places[filled, 2] = x[p], y[p], k
+        places[filled, 3], places[filled, 4], places[filled, 5] = l, share[p], pixel
+        views[filled] = j0 * nu + i0
+        filled += 1
+    return filled
+
+
+@_compiled
+def put_in_order(found, filled):  # type: ignore[no-untyped-def]
+    """Put the places that are kept in the order of their views."""
+    places, views, ordered, begin = found
+    begin[:] = 0
+    for p in range(filled):
+        begin[views[p] + 1] += 1
+    for view in range(1, len(begin)):
+        begin[view] += begin[view - 1]
+    for p in range(filled):
+        to, view = begin[views[p]], views[p]
+        for n in range(6):
+            ordered[to, n] = places[p, n]
+        begin[view] += 1
+    for view in range(len(begin) - 1, 0, -1):  # each begins where the one before it ended
+        begin[view] = begin[view - 1]
+    begin[0] = 0
+
+
+@_allocating
+def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # type: ignore[no-untyped-def]
+    """Trace the pixels of a tile from its pixel ``start`` on, as long as there is room to keep what they meet.
+
+    Returns:
+        The number, in the tile, of the first pixel that was not traced: as many as there are once all were. After
+        ``ended[0]`` is true it means nothing.
+    """
+    return find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, room())
+
+
+@_compiled
+def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, within):  # type: ignore[no-untyped-def]
+    """As `find_tile`, within what `room` gives."""
+    table, samples, _, seed = points
+    cells = aim.cells
+    rays, near, images, flipped = within
+    share = rays.share
+    columns = min(tile.end_column, sensor.columns) - tile.first_column
+    pixels = (min(tile.end_row, sensor.rows) - tile.first_row) * columns
+    filled, number = 0, start
+    while number < pixels and not ended[0]:
+        row, column = tile.first_row + number // columns, tile.first_column + number % columns
+        pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
+        seen = cells_at(aim.by_cell, cells, middle, sensor.sensitive, near)
+        if filled + seen * samples > len(found.places):
+            break
+        first = first_point(points, pixel)
+        for q in range(seen):
+            turn_to(aim.by_cell, cells, seed, pixel, near, q, images, flipped)
+            for done in range(0, samples, PACKET):
+                n = min(PACKET, samples - done)
+                drawn = Drawn(table, first + done, n, flipped)
+                aim_rays(aim, drawn, middle, sensor.sensitive, images, rays)
+                sent = 0
+                for p in range(n):
+                    sent += share[p] > 0.0
+                if sent == 0:
+                    continue
+                take_steps(steps, drawn, rays)
+                filled = keep_rays(look, rays, n, pixel, found, filled)
+        number += 1
+    put_in_order(found, filled)
+    return number
+
+
+@_compiled
+def spread_row(grown, weights, ordered, begin, row):  # type: ignore[no-untyped-def]
+    """Hand to samples what the rays carry whose first view is in a row of views.
+
+    That are samples of this row of views and, where rays lie between views, of the next one.
+
+    Args:
+        grown: `vcc.engines.ray_tables.Grown`.
+        weights: of the pixels' values, flat, float32.
+        ordered: (tiles, rays, 6), what was found in some tiles, whose order is that of sums.
+        begin: (tiles, views + 1), where each view's begin; see `vcc.engines.ray_tables.Found`.
+        row: of views.
+    """
+    values, (nv, nu, nt, ns), channels, motion, between = grown
+    # As in `ray_lookup.add_rays`.
+    parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
+    vectors = parted and (channels == 1 or channels == 3 or channels == 4)
+    line, picture, row_of_views = ns * channels, nt * ns * channels, nu * nt * ns * channels
+    for tile in range(len(ordered)):
+        places = ordered[tile]
+        for column in range(nu):
+            view = row * nu + column
+            base = row * row_of_views + column * picture
+            for p in range(begin[tile, view], begin[tile, view + 1]):
+                i, j, k, l = places[p, 0], places[p, 1], places[p, 2], places[p, 3]
+                weight, pixel = places[p, 4], int(places[p, 5]) * channels
+                if not between:
+                    spread_view(grown, base, k, l, weight, weights, pixel)
+                    continue
+                fi, fj = min(max(i, 0.0), nu - 1.0) - column, min(max(j, 0.0), nv - 1.0) - row
+                if vectors:
+                    k0, l0 = k + motion[0, 0] * (i - column), l + motion[1, 1] * (j - row)
+                    k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
+                    kf0, kf1, lf0, lf1 = math.floor(k0), math.floor(k1), math.floor(l0), math.floor(l1)
+                    inside = (
+                        min(kf0, kf1) >= 0
+                        and max(kf0, kf1) < ns - 1
+                        and min(lf0, lf1) >= 0
+                        and max(lf0, lf1) < nt - 1
+                    )
+                    if inside:
+                        c0, c1 = int(kf0) * channels, int(kf1) * channels
+                        r0, r1 = int(lf0) * line, int(lf1) * line
+                        parts = (k0 - kf0, k1 - kf1), (l0 - lf0, l1 - lf1)
+                        corners = corners_in_four_views(base, (c0, c1), (r0, r1), picture, row_of_views)
+                        rows, columns = weights_in_four_views(weight, fi, fj, parts)
+                        if channels == 3:
+                            spread_views_of_3(values, corners, line, rows, columns, weights, pixel)
+                        elif channels == 1:
+                            spread_views_of_1(values, corners, line, rows, columns, weights, pixel)
+                        else:
+                            spread_views_of_4(values, corners, line, rows, columns, weights, pixel)
+                        continue
+                for dj in range(2):
+                    wj = weight * (fj if dj else 1.0 - fj)
+                    if wj == 0.0:
+                        continue
+                    for di in range(2):
+                        w = wj * (fi if di else 1.0 - fi)
+                        if w == 0.0:
+                            continue
+                        away_i, away_j = i - (column + di), j - (row + dj)
+                        view_k = k + motion[0, 0] * away_i + motion[0, 1] * away_j
+                        view_l = l + motion[1, 0] * away_i + motion[1, 1] * away_j
+                        beside = base + dj * row_of_views + di * picture
+                        spread_view(grown, beside, view_k, view_l, w, weights, pixel)
+
+
+# --- back to numbers ---
+
+
+@_inlined_back
+def lit_by(share, n, lit):  # type: ignore[no-untyped-def]
+    """Set ``lit`` to 1 for rays that carry light, else to 0; returns how many do."""
+    number = 0
+    for p in range(n):
+        carries = share[p] > 0.0
+        lit[p] = 1.0 if carries else 0.0
+        number += carries
+    return number
+
+
+@_inlined_back
+def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, told):  # type: ignore[no-untyped-def]
+    """Trace a packet of rays, which ``ways[0][0]`` holds at the sensor, and go back with what they find.
+
+    ``ways``: (what rays are before each step and behind all, and their indices (steps + 2, 5, rays); which are not
+    stopped; cotangents (5, rays); room for two numbers a ray, and for the sums of `cell_back`).
+    """
+    kept, lit, bar, found, sums = ways
+    n, number = drawn.rays, len(steps.codes)
+    if lit_by(kept[0, 4], n, lit) > 0:
+        for step in range(number):
+            step_on(steps, step, drawn, kept[step], kept[step + 1], lit)
+        for q in range(5):
+            for p in range(n):
+                kept[number + 1, q, p] = kept[number, q, p]
+        to_indices(field.index_from_ray, packet_of(kept[number + 1]), n)
+        field_back(field, weights[place[0], place[1]], n, kept[number + 1], lit, bar, told.motion, told.scale)
+        moved_back(field.index_from_ray.reshape(-1), n, kept[number], bar, told.indices)
+        of_steps = told.steps, told.matrices, told.shares, told.slopes, told.points
+        for step in range(number - 1, -1, -1):
+            step_back(steps, step, drawn, kept[step], bar, found, of_steps)
+        if aim.by_cell:
+            of_cells = told.cells, told.kinds, told.borders, sums
+            cell_back(drawn, images, aim.cells, cell, kept[0], bar, of_cells)
+        else:
+            window_back(drawn, aim.window, kept[0], bar, told.window, told.scatter, told.points)
+        pixel_back(drawn, place, bar, told.sensor)
+
+
+@_allocating_back
+def numbers_of_tiles(field, sensor, points, aim, steps, weights, ended, told, tiles):  # type: ignore[no-untyped-def]
+    """What the pixels of tiles say of all numbers, added to ``told``; what is given: `vcc.engines.ray_tables`.
+
+    ``weights``: (rows, columns, channels), of the picture. ``tiles``: (tiles, 4). Once ``ended[0]`` is true,
+    nobody wants them, and the kernel returns.
+    """
+    kept = np.empty((len(steps.codes) + 2, 5, PACKET))
+    ways = kept, np.empty(PACKET), np.empty((5, PACKET)), np.empty((2, PACKET)), np.empty((2, 4))
+    numbers_within(field, sensor, points, aim, steps, weights, ended, told, tiles, room(), ways)
+
+
+@_back
+def numbers_within(field, sensor, points, aim, steps, weights, ended, told, tiles, within, ways):  # type: ignore[no-untyped-def]
+    """As `numbers_of_tiles`, within what `room` gives, and the ways of `packet_back`."""
+    table, samples, _, seed = points
+    cells = aim.cells
+    _, near, images, flipped = within
+    at_sensor = packet_of(ways[0][0])
+    for tile in range(len(tiles)):
+        for row in range(tiles[tile, 0], min(tiles[tile, 1], sensor.rows)):
+            for column in range(tiles[tile, 2], min(tiles[tile, 3], sensor.columns)):
+                if ended[0]:
+                    return
+                pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
+                first = first_point(points, pixel)
+                for q in range(cells_at(aim.by_cell, cells, middle, sensor.sensitive, near)):
+                    turn_to(aim.by_cell, cells, seed, pixel, near, q, images, flipped)
+                    for done in range(0, samples, PACKET):
+                        drawn = Drawn(table, first + done, min(PACKET, samples - done), flipped)
+                        aim_rays(aim, drawn, middle, sensor.sensitive, images, at_sensor)
+                        packet_back(field, drawn, aim, images, near[q], steps, (row, column), weights, ways, told)
