@@ -1,4 +1,7 @@
-"""A plan in words: what was folded, what was pulled to the sensor, which sampling was chosen, what it costs."""
+"""A plan in words: what was folded, what was pulled to the sensor, which sampling was chosen, what it costs.
+
+And what a light field on disk and an executor add to that.
+"""
 
 from __future__ import annotations
 

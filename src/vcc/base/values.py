@@ -1,4 +1,4 @@
-"""Frozen data that is equal when its content is equal, arrays included, and can be a key of a cache."""
+"""Frozen data that is equal when its content is equal, arrays included: keys of caches, and names that last."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Arrays of views as users have them, in one row or in a grid, and what numbers may be in place of radiance."""
+"""Arrays of views as users have them, in one row or in a grid, and what numbers may be in place of radiance.
+
+And the other way: the samples of a light field as NumPy arrays, for files.
+"""
 
 from __future__ import annotations
 

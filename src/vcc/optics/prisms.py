@@ -1,4 +1,4 @@
-"""Prisms of several plane faces that meet in the middle: the biprism, and pyramids."""
+"""Prisms: the thin one, and those of several plane faces that meet in the middle, the biprism and pyramids."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What a camera with lenslets before its sensor makes of the middle of its entrance plane: a micro-image each."""
+"""What a camera with lenslets before its sensor makes of the middle of its entrance plane: a micro-image each.
+
+And its aberrations, taken out of a light field afterwards.
+"""
 
 from __future__ import annotations
 
