@@ -5,12 +5,12 @@
     python benchmarks/gradcheck.py --kind axicon    # one element
     python benchmarks/gradcheck.py --between auto   # an hour: with views in between, a thousand taps instead of 16
 
-Cameras are those of the page's table (docs/learning_table.py), before a light field of random samples; pictures
-by the reference, in double precision, by footprints and by rays. Each parameter is checked by itself: all its
-numbers, derivatives to 1e-3. Steps are 1e-5 of its scale by footprints. A ray looks samples up linearly, which has
-a kink at each sample: of some thousand rays that a step moves by ten thousandths of a sample, one or so crosses a
-kink. Steps by rays are 1e-8, which meet none but by chance; what double precision rounds is then still a
-thousandth of the tolerance.
+Cameras are those of the page's table (tools/docs/learning_table.py), before a light field of random samples;
+pictures by the reference, in double precision, by footprints and by rays. Each parameter is checked by itself:
+all its numbers, derivatives to 1e-3. Steps are 1e-5 of its scale by footprints. A ray looks samples up linearly,
+which has a kink at each sample: of some thousand rays that a step moves by ten thousandths of a sample, one or so
+crosses a kink. Steps by rays are 1e-8, which meet none but by chance; what double precision rounds is then still
+a thousandth of the tolerance.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from vcc.learn.verdicts import verdict
 from vcc.torch import CameraModule
 from vcc.units import mm
 
-TABLE = runpy.run_path(str(Path(__file__).resolve().parents[1] / "docs" / "learning_table.py"))
+TABLE = runpy.run_path(str(Path(__file__).resolve().parents[1] / "tools" / "docs" / "learning_table.py"))
 ELEMENTS = TABLE["ELEMENTS"]
 STEP = {"footprints": 1e-5, "rays": 1e-8}
 VALUES = np.random.default_rng(0).random((4, 4, 10, 10))

@@ -94,7 +94,7 @@ def test_pictures_move_as_their_disparities_say(desk, disparity, rows, columns):
 
 def test_the_script_renders_and_keeps_a_tiny_desk(tmp_path, monkeypatch):
     pytest.importorskip("mitsuba", reason="the package mitsuba is not installed")
-    monkeypatch.syspath_prepend(DOCS)
+    monkeypatch.syspath_prepend(DOCS.parent / "tools" / "docs")
     script, scene = importlib.import_module("render_desk"), importlib.import_module("desk_scene")
     assert (scene.EYE, scene.TARGET, scene.FOCUS) == (EYE, TARGET, FOCUS)
     cameras = scene.cameras((2, 2), (16, 24))

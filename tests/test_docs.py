@@ -163,8 +163,8 @@ def test_the_reference_has_every_pattern_kernel_and_surface(module):
 
 @pytest.mark.parametrize("name", vcc.gallery.ENTRIES)
 def test_every_camera_of_the_gallery_has_a_page_of_its_own_run(name):
-    pages = runpy.run_path(str(ROOT / "docs" / "gallery_pages.py"))
-    again = f"run: python docs/gallery_pages.py {name}"
+    pages = runpy.run_path(str(ROOT / "tools" / "docs" / "gallery_pages.py"))
+    again = f"run: python tools/docs/gallery_pages.py {name}"
     page = ROOT / "docs" / "gallery" / f"{name}.md"
     assert page.exists(), again
     text = page.read_text(encoding="utf-8")
@@ -183,3 +183,8 @@ def test_no_page_or_picture_of_the_gallery_is_left_over():
     shown = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "gallery").glob("*.md"))
     for picture in pictures.rglob("*.*"):
         assert f"../images/gallery/{picture.relative_to(pictures).as_posix()})" in shown
+
+
+def test_pictures_of_pages_are_stored_as_webp():
+    kinds = {path.suffix for path in (ROOT / "docs" / "images").rglob("*.*")}
+    assert kinds == {".webp"}, "run: python tools/docs/webp.py"

@@ -21,7 +21,7 @@ NAMES = ("first_camera", "plenoptic", "learn_a_mask")
 
 @functools.cache
 def pages() -> dict[str, Any]:
-    return runpy.run_path(str(ROOT / "docs" / "notebook_pages.py"))
+    return runpy.run_path(str(ROOT / "tools" / "docs" / "notebook_pages.py"))
 
 
 def shown(value: Any) -> Any:
@@ -59,7 +59,7 @@ def test_a_notebooks_page_has_its_words_and_code(name):
     place = 0
     for kind, source in pages()["cells"](name):
         wanted = f"```python\n{source}\n```" if kind == "code" else source.replace(".ipynb)", ".md)")
-        assert wanted in page[place:], f"python docs/notebook_pages.py writes the page anew; it lacks: {source}"
+        assert wanted in page[place:], f"run: python tools/docs/notebook_pages.py; the page lacks: {source}"
         place = page.index(wanted, place)
     for picture in re.findall(r'src="\.\./(images/[^"]+)"', page):
         assert (ROOT / "docs" / picture).exists()

@@ -11,12 +11,12 @@ import vcc
 from tests.learn.cameras import ELEMENTS
 from vcc.learn.verdicts import verdict
 
-DOCS = Path(__file__).parents[2] / "docs"
+TOOLS = Path(__file__).parents[2] / "tools" / "docs"
 
 
 @pytest.fixture(scope="module")
 def page():
-    return runpy.run_path(str(DOCS / "learning_table.py"))
+    return runpy.run_path(str(TOOLS / "learning_table.py"))
 
 
 @pytest.mark.parametrize(
@@ -47,6 +47,6 @@ def test_electronics_are_smoothed(page):
 
 @pytest.mark.parametrize("kind", ["lens", "mask of cells", "axicon"])
 def test_the_table_says_so_too(page, kind):
-    text = (DOCS / "learning.md").read_text(encoding="utf-8")
+    text = (TOOLS.parents[1] / "docs" / "learning.md").read_text(encoding="utf-8")
     written = [line for line in text.splitlines() if line.startswith(f"| {kind} |")]
-    assert written == page["rows"](kind), "run: python docs/learning_table.py"
+    assert written == page["rows"](kind), "run: python tools/docs/learning_table.py"

@@ -8,6 +8,7 @@ exact overlap; where diffusers scatter them, the sampling error is told.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -248,7 +249,7 @@ def _check(
         raise InputError(f"rays is a whole number from 16 to 2^26, not {rays}")
 
 
-def _sizes(aperture: tuple[float, float]) -> tuple[float, float]:
+def _sizes(aperture: Sequence[float]) -> tuple[float, float]:
     if len(aperture) != 2 or not all(side > 0 and math.isfinite(side) for side in aperture):
         raise InputError(f"aperture is (width, height), each above 0 m, not {aperture}")
     return float(aperture[0]), float(aperture[1])

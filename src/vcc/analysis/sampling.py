@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -131,7 +132,7 @@ def _grid_of(light_field: Samples) -> Grid:
     return light_field.grid
 
 
-def _checked_depths(depths: tuple[float, float]) -> tuple[float, float]:
+def _checked_depths(depths: Sequence[float]) -> tuple[float, float]:
     """(lowest, highest) 1/Z."""
     if len(depths) != 2 or not all(depth > 0 for depth in depths) or depths[0] > depths[1]:
         raise InputError(f"depths is (near, far) before the camera in metres, each above 0, not {depths}")

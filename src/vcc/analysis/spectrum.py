@@ -313,7 +313,7 @@ def _coordinate(name: str) -> int:
     return order.index(name)
 
 
-def _two_axes(across: tuple[str, str]) -> tuple[int, int]:
+def _two_axes(across: Sequence[str]) -> tuple[int, int]:
     if len(across) != 2 or across[0] == across[1]:
         raise InputError(f'a plane lies across two coordinates, such as ("u", "s"), not {across!r}')
     for name in across:

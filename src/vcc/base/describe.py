@@ -172,7 +172,7 @@ def _value(value: Any, unit: str | None) -> str:
 def _number(value: float, unit: str | None) -> str:
     if unit is not None:
         return short(value, unit) if math.isfinite(value) else ("infinite" if value > 0 else "minus infinite")
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return str(value) if isinstance(value, int) else f"{value:.6g}"
 
 
 def _list(values: tuple[Any, ...] | list[Any], unit: str | None) -> str:

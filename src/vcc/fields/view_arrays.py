@@ -35,7 +35,7 @@ def in_grid(values: Any, shape: tuple[int, ...], grid: tuple[int, int] | None, c
         InputError: a grid or channels that do not fit; four axes that may be either.
     """
     if grid is not None:
-        if not isinstance(grid, tuple | list) or [isinstance(n, int | np.integer) for n in grid] != [True, True]:
+        if not isinstance(grid, tuple | list) or [isinstance(n, int | np.integer) for n in grid] != [True, True]:  # type: ignore[redundant-expr]
             raise InputError(f"grid is two whole numbers, (rows, columns) of views, not {grid!r}")
         rows, columns = grid
         fits = {3: (None, False), 4: (None, True)}.get(len(shape), ())

@@ -198,7 +198,7 @@ def _divided(values: NDArray[Any], shape: tuple[int, ...] | None, path: Path) ->
     if shape is None:
         return values
     sizes = tuple(shape)
-    if not all(isinstance(n, int | np.integer) and n > 0 for n in sizes):
+    if not all(isinstance(n, int | np.integer) and n > 0 for n in sizes):  # type: ignore[redundant-expr]
         raise InputError(f"shape is made of whole numbers above 0, not {shape}")
     if len(sizes) == 2 and values.ndim in (3, 4):
         sizes = (*sizes, *values.shape[1:])

@@ -126,7 +126,7 @@ class Element(Shown, abc.ABC):
     name: str = ""
 
     def __post_init__(self) -> None:
-        if isinstance(self.name, str) and len(self.name) > LONGEST_NAME:
+        if isinstance(self.name, str) and len(self.name) > LONGEST_NAME:  # type: ignore[redundant-expr]
             raise InputError(
                 f'the name of a {self.kind}, "{self.name[:20]}…", has {len(self.name)} letters: take up to '
                 f"{LONGEST_NAME}"

@@ -151,7 +151,7 @@ class FirstOrder(Element):
             InputError: a radius of 0 or not a number, a negative thickness, an index that is not greater than 0.
         """
         label = f'thick lens "{name}"' if name else f"thick lens at z = {z * 1e3:g} mm"
-        if not isinstance(radii, tuple | list) or len(radii) != 2:
+        if not isinstance(radii, tuple | list) or len(radii) != 2:  # type: ignore[redundant-expr]
             raise InputError(f"radii of {label} are (R1, R2) in metres, not {radii}")
         for radius in radii:
             checks.not_zero(f"a radius of {label}", radius, way_out="inf is a plane")

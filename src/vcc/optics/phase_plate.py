@@ -78,7 +78,7 @@ class PhasePlate(Element):
     def __post_init__(self) -> None:
         super().__post_init__()
         if isinstance(self.surface, type) or not (isinstance(self.surface, Surface) or callable(self.surface)):
-            given = self.surface.__name__ if isinstance(self.surface, type) else type(self.surface).__name__
+            given = self.surface.__name__ if isinstance(self.surface, type) else type(self.surface).__name__  # type: ignore[redundant-expr]
             raise InputError(
                 f"surface of {self.label} is a vcc.surfaces.Surface, such as Cubic(250.0), or a function of "
                 f"(x, y) that returns slopes (Δs, Δt), not {given}"

@@ -109,7 +109,7 @@ def slice_of(across: str) -> tuple[int, int]:
         InputError: others, or one twice.
     """
     names = {"u": "us", "v": "vt"}.get(across, across)
-    if not isinstance(names, str) or len(names) != 2 or names[0] == names[1] or set(names) - set(NAMES):
+    if not isinstance(names, str) or len(names) != 2 or names[0] == names[1] or set(names) - set(NAMES):  # type: ignore[redundant-expr]
         raise InputError(
             f'across is "u" or "v", or two of u, v, s and t, such as "uv", that to the right first, not {across!r}'
         )

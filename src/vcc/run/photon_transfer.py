@@ -86,7 +86,7 @@ def photon_transfer(
         InputError: an unusable argument, or a black level that cuts off the dark noise.
     """
     checks.whole_number_between("levels", levels, 4, way_out="a curve needs as many")
-    if len(shape) != 2 or min(shape) < 1 or shape[0] * shape[1] < 2:
+    if len(shape) != 2 or min(shape) < 1 or shape[0] * shape[1] < 2:  # type: ignore[redundant-expr]
         raise InputError(f"shape is {shape!r}: give (rows, columns) of at least two pixels")
     time = checked_exposure(exposure)
     dark = electronics.dark_current * time

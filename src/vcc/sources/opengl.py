@@ -96,7 +96,7 @@ class Lighting:
             raise InputError(f"sun_from is a direction of three numbers, not {self.sun_from}")
 
 
-def _light(name: str, given: Vector) -> Vector:
+def _light(name: str, given: Sequence[float]) -> Vector:
     """Radiance as floats, none of them below 0."""
     if len(given) != 3 or not all(part >= 0 and math.isfinite(part) for part in given):
         raise InputError(f"{name} is light as (red, green, blue), each 0 or more, not {given}")

@@ -141,7 +141,7 @@ class Attributes(Brief):
             raise InputError(f"{owner}: complete is true or false, not {self.complete!r}")
         if self.disparity_range is not None:
             given = self.disparity_range
-            numbers = len(given) == 2 and all(isinstance(n, int | float) and math.isfinite(n) for n in given)
+            numbers = len(given) == 2 and all(isinstance(n, int | float) and math.isfinite(n) for n in given)  # type: ignore[redundant-expr]
             if not (numbers and given[0] <= given[1]):
                 raise InputError(f"{owner}: disparity_range is (lowest, highest), not {given}")
         if self.channel_names is not None and channels != "unknown" and len(self.channel_names) != (channels or 0):
