@@ -154,7 +154,7 @@ def geometry_by_rays(name: str) -> Case:
     plan = rays.cameras()[name].compile(field, method="rays")
     given = weights(plan)
     shape = ("core.first_pixel", "core.pitch", "core.index_from_ray", "core.aim.")
-    wanted = [each for each in plan.numbers() if each.startswith(shape) or each.endswith("before_from_behind")]
+    wanted = [each for each in plan.parameters() if each.startswith(shape) or each.endswith("before_from_behind")]
     return Case(
         f"geometry by rays, 8 bits: {name}",
         {

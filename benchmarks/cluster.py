@@ -45,7 +45,7 @@ import numpy as np
 
 import vcc
 from vcc.patterns import CosineSum
-from vcc.run.executors import TOGETHER, Work, crew
+from vcc.run.executors import TOGETHER, Work, worker_pool
 from vcc.store import Lossless, create_store, open_store
 from vcc.units import mm
 
@@ -320,9 +320,9 @@ def scheduler() -> None:
 
 def tasks_each_second(client: Any, count: int) -> float:
     """How many tasks are done in a second that do nothing, sums counted."""
-    crew(client).summed(Work(pause, 0.0), range(TOGETHER), longer, lambda _: None)
+    worker_pool(client).summed(Work(pause, 0.0), range(TOGETHER), longer, lambda _: None)
     start = time.perf_counter()
-    crew(client).summed(Work(pause, 0.0), range(count), longer, lambda _: None)
+    worker_pool(client).summed(Work(pause, 0.0), range(count), longer, lambda _: None)
     return count * TOGETHER / (TOGETHER - 1) / (time.perf_counter() - start)
 
 
@@ -473,7 +473,7 @@ def beside_dask() -> None:
                 512.0, 1.0, 0.0, 8, storage=np.inf, network=np.inf, latency=0.0, running=1 / seconds, tasks=rate
             )
             start = time.perf_counter()
-            crew(client).summed(Work(pause, seconds), range(512), longer, lambda _: None)
+            worker_pool(client).summed(Work(pause, seconds), range(512), longer, lambda _: None)
             took = time.perf_counter() - start
             print(f"512 tasks that sleep {seconds:g} s, 8 workers, {rate:.0f} tasks a second: ", end="")
             print(f"simulated {small.simulated():.2f} s, by Dask {took:.2f} s", flush=True)

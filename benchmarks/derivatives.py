@@ -65,7 +65,7 @@ class Compared:
             chain = Chain(self.camera, self.light_field.grid, HOW, [name])
             plan = chain.plan()
             wanted = [number for number in chain.followed()[name] if not number.endswith("half_widths")]
-            given = back(plan, self.light_field, self.weights, HOW, samples_wanted=False, wanted=wanted).numbers
+            given = back(plan, self.light_field, self.weights, HOW, samples_wanted=False, wanted=wanted).gradients
             pulled = chain.pull({}, given)[name]
             here, unit = read(self.camera, name), scale(self.camera, name)
             return Counter(

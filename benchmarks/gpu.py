@@ -29,7 +29,7 @@ from numba import cuda
 import vcc
 from vcc.engines import cuda as engine
 from vcc.engines import cuda_back, cuda_footprints
-from vcc.engines.cuda_arrays import SIMULATED, launch, sent, zeros
+from vcc.engines.cuda_arrays import SIMULATED, launch, to_device, zeros
 from vcc.plan.how import How
 from vcc.run.drive import Drive
 from vcc.units import mm
@@ -87,14 +87,14 @@ class Case:
         return lambda: cuda_footprints.raster_on_gpu(self.core, values)
 
     def back(self) -> Step:
-        weights = sent(np.random.default_rng(3).random((*self.core.raster_shape, 3), np.float32))
+        weights = to_device(np.random.default_rng(3).random((*self.core.raster_shape, 3), np.float32))
         return lambda: cuda_back.samples_back_on_gpu(self.core, self.there.shape, weights)
 
     def numbers(self) -> Step:
-        weights = sent(np.random.default_rng(3).random((*self.core.raster_shape, 3), np.float32))
+        weights = to_device(np.random.default_rng(3).random((*self.core.raster_shape, 3), np.float32))
         wanted = ["weights", *(f"masks[{n}].texture" for n in range(len(self.core.masks)))]
         values = self.values()
-        return lambda: cuda_back.numbers_back(self.core, values, weights, wanted)
+        return lambda: cuda_back.footprint_gradients(self.core, values, weights, wanted)
 
     def rays(self) -> Step:
         values = self.values()

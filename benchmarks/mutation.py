@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ROOMS = {
     "optics": ("optics",),
     "plan": ("plan",),
-    "engines": ("engines/reference.py", "engines/reference_back.py", "engines/reference_ray_numbers.py"),
+    "engines": ("engines/reference.py", "engines/reference_back.py", "engines/reference_ray_gradients.py"),
     "run": ("run",),
     "recover": ("recover",),
 }

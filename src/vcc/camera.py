@@ -9,7 +9,7 @@ from typing import Any, Literal, Self, TypeVar, Unpack
 
 from vcc.advice.explain import Explanation, explained
 from vcc.advice.of_images import Cautions
-from vcc.base import checks, late
+from vcc.base import checks, lazy_import
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
@@ -24,7 +24,7 @@ from vcc.optics.train import Train
 from vcc.plan.choice import compile_best, compiled_each, mixture_of
 from vcc.plan.how import OF_THE_RUN, How, Options
 from vcc.plan.model import Plan
-from vcc.plan.protocol import Room
+from vcc.plan.protocol import OutputBuffers
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
 from vcc.run.batches import may_be_mixed, recorded_each, recorded_mixed
@@ -372,14 +372,14 @@ class Camera(Train):
             InputError: the package anywidget is not installed (extra ``notebook``), a light field that is not in
                 memory, or a camera that no file can hold: functions of Python, elements of your own.
         """
-        return late.module("vcc.bench.widget").bench_of(self, light_field)
+        return lazy_import.module("vcc.bench.widget").bench_of(self, light_field)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.camera_file`."""
         write_train(self, path)
 
 
-def captured_together(
+def captured_in_batches(
     cameras: Sequence[Camera], light_field: Samples, how: How, *, seeds: Sequence[int] | None = None
 ) -> list[Image]:
     """What `Camera.capture` gives of one light field for several cameras, in their order; see `each_captured`."""
@@ -393,7 +393,7 @@ def each_captured(
     how: How,
     *,
     seeds: Sequence[int] | None = None,
-    room: Room | None = None,
+    output_buffers: OutputBuffers | None = None,
 ) -> Iterator[tuple[int, Image]]:
     """What `Camera.capture` gives of one light field for several cameras, which share what they can of the work.
 
@@ -406,7 +406,7 @@ def each_captured(
         light_field: as in `Camera.capture`.
         how: likewise.
         seeds: of rays, one for each camera; None takes that of ``how`` for all.
-        room: where some of the pictures may be made.
+        output_buffers: where some of the pictures may be made.
 
     Returns:
         Each camera's number and picture, as they are made.
@@ -426,7 +426,7 @@ def each_captured(
     if mixture is not None:
         cautions = Cautions(cameras[0], light_field.grid)  # of all of them: they differ in cells alone
         _warn_of(cautions.before())
-        found = zip(mixture.members, recorded_mixed(mixture, light_field, how, room), strict=True)
+        found = zip(mixture.members, recorded_mixed(mixture, light_field, how, output_buffers), strict=True)
         for number, one in found:
             camera = cameras[number]
             # A picture that is dark is explained by the camera's own plan.
@@ -441,8 +441,8 @@ def each_captured(
         how,
         None if seeds is None else [seeds[number] for number in left],
     )
-    room_of = room and (lambda places: room([left[place] for place in places]))
-    for number, (plan, one) in zip(left, recorded_each(plans, light_field, how, room_of), strict=True):
+    buffers_of = output_buffers and (lambda places: output_buffers([left[place] for place in places]))
+    for number, (plan, one) in zip(left, recorded_each(plans, light_field, how, buffers_of), strict=True):
         camera = cameras[number]
         cautions = Cautions(camera, light_field.grid)
         _warn_of((*plan.cautions, *cautions.before(), *cautions.of(plan, light_field, one)))

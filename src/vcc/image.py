@@ -17,9 +17,9 @@ from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.fields.sampled import IMAGE_AXES, Index, as_array, indices, taken, to_numpy
 from vcc.files.destination import Target
+from vcc.files.image_metadata import CameraMark, ImageMetadata, Quantity
+from vcc.files.images_with_metadata import clipping, light_of, read_with_metadata, unknown
 from vcc.files.pictures import Exposure, SavedPicture, coded_picture, save_picture
-from vcc.files.stated import clipping, light_of, read_stated, unknown
-from vcc.files.statement import CameraMark, Quantity, Statement
 from vcc.optics.train import Train
 
 
@@ -125,7 +125,7 @@ class Image(Shown):
         - ``.exr``: linear float32, values untouched; channels R, G, B or Y
         - ``.npy``: linear float32, values untouched
 
-        Each file says what its numbers are (`vcc.files.statement`), and `load_image` gives the picture back.
+        Each file says what its numbers are (`vcc.files.image_metadata`), and `load_image` gives the picture back.
 
         Args:
             path: where to; or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
@@ -147,14 +147,14 @@ class Image(Shown):
                 the format cannot show.
         """
         shown = self.upright() if upright else self
-        values, said = shown.to_numpy(), shown._statement()
+        values, said = shown.to_numpy(), shown._metadata()
         return save_picture(values, path, statement=said, exposure=exposure, bits=bits, format=format)
 
-    def _statement(self) -> Statement:
+    def _metadata(self) -> ImageMetadata:
         """What the values are, for a file."""
         mark = CameraMark.of(self.camera) if isinstance(self.camera, Train) else self.camera
         quantity: Quantity = "light" if mark is None else "irradiance"
-        return Statement(quantity, upright=not self.inverted, frame=self.frame, camera=mark)
+        return ImageMetadata(quantity, upright=not self.inverted, frame=self.frame, camera=mark)
 
     def __repr__(self) -> str:
         pitch = short(self.pixel_area**0.5)
@@ -181,8 +181,8 @@ def load_image(path: str | PathLike[str]) -> Image:
     Warns:
         ResultWarning: pixels were too bright when the file was written: they are lower bounds.
     """
-    stated = read_stated(path)
-    said = stated.statement
+    stated = read_with_metadata(path)
+    said = stated.metadata
     if said is None:
         raise InputError(
             f"{unknown(stated)}: vcc.formats.pictures.read_picture gives its numbers as they are, for an "

@@ -14,9 +14,9 @@ from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.fields.sampled import as_array
 from vcc.files.destination import Target
+from vcc.files.image_metadata import CameraMark, ImageMetadata, RawNumbers
+from vcc.files.images_with_metadata import read_with_metadata, unknown
 from vcc.files.pictures import SavedPicture, save_numbers
-from vcc.files.stated import read_stated, unknown
-from vcc.files.statement import CameraMark, RawNumbers, Statement
 from vcc.image import Image
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
@@ -97,7 +97,7 @@ class Recording(RawPicture, Shown):
         """Write the numbers untouched to a .tif, .png or .npy: linear, not scaled, upside down as recorded.
 
         The file also says, as JSON, what the numbers mean (exposure, gain, black level, filter, …; see
-        `vcc.files.statement`), and `load_recording` gives the recording back.
+        `vcc.files.image_metadata`), and `load_recording` gives the recording back.
 
         Args:
             path: where to; or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
@@ -108,11 +108,11 @@ class Recording(RawPicture, Shown):
                 or a place that cannot be written.
         """
         words = f"{self.electronics.bit_depth}-bit raw, {self.electronics.filter_in_words}, {self._in_words()}"
-        return save_numbers(self.values, path, self._statement(), words, format)
+        return save_numbers(self.values, path, self._metadata(), words, format)
 
-    def _statement(self) -> Statement:
+    def _metadata(self) -> ImageMetadata:
         """What the numbers are, for a file."""
-        return Statement(
+        return ImageMetadata(
             "digital numbers",
             upright=False,
             clipped=self.saturated,
@@ -220,8 +220,8 @@ def load_recording(path: str | PathLike[str], sensor: Sensor) -> Recording:
         InputError: a file that cannot be read, that does not say that it is such a recording, or whose numbers
             have been changed since it was written; a sensor that the file contradicts.
     """
-    stated = read_stated(path)
-    said = stated.statement
+    stated = read_with_metadata(path)
+    said = stated.metadata
     if said is None or said.recording is None:
         is_none = unknown(stated) if said is None else f"{path} says that its numbers are {said.in_words}"
         raise InputError(

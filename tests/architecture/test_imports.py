@@ -73,7 +73,7 @@ FACES = {
 
 BY_NAME = {
     "": "names of `vcc` are loaded when they are first used, and what shows things in notebooks, too",
-    "base.late": "what the others load with",
+    "base.lazy_import": "what the others load with",
     "store.compression": "a codec is a class of Zarr's, which takes long to load",
     "sources.planes": "pictures of planes are mixed by compiled loops",
     "sources.depth_map": "meshes are made by compiled loops",

@@ -23,7 +23,7 @@ import vcc
 from tests.bench.on_bench import CAMERA, noise, offered
 from vcc import InputError
 from vcc.bench import server
-from vcc.bench.carried import Damaged, packed, unpacked
+from vcc.bench.carried import DamagedMessage, packed, unpacked
 from vcc.bench.server import LARGEST_MESSAGE, MOST_CLIENTS, Door, Outbox, application, listening
 
 PAGES = {"index.html": b"<p>A bench.</p>", "bench.js": b"export {};", "notes.txt": b"not a page"}
@@ -305,7 +305,7 @@ def test_messages_come_as_they_went(message, buffers):
 def test_bytes_are_a_message_or_damaged(data):
     try:
         message, _ = unpacked(data)
-    except Damaged:
+    except DamagedMessage:
         return
     assert isinstance(message, dict)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import vcc
-from vcc.bench.snapping import snaps_of_elements, snaps_of_sensor, told_once
+from vcc.bench.snapping import snaps_of_elements, snaps_of_sensor, without_repeats
 from vcc.units import mm
 
 
@@ -109,7 +109,7 @@ def test_the_sensor_is_pulled_to_where_focusing_puts_it():
 
 
 def test_a_distance_is_told_once():
-    assert told_once({"a": 1.0, "b": 1.0001, "c": math.inf, "d": math.inf, "e": 2.0}) == {
+    assert without_repeats({"a": 1.0, "b": 1.0001, "c": math.inf, "d": math.inf, "e": 2.0}) == {
         "a": 1.0,
         "c": math.inf,
         "e": 2.0,

@@ -14,7 +14,7 @@ import pytest
 import vcc
 from tests.command_line import CAMERA, KNOWN, refused, run, write_views
 from vcc.cli.app import COMMANDS, RENDERERS
-from vcc.cli.console import _Foretold, as_options
+from vcc.cli.console import _Estimate, as_options
 from vcc.plan.how import How
 
 
@@ -81,17 +81,17 @@ def test_progress_is_asked_for_where_work_is_long(folder, monkeypatch):
 
 def test_long_work_that_nobody_watches_says_once_how_long_it_takes(capsys):
     now = [0.0]
-    foretold = _Foretold("Rendering views", lambda: now[0])
+    foretold = _Estimate("Rendering views", lambda: now[0])
     for second in range(60):
         now[0] = float(second)
         foretold(second, 400)
     assert capsys.readouterr().err == "Rendering views: about 7 min to go\n"  # after 5 s, 5 of 400: 395 s
-    begun_before = _Foretold("Rendering views", lambda: now[0])
+    begun_before = _Estimate("Rendering views", lambda: now[0])
     begun_before(390, 400)
     now[0] += 10
     begun_before(392, 400)
     assert capsys.readouterr().err == "Rendering views: about 40 s to go\n"
-    short = _Foretold("Rendering views", lambda: now[0])
+    short = _Estimate("Rendering views", lambda: now[0])
     now[0] += 6
     short(390, 400)
     assert capsys.readouterr().err == ""

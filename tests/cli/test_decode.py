@@ -14,7 +14,7 @@ import vcc
 from tests.command_line import refused, run
 from tests.formats.test_lytro_lfp import container, pack_little
 from vcc.cli.raw_recordings import turned_tile
-from vcc.files.statement import CameraMark, statement_of
+from vcc.files.image_metadata import CameraMark, metadata_of
 from vcc.formats.writing import save_light_field
 from vcc.recover import LensletGrid, decode_heterodyne, decode_plenoptic
 from vcc.store import open_store
@@ -392,7 +392,7 @@ def test_what_capture_wrote_is_decoded_as_what_was_captured(written, ending):
     for more in ([], ["--as-recorded"]) if ending == "exr" else ([],):
         result = run("capture", "camera.toml", "field.npz", "-o", raw, "--samples", 16, *more)
         assert result.exit_code == 0, result.output
-        exposure = statement_of(Path(raw)).exposure
+        exposure = metadata_of(Path(raw)).exposure
         seen = np.minimum(image.to_numpy(), np.float32(1 / exposure)) if exposure != 1 else image.to_numpy()
         expected = decode_plenoptic(seen, camera=camera, views=3)
         values, notes = decoded(raw)

@@ -16,7 +16,7 @@ import xarray
 
 import vcc
 from tests.command_line import CAMERA, KNOWN, refused, run, write_views
-from vcc.run import sent
+from vcc.run import serialization
 from vcc.sweeps import open_sweep, sweeping
 
 MASK = """
@@ -85,7 +85,7 @@ def test_an_executor_makes_the_same_pictures(folder, monkeypatch):
     assert " of 6 cameras, one of them: " in result.stderr
     here, there = (np.asarray(open_sweep(name).pictures) for name in ("here.zarr", "there.zarr"))
     np.testing.assert_allclose(there, here, rtol=0, atol=1e-6 * here.max())
-    monkeypatch.setattr(sent, "SENT", 1000)
+    monkeypatch.setattr(serialization, "SENT", 1000)
     said = refused(*sweep(*values, "-o", "more.zarr", "--executor", "threads"))
     assert "views is read into memory, and is too large to be sent" in said
     assert "vcc convert views scene.zarr makes a store" in said

@@ -212,7 +212,7 @@ def test_backwards_as_the_reference(name, monkeypatch):
         found = engine.back(core, values, weights, wanted=wanted, threads=1)
         assert_close(found.samples, expected.samples)
         for number in wanted:
-            assert_close(found.numbers[number], expected.numbers[number])
+            assert_close(found.gradients[number], expected.gradients[number])
 
 
 def assert_close(found: np.ndarray, expected: np.ndarray) -> None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.engines.test_footprint_numbers import Drawn
+from tests.engines.test_footprint_gradients import Drawn
 from vcc.base.workers import Workers
 from vcc.engines import numba_cpu
 from vcc.engines.footprints_of_many import rasters, rasters_by_turns

@@ -21,7 +21,7 @@ from vcc.plan.rays.bounds.windows import CellWindows, Window
 from vcc.run.drive import drive
 from vcc.shapes import kernels, patterns, surfaces
 from vcc.shapes.lattice import CellApertures
-from vcc.shapes.sheets import Product
+from vcc.shapes.stacked_patterns import Product
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 

@@ -60,7 +60,7 @@ def error(engine, core: Rays, channels: tuple[int, ...], beside: int = 0) -> flo
     back = engine.back(core, samples, weights, beside=beside, threads=2)
     assert back.samples.shape == samples.shape
     assert back.samples.dtype == kind
-    assert back.numbers == {}
+    assert back.gradients == {}
     ahead = (raster.astype(np.float64) * weights).sum()
     assert ahead > 0
     return abs((back.samples.astype(np.float64) * samples).sum() - ahead) / ahead
@@ -147,7 +147,7 @@ def test_samples_and_numbers_count_to_one_total(engine):
         core, samples, weights, wanted=["scale"], threads=1, progress=lambda *call: calls.append(call)
     )
     assert back.samples is not None
-    assert set(back.numbers) == {"scale"}
+    assert set(back.gradients) == {"scale"}
     done, totals = zip(*calls, strict=True)
     assert set(totals) == {done[-1]}
     assert list(done) == sorted(done)

@@ -13,7 +13,7 @@ from tests.physics.random_cameras import AFFINE, drawn
 from vcc.engines import reference
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import share_slopes, shares
-from vcc.plan.numbers import numbers, with_numbers
+from vcc.plan.parameters import parameters, with_parameters
 
 # Cameras here ask for what they like.
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
@@ -46,7 +46,7 @@ def assert_adjoint(core: Footprints) -> None:
     weights, picture = weights_of(core, values), ahead(core, values)
     found = reference.back(core, np.broadcast_to(np.float32(0), values.shape), weights, threads=1)
     assert found.samples.dtype == np.float64
-    assert found.numbers == {}
+    assert found.gradients == {}
     product = (found.samples * values).sum()
     # Sums of n terms in double precision differ by some √n·1e-16 of the root of the sum of their squares.
     assert abs(product - (weights * picture).sum()) <= 1e-12 * np.linalg.norm(weights) * np.linalg.norm(picture)
@@ -70,11 +70,13 @@ def assert_differences(core: Footprints, names=None, together: bool = False) -> 
     """Central differences of some 1e-5 along a random direction of each number, or of all of them at once. Second
     derivatives jump where footprints end and in textures, which so small a step seldom meets."""
     values, draw = light_of(core), np.random.default_rng(7)
-    weights, every = weights_of(core, values), numbers(core)
+    weights, every = weights_of(core, values), parameters(core)
     names = [name for name in names or every if name != "sharpen_samples"]
     found = reference.back(core, values, weights, samples=False, wanted=names, threads=1)
     assert found.samples is None
-    assert {name: one.shape for name, one in found.numbers.items()} == {name: every[name].shape for name in names}
+    assert {name: one.shape for name, one in found.gradients.items()} == {
+        name: every[name].shape for name in names
+    }
     # Steps count up to the last sample.
     directions = {
         name: 1e-5 * draw.normal(size=every[name].shape) / (max(core.samples) if "step" in name else 1)
@@ -82,11 +84,11 @@ def assert_differences(core: Footprints, names=None, together: bool = False) -> 
     }
     for some in [names] if together else [[name] for name in names]:
         over, under = (
-            ahead(with_numbers(core, {name: every[name] + sign * directions[name] for name in some}), values)
+            ahead(with_parameters(core, {name: every[name] + sign * directions[name] for name in some}), values)
             for sign in (1, -1)
         )
         change = (over - under) / 2
-        told = sum((found.numbers[name] * directions[name]).sum() for name in some)
+        told = sum((found.gradients[name] * directions[name]).sum() for name in some)
         allowed = 1e-6 * np.linalg.norm(weights) * np.linalg.norm(change)
         assert abs(told - (weights * change).sum()) <= allowed, some
 
@@ -137,7 +139,7 @@ def test_places_have_no_derivative_on_the_nearest_pixel():
     for name in ("x", "y", "step", "opening"):
         with pytest.raises(vcc.InputError, match=f"'{name}' where each sample falls on the nearest pixel"):
             reference.back(core, values, weights_of(core, values), wanted=[name], threads=1)
-    assert_differences(core, [name for name in numbers(core) if name not in ("x", "y", "step", "opening")])
+    assert_differences(core, [name for name in parameters(core) if name not in ("x", "y", "step", "opening")])
 
 
 def test_what_there_is_no_derivative_to_is_refused_by_name():

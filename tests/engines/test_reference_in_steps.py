@@ -14,10 +14,10 @@ import pytest
 
 import vcc
 from tests.engines.test_agreement import CAMERAS, field, samples, turned
-from tests.engines.test_ray_numbers import case, wanted
+from tests.engines.test_ray_gradients import case, wanted
 from tests.engines.test_reference_back import core_of, light_of
 from vcc.base.units import mm
-from vcc.engines import reference, reference_ray_numbers
+from vcc.engines import reference, reference_ray_gradients
 from vcc.plan import operators
 from vcc.plan.footprints.shares import shares
 
@@ -80,10 +80,10 @@ def test_as_many_rays_are_followed_at_once_as_may_be(monkeypatch, name):
         cells = (2 * down + 1) * (2 * across + 1)
     every = []
     for at_once in (1, core.samples * cells * 4, core.samples * cells * 5 - 1, 2**20):
-        monkeypatch.setattr(reference_ray_numbers, "RAYS_AT_ONCE", at_once)
+        monkeypatch.setattr(reference_ray_gradients, "RAYS_AT_ONCE", at_once)
         calls: list[tuple[int, int]] = []
         every.append(
-            reference_ray_numbers.ray_numbers_back(
+            reference_ray_gradients.ray_gradients(
                 core, values, weights, names, progress=lambda *call, calls=calls: calls.append(call)
             )
         )
@@ -105,7 +105,7 @@ def test_rays_beside_those_of_the_first_round_have_derivatives_of_their_own():
         picture = reference.run(core, values, beside=beside, threads=1).values
         told = reference.back(core, values, weights, wanted=["scale"], beside=beside, threads=1)
         product = float((picture.reshape(weights.shape) * weights).sum())
-        assert float(told.numbers["scale"]) * core.scale == pytest.approx(product, rel=1e-6)
+        assert float(told.gradients["scale"]) * core.scale == pytest.approx(product, rel=1e-6)
         assert float((told.samples * values).sum()) == pytest.approx(product, rel=1e-6)
         found.append(product)
     assert found[0] != pytest.approx(found[1], rel=1e-3)

@@ -81,7 +81,7 @@ def of_some_taps(core: Footprints) -> Footprints:
 def back(core: Footprints, shape: tuple[int, ...], raster: np.ndarray, threads: int = 2, **options) -> np.ndarray:
     without_content = np.broadcast_to(np.float32(0), shape)
     gradient = NUMBA.back(core, without_content, raster, threads=threads, **options)
-    assert gradient.numbers == {}
+    assert gradient.gradients == {}
     return gradient.samples
 
 

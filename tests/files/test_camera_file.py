@@ -37,11 +37,11 @@ from vcc.base.units import deg, mm, nm, um
 from vcc.camera_file import ELEMENT_KINDS, KERNEL_NAMES, PATTERN_NAMES, SURFACE_NAMES, save_camera
 from vcc.files.camera_reading import read_train
 from vcc.files.camera_writing import write_train
-from vcc.files.statement import CameraMark
+from vcc.files.image_metadata import CameraMark
 from vcc.optics.train import Train
 from vcc.shapes import kernels, patterns, surfaces
 from vcc.shapes.lattice import CellApertures, CellBlock, Lattice
-from vcc.shapes.sheets import Product
+from vcc.shapes.stacked_patterns import Product
 
 SENSOR = '\n[sensor]\nz = "52 mm"\nshape = [500, 400]\npitch = "48 um"\n'
 LENS = '[[elements]]\nkind = "lens"\nz = "0 mm"\nfocal_length = "50 mm"\n'

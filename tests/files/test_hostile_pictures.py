@@ -17,7 +17,7 @@ from PIL import Image
 
 from vcc.base.errors import InputError
 from vcc.files import jpeg_headers
-from vcc.files.claims import PICTURE, SMALL_FILE, TIMES_PACKED, check_claim
+from vcc.files.declared_sizes import PICTURE, SMALL_FILE, TIMES_PACKED, check_declared_size
 from vcc.files.pictures import read_picture, read_png_into
 
 RANDOM = np.random.default_rng(3)
@@ -37,12 +37,12 @@ def refused(path: Path, data: bytes, message: str) -> None:
 
 
 def test_a_claim_is_held_against_the_bytes() -> None:
-    check_claim(PICTURE, 10, "it")
-    check_claim(TIMES_PACKED * 2 * SMALL_FILE, 2 * SMALL_FILE, "it")
+    check_declared_size(PICTURE, 10, "it")
+    check_declared_size(TIMES_PACKED * 2 * SMALL_FILE, 2 * SMALL_FILE, "it")
     with pytest.raises(InputError, match=r"it claims 67,108,865 bytes of samples in 10 bytes.*67,108,864"):
-        check_claim(PICTURE + 1, 10, "it")
+        check_declared_size(PICTURE + 1, 10, "it")
     with pytest.raises(InputError, match="claims endlessly many bytes"):
-        check_claim(10**400, 10, "it")
+        check_declared_size(10**400, 10, "it")
 
 
 # PNG

@@ -45,7 +45,7 @@ def written(path, samples, *, axes="v:u:t:s", mode="sub-aperture", change=None):
 def test_rays_go_where_a_thin_lens_sends_them(tmp_path, samples):
     back = vox.read(written(tmp_path / "a b.vox", samples))
     assert np.array_equal(back.values, samples)
-    assert (back.transfer, back.remarks, back.values.dtype) == ("linear", (), np.uint16)
+    assert (back.transfer, back.notices, back.values.dtype) == ("linear", (), np.uint16)
     rays = back.frame.inverse()
     x, y, distance = 1.5e-3, -2e-3, 0.7
     for j, i in np.ndindex(3, 5):
@@ -91,8 +91,8 @@ def test_what_is_not_stated_is_said(tmp_path, samples):
     back = vox.read(written(tmp_path / "a.vox", samples, change=no_distance))
     assert back.frame is None
     assert back.geometry.spacing == pytest.approx(APART)
-    assert "does not state all of its camera" in back.remarks[0]
-    assert "white pictures too, which are not applied" in back.remarks[1]
+    assert "does not state all of its camera" in back.notices[0]
+    assert "white pictures too, which are not applied" in back.notices[1]
     assert back.metadata == {"camera": "home-made"}
 
     def uncalibrated(file):
@@ -106,7 +106,7 @@ def test_what_is_not_stated_is_said(tmp_path, samples):
 
     back = vox.read(written(tmp_path / "a.vox", samples, change=focused))
     assert back.frame is None
-    assert "a focused plenoptic camera" in back.remarks[0]
+    assert "a focused plenoptic camera" in back.notices[0]
 
     def nothing(file):
         del file["instrument"]

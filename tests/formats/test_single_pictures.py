@@ -67,7 +67,7 @@ def test_opacity_is_weight_and_cut_blocks_are_said(samples: NDArray[np.uint8], t
     decoded = read_container(write(tmp_path / "a.png", picture[:-1, :-2]), views=(2, 3))
     np.testing.assert_array_equal(decoded.values, samples[:, :, :-1, :-1])
     np.testing.assert_allclose(decoded.weights, opacity[:, :, :-1, :-1, 0] / 255, rtol=1e-6)
-    assert "last 1 rows and 1 columns" in decoded.remarks[0]
+    assert "last 1 rows and 1 columns" in decoded.notices[0]
     with pytest.warns(ResultWarning, match="were left out"):
         open_light_field(tmp_path / "a.png", views=(2, 3), **GIVEN)
 

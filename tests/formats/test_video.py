@@ -47,7 +47,7 @@ def test_frames_are_views(tmp_path, frames, ending):
     assert np.array_equal(back.values, frames[None])
     assert back.transfer == "srgb"
     assert back.geometry.spacing is None
-    assert "equal steps" in back.remarks[0]
+    assert "equal steps" in back.notices[0]
     assert calls[-1][0] == 10
     assert np.array_equal(video.read(path, every=3).values[0], frames[::3])
     assert np.array_equal(video.read(path, every=2, first=1, last=7).values[0], frames[1:8:2])

@@ -83,7 +83,7 @@ def test_depth_and_what_file_managers_add_are_left_alone(tmp_path, small):
     more = [("depth.png", png(small[0, 0])), ("__MACOSX/._views.xml", b"\0"), (".views.xml", b"")]
     back = viewer_zip.read(zipped(tmp_path / "a.zip", entries_of(small), more=more))
     assert np.array_equal(back.values, small)
-    assert back.remarks == ("its depth.png is not read: what its numbers mean is not documented",)
+    assert back.notices == ("its depth.png is not read: what its numbers mean is not documented",)
 
 
 def test_a_line_and_a_single_view(tmp_path, small):

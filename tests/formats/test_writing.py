@@ -14,7 +14,7 @@ import pytest
 from tests.command_line import refused, run
 from vcc import Affine, Image, InputError, LightField, ResultWarning, open_light_field
 from vcc.files import transfer
-from vcc.files.statement import statement_of
+from vcc.files.image_metadata import metadata_of
 from vcc.formats import arrays, eslf, lftoolbox, read_geometry
 from vcc.formats.writing import save_folder, save_light_field
 from vcc.store import open_store, save_store
@@ -250,7 +250,7 @@ def test_views_that_are_dark_are_said(tmp_path):
 
 def test_one_picture_of_all_views_is_for_people(tmp_path):
     save_light_field(field_of(), tmp_path / "a.png")
-    said = statement_of(tmp_path / "a.png")
+    said = metadata_of(tmp_path / "a.png")
     assert (said.quantity, said.transfer, said.exposure, said.upright) == ("radiance", "srgb", 1, True)
     picture = Image(RNG.random((12, 12), np.float32), Affine.identity(2), inverted=False)
     picture.save(tmp_path / "b.png", exposure=2)
@@ -269,7 +269,7 @@ def test_a_folder_that_was_exposed_becomes_a_store_of_its_radiance(tmp_path, mon
         assert result.exit_code == 0, result.output
     half_a_code, half_of_8_bits = 0.51 * 2.4 / 1.055 / 65535 / 0.5, 0.51 * 2.4 / 1.055 / 255 / 0.25
     assert np.abs(open_store("field.zarr").read().values - light_field.values).max() <= half_a_code
-    assert read_geometry("again").stated.is_neutral is False
+    assert read_geometry("again").metadata.is_neutral is False
     assert np.abs(reopened("again").values - light_field.values).max() <= half_a_code + half_of_8_bits
     for output in ("b.zarr", "b.npz"):
         assert "--exposure is for folders" in refused("convert", "views", output, "--exposure", "auto")

@@ -40,7 +40,7 @@ def code(**options) -> vcc.Mask:
 def test_places_follow_the_focal_length_as_a_lens_bends():
     """A ray through x at a lens lands b·x/f² further for each metre of focal length, b behind it."""
     chain = Chain(camera(z=0.0), LIGHT_FIELD.grid, None, ["main.focal_length", "sensor.z"])
-    numbers = chain.plan().numbers()
+    numbers = chain.plan().parameters()
     weights = np.random.default_rng(2).random(numbers["core.x"].shape)
     pulled = chain.pull({}, {"core.x": weights})
     # Sample (0, 0) of view i: u = 2 mm · (i − 2), s = −2 mrad · (0 − 6.5)
@@ -70,7 +70,7 @@ def test_a_rim_at_the_views_may_leave_them():
     one, other = (picture(each.plan(), LIGHT_FIELD, how) for each in (still, chain))
     np.testing.assert_allclose(other, one, atol=0.01 * one.max())
     weights = np.random.default_rng(4).standard_normal(one.shape)
-    found = back(chain.plan(), LIGHT_FIELD, weights[..., 0], how, wanted=chain.followed()["main.z"]).numbers
+    found = back(chain.plan(), LIGHT_FIELD, weights[..., 0], how, wanted=chain.followed()["main.z"]).gradients
     near, far = ((weights * picture(chain.plan({"main.z": z}), LIGHT_FIELD, how)).sum() for z in (1e-7, 2e-7))
     slope = (-3 * (weights * other).sum() + 4 * near - far) / 2e-7
     assert chain.pull({}, found)["main.z"] == pytest.approx(slope, rel=1e-3)
@@ -88,7 +88,7 @@ def test_only_what_follows_a_parameter_is_named():
 
 def test_values_are_put_and_all_plans_have_one_form():
     chain = Chain(camera(code()), LIGHT_FIELD.grid, None, ["code.z", "code.pattern"])
-    here, there = chain.plan().numbers(), chain.plan({"code.z": 41 * mm, "code.pattern": CELLS**2}).numbers()
+    here, there = chain.plan().parameters(), chain.plan({"code.z": 41 * mm, "code.pattern": CELLS**2}).parameters()
     assert {name: one.shape for name, one in here.items()} == {name: one.shape for name, one in there.items()}
     assert np.abs(here["core.masks[0].texture"] - there["core.masks[0].texture"]).max() > 0.05
     pulled = chain.pull(
@@ -138,7 +138,7 @@ def check_derivatives(camera: vcc.Camera, light_field: vcc.LightField, names: li
     numbers = {number for followed in chain.followed().values() for number in followed}
     wanted = [number for number in numbers if not number.endswith("half_widths")]  # which say what tents are
     given = weights if light_field.values.ndim == 5 else weights[..., 0]
-    back_to_numbers = back(plan, light_field, given, how, samples_wanted=False, wanted=wanted).numbers
+    back_to_numbers = back(plan, light_field, given, how, samples_wanted=False, wanted=wanted).gradients
     pulled = chain.pull({}, back_to_numbers)
     # What rounding leaves of a sum over the picture: 1e-16 of its terms, divided by the step.
     rounding = 1e-14 * np.abs(weights * picture(plan, light_field, how)).sum()

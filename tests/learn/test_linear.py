@@ -84,7 +84,7 @@ def test_transposes_agree_with_differences(name, sample, monkeypatch):
     here = {parameter: read(camera, parameter) * 1.01}
     weights = {
         number: np.random.default_rng(3).standard_normal(value.shape)
-        for number, value in chain.plan(here).numbers().items()
+        for number, value in chain.plan(here).parameters().items()
     }
     assert chain._at(here).linear(parameter)
     followed = chain.followed(here)[parameter]
@@ -101,10 +101,10 @@ def test_a_mask_of_a_million_cells_is_learned_at_once():
     cells = np.random.default_rng(1).uniform(0.2, 0.8, (1000, 1000))
     camera = vcc.Camera([LENS, vcc.Mask(pattern=cells, width=9 * mm, z=20 * mm, name="code")], sensor())
     chain = Chain(camera, field().grid, None, ["code.pattern"])
-    texture = chain.plan().numbers()["core.masks[0].texture"]
+    texture = chain.plan().parameters()["core.masks[0].texture"]
     weights = {"core.masks[0].texture": np.ones(texture.shape)}
     change = np.random.default_rng(2).uniform(-0.1, 0.1, cells.shape)
     other = Chain(put(camera, {"code.pattern": cells + change}), field().grid, None, [])
     other.choices = chain.choices
-    found = other.plan().numbers()["core.masks[0].texture"] - texture
+    found = other.plan().parameters()["core.masks[0].texture"] - texture
     assert np.sum(chain.pull({}, weights)["code.pattern"] * change) == pytest.approx(found.sum(), rel=1e-9)

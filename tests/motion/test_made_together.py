@@ -16,7 +16,7 @@ from tests.physics.random_cameras import drawn
 from vcc.learn.parameters import keys
 from vcc.motion import LightFieldVideo, Lines, MovingCamera, Steps, moving_camera
 from vcc.patterns import Circle, mura
-from vcc.run import sent
+from vcc.run import serialization
 from vcc.store import save_store
 from vcc.units import mm, ms
 
@@ -56,13 +56,13 @@ def assert_same(found, truth):
 
 def noted(monkeypatch):
     """The cameras that are captured together, or alone, from now on."""
-    made, together, alone = [], moving_camera.captured_together, vcc.Camera.capture
+    made, together, alone = [], moving_camera.captured_in_batches, vcc.Camera.capture
 
     def several(cameras, *given, **named):
         made.append(cameras)
         return together(cameras, *given, **named)
 
-    monkeypatch.setattr(moving_camera, "captured_together", several)
+    monkeypatch.setattr(moving_camera, "captured_in_batches", several)
     monkeypatch.setattr(vcc.Camera, "capture", lambda one, *a, **n: made.append([one]) or alone(one, *a, **n))
     return made
 
@@ -109,7 +109,7 @@ def test_an_executor_takes_frames_of_a_video_and_small_light_fields_in_memory(st
 
 
 def test_what_an_executor_cannot_do_is_refused(stored, monkeypatch):
-    monkeypatch.setattr(sent, "SENT", 1000)
+    monkeypatch.setattr(serialization, "SENT", 1000)
     with ThreadPoolExecutor(1) as pool:
         with pytest.raises(vcc.InputError, match="save_store"):
             SWEEP.capture(stored.read(), EXPOSURE, executor=pool)

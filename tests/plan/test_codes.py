@@ -11,7 +11,7 @@ from vcc.plan.choice import compile_best, compiled_each
 from vcc.plan.footprints.codes import Codes, exchanged
 from vcc.plan.how import How
 from vcc.shapes.patterns import Bounded, Cells, Circle
-from vcc.shapes.sheets import Product, Shifted
+from vcc.shapes.stacked_patterns import Product, Shifted
 from vcc.units import mm
 
 RANDOM = np.random.default_rng(3)
@@ -63,8 +63,8 @@ def test_plans_made_together_are_those_made_alone(case, refine, monkeypatch):
         )
         # Masks are looked at in single precision where rays meet them.
         assert plan.missing_rays == pytest.approx(alone.missing_rays, rel=1e-6, abs=1e-9)
-        numbers = plan.numbers()
-        for name, values in alone.numbers().items():
+        numbers = plan.parameters()
+        for name, values in alone.parameters().items():
             np.testing.assert_allclose(numbers[name], values, rtol=1e-9, atol=1e-9, err_msg=name)
 
 

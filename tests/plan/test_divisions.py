@@ -17,6 +17,7 @@ from vcc.optics.scatter import Scatter
 from vcc.plan.depth_rule import denser
 from vcc.plan.following import Follow
 from vcc.plan.footprints.around import Sharpened, _check_raster, choose_gaps, choose_sharp_footprint, filled
+from vcc.plan.footprints.batch import Apart
 from vcc.plan.footprints.cells import Detail, Geometry, SampleDivision, _misplaced, divide_samples, divide_views
 from vcc.plan.footprints.compile import ByFootprints, choose_taps
 from vcc.plan.footprints.diffusers import Blurs
@@ -24,7 +25,6 @@ from vcc.plan.footprints.landing import Landing, choose_landing
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision
-from vcc.plan.footprints.together import Apart
 from vcc.plan.footprints.words import notes_of
 from vcc.plan.how import How
 from vcc.plan.in_focus import share_in_focus
@@ -73,7 +73,7 @@ class Told(Detail):
         self.asked.append((plane, known, added))
         return self.loses(added) if callable(self.loses) else self.loses
 
-    def together(self, looks):
+    def joint_variation(self, looks):
         return self.apart
 
 
@@ -307,7 +307,7 @@ def test_footprints_that_are_sharpened(step, parts, hard, footprint):
 def test_aims_are_alike_where_they_aim_at_the_same_by_as_many_rays():
     one = AimChoices(StopChoices((), (), None, None), (), True, ((0.1, 0.2),), (0, 1), None, (1, 2), 3)
     assert one.like(replace(one, bends=(None,), towards=(1, "a")))
-    for other in ({"everything": False}, {"strips": (0, 2)}, {"reach": (2, 2)}, {"halvings": 2}):
+    for other in ({"everything": False}, {"slope_bounds": (0, 2)}, {"reach": (2, 2)}, {"halvings": 2}):
         assert not one.like(replace(one, **other))
         assert not replace(one, **other).like(one)
 
@@ -350,7 +350,7 @@ def test_gradients_add_up_by_name():
     assert (other + one).samples.tolist() == [1, 1]
     assert (one + one).samples.tolist() == [2, 2]
     assert (other + other).samples is None
-    assert {name: value.tolist() for name, value in total.numbers.items()} == {"a": [1], "b": [3]}
+    assert {name: value.tolist() for name, value in total.gradients.items()} == {"a": [1], "b": [3]}
     told: list[tuple[int, int]] = []
 
     def work(result):
@@ -361,7 +361,7 @@ def test_gradients_add_up_by_name():
         return found
 
     made = Gradient.of(work("samples"), work({"a": 1}), lambda done, total: told.append((done, total)))
-    assert (made.samples, made.numbers) == ("samples", {"a": 1})
+    assert (made.samples, made.gradients) == ("samples", {"a": 1})
     assert [done / total for done, total in told] == [0.5, 1]
     assert Gradient.of(None, work({}), lambda done, total: None).samples is None
 

@@ -23,7 +23,7 @@ from vcc.plan.following import Parts, differences
 from vcc.plan.footprints.means import Boxes, choose_mean, mean_over
 from vcc.plan.how import How
 from vcc.run.drive import drive
-from vcc.shapes.sheets import Product, Shifted
+from vcc.shapes.stacked_patterns import Product, Shifted
 from vcc.units import mm, um
 
 STEPS = (3e-6, 3e-5, 3e-4)
@@ -83,7 +83,7 @@ def slopes(camera, grid, by, number, path, value):
     for step in STEPS:
         try:
             high, low = (
-                compute(moved(camera, number, path, value + side * step * unit), grid, None, *by).plan.numbers()
+                compute(moved(camera, number, path, value + side * step * unit), grid, None, *by).plan.parameters()
                 for side in (1, -1)
             )
         except vcc.InputError as error:

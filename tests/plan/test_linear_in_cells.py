@@ -135,7 +135,7 @@ def test_numbers_that_are_linear_in_what_elements_hold_say_so_by_their_transpose
         def plan_with(sign, values=values, change=change, held=held, made=made):
             moved = values + sign * change
             given = dict(zip(held, moved, strict=True)) if isinstance(held, dict) else moved
-            return compute(made(given), FIELD.grid, how, choices).plan.numbers()
+            return compute(made(given), FIELD.grid, how, choices).plan.parameters()
 
         low, high = plan_with(-1), plan_with(1)
         wanted = got = 0.0

@@ -13,7 +13,7 @@ from vcc.base.units import mm
 from vcc.plan.footprints.means import Boxes, choose_mean, mean_back, mean_over
 from vcc.shapes.mean_back import holds
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, as_pattern
-from vcc.shapes.sheets import Product, Shifted, in_one_plane
+from vcc.shapes.stacked_patterns import Product, Shifted, in_one_plane
 
 OTHER = Cells(np.random.default_rng(5).random((4, 3)), 5 * mm, 7 * mm, (0.3 * mm, -0.4 * mm))
 

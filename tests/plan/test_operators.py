@@ -15,7 +15,6 @@ import torch
 
 from vcc.fields.grid import Block
 from vcc.plan import correlation, operators
-from vcc.plan.numbers import numbers, with_numbers
 from vcc.plan.operators import (
     LONG,
     AlongAxes,
@@ -29,6 +28,7 @@ from vcc.plan.operators import (
     merged,
     tent,
 )
+from vcc.plan.parameters import parameters, with_parameters
 
 SEEDS = range(6)
 """Shapes and numbers follow from it."""
@@ -153,7 +153,7 @@ def test_operators_are_linear():
 
 def assert_pulls_what_changes(operator, x: np.ndarray, rng: np.random.Generator) -> None:
     """An operator is linear in each of its numbers: ⟨w, A(n + d) x − A(n) x⟩ = ⟨pull(x, w), d⟩, whatever d is."""
-    own = numbers(operator)
+    own = parameters(operator)
     weights = signed(rng, *np.shape(operator.apply(x)))
     pulled = operator.pull(x, weights, own)
     assert set(pulled) == set(own)
@@ -162,7 +162,7 @@ def assert_pulls_what_changes(operator, x: np.ndarray, rng: np.random.Generator)
         assert pulled[name].shape == number.shape
         np.testing.assert_array_equal(operator.pull(x, weights, (name,))[name], pulled[name])
         step = signed(rng, *number.shape)
-        changed = with_numbers(operator, {name: number + step}).apply(x)
+        changed = with_parameters(operator, {name: number + step}).apply(x)
         expected = float((weights * (changed - operator.apply(x))).sum())
         # Two outputs are computed in double precision, each a sum like that of the dot test.
         bound = ROUNDING[np.dtype(np.float64)] * np.linalg.norm(weights) * np.linalg.norm(changed)
@@ -355,7 +355,7 @@ def test_samples_are_made_of_those_that_are_named(name, seed):
     made = operator.shape(shape)
     rows, columns = (np.sort(rng.choice(np.arange(2, n - 2), 2, replace=False)) for n in made[2:4])
     taken = np.zeros(made)
-    view = tuple(before for before, _ in operator.beside[:2]) if isinstance(operator, DarkBorder) else (0, 0)
+    view = tuple(before for before, _ in operator.halo[:2]) if isinstance(operator, DarkBorder) else (0, 0)
     taken[view][rows[0] : rows[1], columns[0] : columns[1]] = rng.uniform(
         1, 2, (np.diff(rows)[0], np.diff(columns)[0])
     )

@@ -17,7 +17,7 @@ from vcc.engines import reference
 from vcc.fields.grid import Block
 from vcc.plan.footprints.model import Footprints, MaskLookup
 from vcc.plan.how import How
-from vcc.plan.numbers import numbers
+from vcc.plan.parameters import parameters
 from vcc.plan.rays.compile import ByRays
 from vcc.plan.rays.model import Rays
 from vcc.shapes.kernels import Gaussian
@@ -65,14 +65,14 @@ def test_blocks_of_a_light_field_add_up_to_the_raster_and_to_its_derivatives(ste
     np.testing.assert_allclose(sum(parts), whole, rtol=1e-12, atol=1e-13)
 
     weights, wanted = RANDOM.standard_normal(whole.shape), ["step", "masks[0].step", "weights", "scale"]
-    told = reference.back(core, values, weights, wanted=[*wanted, "x", "y"], threads=1).numbers
+    told = reference.back(core, values, weights, wanted=[*wanted, "x", "y"], threads=1).gradients
     total: dict[str, np.ndarray] = {}
-    needed = core.needed(wanted)
+    needed = core.required(wanted)
     assert needed == {*wanted, "x", "y", "masks[0].column", "masks[0].row"}
-    assert core.needed({"weights"}) == {"weights"}
+    assert core.required({"weights"}) == {"weights"}
     for block in BLOCKS:
         part = reference.back(core.part(block), values[block.slices], weights, wanted=sorted(needed), threads=1)
-        for name, value in core.whole_numbers(block, part.numbers).items():
+        for name, value in core.full_gradients(block, part.gradients).items():
             total[name] = total.get(name, 0.0) + value
     for name, value in told.items():
         np.testing.assert_allclose(total[name], value, rtol=1e-9, atol=1e-11, err_msg=name)
@@ -281,9 +281,9 @@ def test_a_block_of_the_light_field_is_looked_at_from_where_it_stands():
     whole, moved = core.looked_up(pixel, core.block(pixel))[0], part.looked_up(pixel, part.block(pixel))[0]
     np.testing.assert_allclose(moved, whole - [2, 1, 5, 3], atol=1e-9)
     assert part.views == (5, 5, 15, 15)
-    assert core.needed({"scale"}) == {"scale"}
+    assert core.required({"scale"}) == {"scale"}
     given = {"scale": np.array(2.0)}
-    assert core.whole_numbers(block, given) == given
+    assert core.full_gradients(block, given) == given
     assert core.scaled(1) is core
     assert core.scaled(2.5).scale == 2.5
 
@@ -317,4 +317,4 @@ def test_how_many_rays_there_are():
     assert core.tables_bytes >= sum(table.nbytes for table in tables)
     small, large = (rays_core(LENS, vcc.Mask(np.ones((n, 20)), 4 * mm, z=10 * mm)) for n in (30, 70))
     assert large.tables_bytes - small.tables_bytes == 40 * 20 * 4  # shares in single precision
-    assert set(numbers(window)) >= {"scale", "motion", "index_from_ray"}
+    assert set(parameters(window)) >= {"scale", "motion", "index_from_ray"}

@@ -21,6 +21,7 @@ from vcc.plan.correlation import correlated
 from vcc.plan.coverage import AskedLight, Missing, _cut
 from vcc.plan.following import Follow
 from vcc.plan.footprints.around import Sharpened
+from vcc.plan.footprints.batch import Looks
 from vcc.plan.footprints.cells import Geometry, SampleDivision, parts_of_sheared
 from vcc.plan.footprints.detail import detail_lost, details_lost
 from vcc.plan.footprints.mask_textures import MaskMet
@@ -28,7 +29,6 @@ from vcc.plan.footprints.means import _raster
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane, along_axes, cell_tiles, depends_on_view_only, tap_origin
 from vcc.plan.footprints.taps import CellDivision, Taps
-from vcc.plan.footprints.together import Looks
 from vcc.plan.footprints.words import cautions_of
 from vcc.plan.how import How, cores
 from vcc.plan.model import Plan
@@ -738,7 +738,7 @@ def test_views_and_pixels_that_are_looked_at_are_told_without_a_border_that_is_p
     plan = Plan((5, 5), (3, 3, 9, 9), Looking(views, pixels), before=(sharpen, border))
     assert plan.shape((3, 3, 9, 9)) == (4, 6, 11, 11)
     assert plan.reach == sharpen.reach == 2
-    assert plan.beside == border.beside
+    assert plan.halo == border.halo
     assert np.argwhere(plan.used_views((3, 3, 9, 9))).tolist() == [[0, 2]]
     # rows 4 to 7 are 2 to 5 without the border, and 0 to 7 with what the filter looks at
     assert plan.used_pixels((3, 3, 9, 9))[0, 2].tolist() == [[0, 7], [2, 9]]
@@ -747,7 +747,7 @@ def test_views_and_pixels_that_are_looked_at_are_told_without_a_border_that_is_p
     assert plan.kept_as(np.dtype(np.uint8)) == (np.dtype(np.int16), 2.0**-5)
     assert replace(plan, before=()).kept_as(np.dtype(np.float16)) == (np.dtype(np.float32), 1.0)
     assert replace(plan, before=()).reach == 0
-    assert replace(plan, before=()).beside == ((0, 0),) * 4
+    assert replace(plan, before=()).halo == ((0, 0),) * 4
 
 
 def test_numbers_of_plans_are_put_back_by_their_names():
@@ -756,15 +756,15 @@ def test_numbers_of_plans_are_put_back_by_their_names():
     camera = vcc.Camera([vcc.Lens(50 * mm)], vcc.Sensor(52 * mm, (4, 5), 0.1 * mm))
     field = vcc.LightField.from_views(np.ones((2, 2, 6, 6)), 1 * mm, 0.01)
     plan = replace(camera.compile(field, interpolation="linear"), before=(blur,), after=(lines,))
-    numbers = plan.numbers()
+    numbers = plan.parameters()
     assert {"core.x", "core.scale", "before[0].kernel", "after[0].down", "after[0].half_widths"} <= set(numbers)
     assert plan.smear == (0.5, 0.25)
-    changed = plan.with_numbers({name: value + 1 for name, value in numbers.items()})
-    for name, value in changed.numbers().items():
+    changed = plan.with_parameters({name: value + 1 for name, value in numbers.items()})
+    for name, value in changed.parameters().items():
         np.testing.assert_allclose(value, numbers[name] + 1, rtol=1e-6, err_msg=name)
-    assert plan.with_numbers({}).numbers().keys() == numbers.keys()
+    assert plan.with_parameters({}).parameters().keys() == numbers.keys()
     with pytest.raises(KeyError, match="nothing"):
-        plan.with_numbers({"core.nothing": 1.0})
+        plan.with_parameters({"core.nothing": 1.0})
     plan.check_fits(camera, field.grid)
     other = vcc.Camera([vcc.Lens(60 * mm)], camera.sensor)
     elsewhere = vcc.LightField.from_views(np.ones((2, 2, 6, 6)), 2 * mm, 0.01).grid

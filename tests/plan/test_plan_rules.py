@@ -417,14 +417,14 @@ def test_a_round_hole_that_rays_stray_from_is_a_disc_or_the_rectangle_around_it(
         np.testing.assert_allclose(size, wanted)
         assert disc is round_still
     assert not bound((0.1, 0.2), circle=False).widened()[1]
-    for n, strip in enumerate(bound((0.9, 0.0)).strips()):
+    for n, strip in enumerate(bound((0.9, 0.0)).slope_bounds()):
         assert strip.from_sensor.tolist() == [4 * n + 1, 4 * n + 2, 4 * n + 3, 4 * n + 4]
         assert (strip.middle, strip.half) == (pytest.approx([2.5, 3.3][n]), [1.9, 1.0][n])
         assert (strip.number, strip.disc, strip.words) == (2, False, "hole")
 
 
 def test_strips_bound_slopes_unless_they_are_a_million_wide():
-    strip = bound((0.0, 0.0)).strips()[0]  # of a row (1, 2, 3, 4): 5 to slopes
+    strip = bound((0.0, 0.0)).slope_bounds()[0]  # of a row (1, 2, 3, 4): 5 to slopes
     assert replace(strip, half=4.99e6).bounds_slopes
     assert not replace(strip, half=5.01e6).bounds_slopes
 

@@ -11,7 +11,7 @@ import pytest
 
 from vcc.base.affine import Affine
 from vcc.optics.deflections import CellDeflection
-from vcc.plan.numbers import numbers, with_numbers
+from vcc.plan.parameters import parameters, with_parameters
 from vcc.plan.rays import steps
 from vcc.plan.rays.aim_backwards import aim_back
 from vcc.plan.rays.backwards import back
@@ -97,7 +97,7 @@ def test_each_step_backwards_is_the_transpose_of_its_derivative(name):
         along = random(*getattr(before, part).shape)
         wanted = slope(lambda at, p=part: made(step, replace(before, **{p: at})), getattr(before, part), along)
         assert np.sum(getattr(found, part) * along) == pytest.approx(wanted, **TOLERANCE), part
-    known = numbers(step)
+    known = parameters(step)
     assert set(own) <= set(known)
     for number, value in known.items():
         along = random(*value.shape)
@@ -106,7 +106,7 @@ def test_each_step_backwards_is_the_transpose_of_its_derivative(name):
         if number == "frequency":  # 0 stands for no cosines along an axis, and stays
             assert not own[number][value == 0].any()
             along *= value != 0
-        wanted = slope(lambda at, n=number: made(with_numbers(step, {n: at}), before), value, along)
+        wanted = slope(lambda at, n=number: made(with_parameters(step, {n: at}), before), value, along)
         got = np.sum(own.get(number, 0.0) * along)
         assert got == pytest.approx(wanted, **TOLERANCE), number
 
@@ -174,11 +174,11 @@ def test_aims_backwards_are_the_transposes_of_their_derivatives(name):
 
         wanted = slope(changed, given[part], along)
         assert np.sum(getattr(found, part) * along) == pytest.approx(wanted, **TOLERANCE), part
-    for number, value in numbers(aim).items():
+    for number, value in parameters(aim).items():
         if not np.isfinite(value).all():
             continue
         along = random(*value.shape)
         wanted = slope(
-            lambda at, n=number: told(behind, aimed(with_numbers(aim, {n: at}), x, y, points)), value, along
+            lambda at, n=number: told(behind, aimed(with_parameters(aim, {n: at}), x, y, points)), value, along
         )
         assert np.sum(own[number] * along) == pytest.approx(wanted, **TOLERANCE), number

@@ -8,7 +8,7 @@ import pytest
 import vcc
 from vcc.base.units import mm, um
 from vcc.engines import reference
-from vcc.plan.numbers import with_numbers
+from vcc.plan.parameters import with_parameters
 
 MASK = 1
 SENSOR = vcc.Sensor(52 * mm, (14, 13), 90 * um)
@@ -48,7 +48,7 @@ def picture(changed: dict[str, float], shift: np.ndarray) -> np.ndarray:
     own = camera(changed).compile(FIELD, method="footprints", between_views="none", refine=1).core
     numbers = {"x": own.x, "y": own.y, "step": own.step, "masks[0].step": step}
     numbers |= {"masks[0].column": start[..., 0] + shift[0], "masks[0].row": start[..., 1] + shift[1]}
-    return reference.run(with_numbers(PLAN.core, numbers), FIELD.values, threads=1).values
+    return reference.run(with_parameters(PLAN.core, numbers), FIELD.values, threads=1).values
 
 
 @pytest.mark.parametrize("border", [0.0, 0.5])

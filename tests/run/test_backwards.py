@@ -11,7 +11,7 @@ import vcc
 from vcc.base.units import mm
 from vcc.fields.grid import Block
 from vcc.plan.how import How
-from vcc.plan.numbers import numbers, with_numbers
+from vcc.plan.parameters import parameters, with_parameters
 from vcc.run import backwards
 from vcc.run.backwards import Backwards, back
 from vcc.run.blocks import Blocks
@@ -75,11 +75,11 @@ def test_derivatives_through_the_whole_plan(name, kind):
     sensor = replace(SENSOR, pitch=FOCUS * 3.07e-3, decentre=(0.013 * mm, 0.029 * mm))
     plan = vcc.Camera(elements, sensor).compile(given, **options)
     how, weights = How(engine="reference"), weights_of(SENSOR.shape)
-    own = plan.numbers()
+    own = plan.parameters()
     linear = [each for each in own if each.startswith(("before", "after")) or each == "core.scale"]
     small = {"core.x": 1e-5, "core.step": 1e-6} if not plan.by_rays else {}
     found = back(plan, given, weights, how, wanted=[*linear, *small])
-    assert set(found.numbers) == {*linear, *small}
+    assert set(found.gradients) == {*linear, *small}
 
     def seen(changed, samples=given) -> float:
         drive = Drive(changed, samples, how)
@@ -87,10 +87,10 @@ def test_derivatives_through_the_whole_plan(name, kind):
 
     for number in [*linear, *small]:
         step = rng.standard_normal(own[number].shape) * small.get(number, 1.0)
-        ahead, behind = (plan.with_numbers({number: own[number] + sign * step}) for sign in (1, -1))
+        ahead, behind = (plan.with_parameters({number: own[number] + sign * step}) for sign in (1, -1))
         expected = (seen(ahead) - seen(behind)) / 2
         rounding = 1e-12 * np.abs(weights).sum() * np.abs(own[number]).max() * 10
-        assert float((found.numbers[number] * step).sum()) == pytest.approx(expected, rel=1e-5, abs=rounding), (
+        assert float((found.gradients[number] * step).sum()) == pytest.approx(expected, rel=1e-5, abs=rounding), (
             number
         )
     # A step of one in each number as it is given: what 8 bits are rounded to on their way is left out.
@@ -112,7 +112,7 @@ def test_blocks_add_up_to_the_whole(tmp_path, monkeypatch, name, engine):
     stored = save_store(given, tmp_path / "a.zarr", chunks=4)
     plan = vcc.Camera(elements, SENSOR).compile(stored, **options)
     how, weights = How(engine=engine), weights_of(SENSOR.shape)
-    wanted = [each for each in plan.numbers() if each.startswith(("before", "after"))]
+    wanted = [each for each in plan.parameters() if each.startswith(("before", "after"))]
     if engine == "reference":
         wanted += ["core.scale"]
     if engine == "reference" and not plan.by_rays:
@@ -130,10 +130,10 @@ def test_blocks_add_up_to_the_whole(tmp_path, monkeypatch, name, engine):
             found.samples, whole.samples, rtol=0, atol=largest * np.abs(whole.samples).max(), err_msg=f"{sizes}"
         )
         for number in wanted:
-            expected = whole.numbers[number]
+            expected = whole.gradients[number]
             atol = largest * max(np.abs(expected).max(), 1e-300)
             np.testing.assert_allclose(
-                found.numbers[number], expected, rtol=0, atol=atol, err_msg=f"{sizes} {number}"
+                found.gradients[number], expected, rtol=0, atol=atol, err_msg=f"{sizes} {number}"
             )
 
 
@@ -141,7 +141,7 @@ def test_a_raster_at_hand_is_not_made_again(monkeypatch):
     given = light_field()
     plan = vcc.Camera(PLANS["filters on both sides"][0], SENSOR).compile(given, method="footprints")
     drive, weights = Drive.of_linear(plan, given, How(engine="reference")), weights_of(SENSOR.shape)
-    wanted = [each for each in plan.numbers() if each.startswith("after")]
+    wanted = [each for each in plan.parameters() if each.startswith("after")]
     assert "after[1].transmission" in wanted
     found = drive.rounds()
     expected = Backwards(drive, wanted).gradient(weights, samples_wanted=False)
@@ -149,7 +149,7 @@ def test_a_raster_at_hand_is_not_made_again(monkeypatch):
     monkeypatch.setattr(Drive, "rounds", None)
     again = Backwards(drive, wanted).gradient(weights, samples_wanted=False, found=found)
     for name in wanted:
-        np.testing.assert_array_equal(again.numbers[name], expected.numbers[name])
+        np.testing.assert_array_equal(again.gradients[name], expected.gradients[name])
 
 
 def test_samples_are_looked_at_only_where_numbers_follow_from_them(monkeypatch, tmp_path):
@@ -171,20 +171,20 @@ def test_samples_are_looked_at_only_where_numbers_follow_from_them(monkeypatch, 
 @pytest.mark.parametrize("method", ["footprints", "rays"])
 @pytest.mark.parametrize("angle", [0.0, 0.3])
 def test_what_parts_say_of_their_numbers_is_brought_back_to_the_whole(method, angle):
-    """A part's numbers are linear in the whole's: ⟨c, part(n + d) − part(n)⟩ = ⟨whole_numbers(c), d⟩."""
+    """A part's numbers are linear in the whole's: ⟨c, part(n + d) − part(n)⟩ = ⟨full_gradients(c), d⟩."""
     rng = np.random.default_rng(1)
     core = vcc.Camera([LENS, *MASKS], SENSOR).compile(light_field(frame=turned(angle)), method=method).core
     rounded = ("texture", "points", "steps", "aim")  # to single precision, or of no part's affair
-    own = {name: value for name, value in numbers(core).items() if not any(word in name for word in rounded)}
+    own = {name: value for name, value in parameters(core).items() if not any(word in name for word in rounded)}
     steps = {name: rng.standard_normal(value.shape) for name, value in own.items()}
     if method == "rays":
         steps["index_from_ray"][4] = 0  # an affine map stays one
-    moved = with_numbers(core, {name: own[name] + step for name, step in steps.items()})
+    moved = with_parameters(core, {name: own[name] + step for name, step in steps.items()})
     for block in (Block((1, 3), (2, 5), (0, 14), (0, 16)), Block((3, 4), (0, 1), (5, 9), (2, 16))):
-        before, after = numbers(core.part(block)), numbers(moved.part(block))
-        assert core.needed(own) == set(own)
+        before, after = parameters(core.part(block)), parameters(moved.part(block))
+        assert core.required(own) == set(own)
         weights = {name: rng.standard_normal(before[name].shape) for name in own}
-        brought = core.whole_numbers(block, weights)
+        brought = core.full_gradients(block, weights)
         assert {name: value.shape for name, value in brought.items()} == {n: v.shape for n, v in own.items()}
         expected = sum(float((weights[name] * (after[name] - before[name])).sum()) for name in own)
         found = sum(float((brought[name] * step).sum()) for name, step in steps.items())
@@ -194,9 +194,9 @@ def test_what_parts_say_of_their_numbers_is_brought_back_to_the_whole(method, an
 
 def test_steps_need_the_places_that_they_move():
     core = vcc.Camera([LENS, *MASKS], SENSOR).compile(light_field()).core
-    assert core.needed(["opening"]) == {"opening"}
-    assert core.needed(["step"]) == {"step", "x", "y"}
-    assert core.needed(["masks[1].step"]) == {"masks[1].step", "masks[1].column", "masks[1].row"}
+    assert core.required(["opening"]) == {"opening"}
+    assert core.required(["step"]) == {"step", "x", "y"}
+    assert core.required(["masks[1].step"]) == {"masks[1].step", "masks[1].column", "masks[1].row"}
 
 
 # --- refusals ---
@@ -219,5 +219,7 @@ def test_what_cannot_be_gone_through_backwards_is_refused():
     weights[3, 5] = np.nan
     with pytest.raises(vcc.InputError, match=r"finite numbers; at \(3, 5\) there is nan"):
         back(plan, given, weights)
-    with pytest.raises(vcc.InputError, match=r"the plan has no number 'core\.z': plan\.numbers\(\) names those"):
+    with pytest.raises(
+        vcc.InputError, match=r"the plan has no parameter 'core\.z'; plan\.parameters\(\) lists all"
+    ):
         Backwards(Drive.of_linear(plan, given, How()), ["core.x", "core.z"])

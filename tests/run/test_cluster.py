@@ -20,7 +20,7 @@ import vcc
 from tests.run.test_executors import CAMERAS, FOCUS, in_blocks, light_field, stored  # noqa: F401  # fixtures
 from tests.run.unread import Unread
 from vcc.run import executors
-from vcc.run.executors import Tree, Work, crew
+from vcc.run.executors import Tree, Work, worker_pool
 from vcc.units import mm
 
 pytestmark = [
@@ -63,8 +63,8 @@ class Deadly(Unread):
 
 
 def test_what_workers_lack_is_told(client, stored, monkeypatch):  # noqa: F811
-    assert crew(client).places == 2
-    assert crew(client).room == pytest.approx(0.7 * 2e9 - 4e8, rel=1e-3)
+    assert worker_pool(client).places == 2
+    assert worker_pool(client).memory == pytest.approx(0.7 * 2e9 - 4e8, rel=1e-3)
     with pytest.raises(
         vcc.InputError, match=r"has 1000 MB for each task, .* and 1500 MB are asked for: give workers"
     ):
@@ -126,9 +126,9 @@ def test_sums_are_those_of_the_tree_and_results_come_with_their_numbers(client):
     for number in range(70):
         tree.put(number, f"{number}!")
     told: list[int] = []
-    assert crew(client).summed(Work(marked, "!"), range(70), joined, told.append) == tree.total
+    assert worker_pool(client).summed(Work(marked, "!"), range(70), joined, told.append) == tree.total
     assert sorted(told) == list(range(70))
-    assert sorted(crew(client).each(Work(marked, "?"), "abc")) == [(0, "a?"), (1, "b?"), (2, "c?")]
+    assert sorted(worker_pool(client).each(Work(marked, "?"), "abc")) == [(0, "a?"), (1, "b?"), (2, "c?")]
 
 
 def marked(mark, item):
@@ -150,7 +150,7 @@ def test_a_view_that_is_missing_is_named(client, tmp_path, monkeypatch):
 def test_a_task_that_kills_all_workers_is_told(client):
     client.cluster.scheduler.allowed_failures = 0
     with pytest.raises(vcc.InputError, match=r"ended each of the workers that took it.* Pass memory_limit="):
-        list(crew(client).each(Work(kill, None), [0]))
+        list(worker_pool(client).each(Work(kill, None), [0]))
 
 
 def kill(*_):
@@ -176,7 +176,7 @@ def test_work_whose_scheduler_is_lost_ends_with_an_error_and_ctrl_c_cancels(ends
         async def never(data):
             await asyncio.sleep(3600)
 
-        workers = crew(client)
+        workers = worker_pool(client)
         with monkeypatch.context() as frozen:
             frozen.setattr(executors, "SILENT", 0.2)  # here alone: a busy machine may answer later
             frozen.setitem(cluster.scheduler.handlers, "echo", never)
@@ -187,9 +187,9 @@ def test_work_whose_scheduler_is_lost_ends_with_an_error_and_ctrl_c_cancels(ends
             "scheduler": (vcc.InputError, "connection to the Dask scheduler inproc.* was lost"),
         }[ends]
         with pytest.raises(expected, match=words):
-            crew(client).summed(Work(sleep, None), range(100), joined, told)
+            worker_pool(client).summed(Work(sleep, None), range(100), joined, told)
     with pytest.raises(vcc.InputError, match="connect anew"):
-        crew(client)
+        worker_pool(client)
 
 
 def test_a_sweep_whose_scheduler_is_lost_says_what_is_kept_and_goes_on(stored, tmp_path, monkeypatch):  # noqa: F811

@@ -146,7 +146,7 @@ def test_bytes_that_plans_take_counted():
 @pytest.mark.parametrize(("border", "beside", "dark"), [(1, ((1, 2), (2, 2)), 6), (0, ((3, 2), (1, 2)), 5)])
 def test_dark_views_around_a_block_count_on_both_sides(border, beside, dark):
     plan = SimpleNamespace(
-        core=SimpleNamespace(raster_shape=(4, 5), border=border), beside=(*beside, (8, 9), (8, 9)), by_rays=False,
+        core=SimpleNamespace(raster_shape=(4, 5), border=border), halo=(*beside, (8, 9), (8, 9)), by_rays=False,
         kept_as=lambda kind: (kind, 1.0), shape=lambda shape: shape,
     )  # fmt: skip
     assert Need.of(plan, grid(), 0, False).border == dark

@@ -26,7 +26,7 @@ import vcc
 from tests.physics.random_cameras import KINDS, drawn
 from vcc.base.units import mm
 from vcc.plan.how import How
-from vcc.run import backwards, drive, sent
+from vcc.run import backwards, drive, serialization
 from vcc.run.backwards import AHEAD
 from vcc.run.blocks import Blocks
 from vcc.run.executors import TOGETHER, Parcel, Pool, Tree, Work
@@ -318,7 +318,7 @@ def test_no_executor(stored):
 
 
 def test_much_in_memory_is_not_sent(monkeypatch):
-    monkeypatch.setattr(sent, "SENT", 1000)
+    monkeypatch.setattr(serialization, "SENT", 1000)
     with Hostile(6) as executor, pytest.raises(vcc.InputError, match=r"takes 0 MB of memory.*save_store\("):
         CAMERAS["fine mask"][0].capture(light_field(), executor=executor)
 

@@ -161,7 +161,7 @@ def test_what_opening_closed_taps_would_add_is_told_of_blocks_too(stored, monkey
     camera = vcc.Camera([LENS, stop, *CAMERAS["plain"][0].elements[1:]], SENSOR)
     given = stored.read()
     plan = camera.compile(given, refine=1)
-    own = plan.numbers()["core.weights"]
+    own = plan.parameters()["core.weights"]
     assert (own == 0).any()
     weights = np.random.default_rng(4).standard_normal((*SENSOR.shape, 2))
 
@@ -178,9 +178,9 @@ def test_what_opening_closed_taps_would_add_is_told_of_blocks_too(stored, monkey
         for tap in (closed, tuple(np.argwhere(own > 0)[0])):
             step = np.zeros_like(own)
             step[tap] = 1
-            ahead, behind = (plan.with_numbers({"core.weights": own + sign * step}) for sign in (1, 0))
+            ahead, behind = (plan.with_parameters({"core.weights": own + sign * step}) for sign in (1, 0))
             expected = seen(ahead) - seen(behind)
-            assert found.numbers["core.weights"][tap] == pytest.approx(expected, rel=1e-6, abs=1e-9)
+            assert found.gradients["core.weights"][tap] == pytest.approx(expected, rel=1e-6, abs=1e-9)
             assert expected != 0
 
 

@@ -17,7 +17,7 @@ import torch
 import vcc
 from tests.run.unread import Unread
 from vcc.base.units import mm
-from vcc.camera import captured_together, each_captured
+from vcc.camera import captured_in_batches, each_captured
 from vcc.fields.grid import Block
 from vcc.plan.how import How
 from vcc.run.batches import recorded_each
@@ -68,7 +68,7 @@ def test_each_picture_is_that_of_its_camera(name, engine):
         cameras = cameras[-6::2]
     how = How(engine=engine, method="footprints", refine=1)
     alone = [each.capture(given, how) for each in cameras]
-    together = captured_together(cameras, given, replace(how, threads=1 if name == "in turn with others" else 2))
+    together = captured_in_batches(cameras, given, replace(how, threads=1 if name == "in turn with others" else 2))
     assert len(together) == len(cameras)
     for found, truth in zip(together, alone, strict=True):
         assert found.camera == truth.camera
@@ -121,7 +121,7 @@ def test_each_picture_by_rays_is_that_of_its_camera(tolerance):
     cameras, given = [camera(), camera(LENSLETS), camera(z=0.9), camera(z=0.8)], light_field(2)
     how = How(method="rays", samples=4, tolerance=tolerance)
     for truth, found in zip(
-        [each.capture(given, how) for each in cameras], captured_together(cameras, given, how), strict=True
+        [each.capture(given, how) for each in cameras], captured_in_batches(cameras, given, how), strict=True
     ):
         np.testing.assert_allclose(found.values, truth.values, rtol=0, atol=1e-6 * truth.values.max())
         assert found.sampling_error == pytest.approx(truth.sampling_error, rel=1e-4)
@@ -138,7 +138,7 @@ def test_pictures_are_put_where_there_is_room_for_them():
         asked.extend(numbers)
         return places[min(numbers) : max(numbers) + 1]
 
-    found = dict(each_captured(cameras, given, how, room=room))
+    found = dict(each_captured(cameras, given, how, output_buffers=room))
     assert sorted(found) == list(range(len(cameras)))
     assert asked == sorted(found)
     for number, image in found.items():
@@ -173,7 +173,7 @@ def test_many_masks_are_made_of_few_pictures_in_memory_and_from_disk(tmp_path):
     given = light_field()
     stored = save_store(given, tmp_path / "a.zarr")
     for threads, each in ((1, given), (3, given), (2, stored)):
-        found = captured_together(cameras, each, How(threads=threads, refine=1))
+        found = captured_in_batches(cameras, each, How(threads=threads, refine=1))
         for number in (0, 17, 35):
             truth = cameras[number].capture(given, engine="reference", refine=1)
             atol = 3e-6 * truth.values.max()

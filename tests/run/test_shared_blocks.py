@@ -15,7 +15,7 @@ import vcc
 from tests.run.test_executors import FOCUS, in_blocks, light_field  # noqa: F401  # fixtures
 from vcc.base.cached import preset
 from vcc.base.units import mm
-from vcc.camera import captured_together
+from vcc.camera import captured_in_batches
 from vcc.plan.how import How
 from vcc.run import drive
 from vcc.store import StoredLightField, save_store
@@ -66,7 +66,7 @@ def test_each_picture_is_that_of_its_camera_and_blocks_are_read_once(stored, in_
     alone = [each.capture(stored, how) for each in CAMERAS[name]]
     by_each = len(read)
     read.clear()
-    together = captured_together(CAMERAS[name], stored, how)
+    together = captured_in_batches(CAMERAS[name], stored, how)
     for found, truth in zip(together, alone, strict=True):
         np.testing.assert_allclose(found.values, truth.values, rtol=0, atol=1e-6 * truth.values.max())
         assert found.camera == truth.camera
@@ -83,7 +83,7 @@ def test_as_many_share_as_there_is_memory_for(stored, in_blocks, read, monkeypat
     for most, times in ((3, 3), (1, 8), (20, 1)):
         monkeypatch.setattr(drive.Drive, "most_at_once", most)
         read.clear()
-        captured_together(cameras, stored, How())
+        captured_in_batches(cameras, stored, How())
         assert len(read) == times * len(set(read))
 
 

@@ -19,10 +19,10 @@ from vcc.base.units import mm
 from vcc.base.version import VERSION
 from vcc.fields.grid import Block
 from vcc.plan.how import How
-from vcc.run import executors, sent
+from vcc.run import executors, serialization
 from vcc.run.drive import Drive
-from vcc.run.executors import Cluster, Pool, Tree, Work, crew, memory_of_task
-from vcc.run.sent import Carried, Sent, check_may_be_sent
+from vcc.run.executors import Cluster, Pool, Tree, Work, memory_of_task, worker_pool
+from vcc.run.serialization import PortableRun, PortableSamples, check_portable
 from vcc.store import save_store
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
@@ -56,7 +56,7 @@ class AtOnce(Executor):
 
 
 @pytest.mark.parametrize(
-    ("asked", "room", "found"),
+    ("asked", "memory", "found"),
     [
         (None, None, QUARTER),
         (10**8, None, 10**8),
@@ -73,9 +73,9 @@ class AtOnce(Executor):
         (None, -3e8, "has 0 MB for each task"),
     ],
 )
-def test_memory_of_a_task(asked, room, found):
+def test_memory_of_a_task(asked, memory, found):
     """What is asked for, a quarter of all, or what the least of the workers has."""
-    workers = None if asked is not None and room is None and asked > 10**9 else SimpleNamespace(room=room)
+    workers = None if asked is not None and memory is None and asked > 10**9 else SimpleNamespace(memory=memory)
     if isinstance(found, str):
         with pytest.raises(vcc.InputError, match=found):
             memory_of_task(asked, workers)
@@ -94,19 +94,21 @@ def test_the_room_of_a_cluster_is_that_of_its_least_worker():
         )  # fmt: skip
 
     one, other = {"memory_limit": 2e9, "nthreads": 2}, {"memory_limit": 8e9, "nthreads": 4}
-    workers = crew(client(one=one, other=other))
+    workers = worker_pool(client(one=one, other=other))
     assert isinstance(workers, Cluster)
-    assert workers.room == pytest.approx(5e8)
+    assert workers.memory == pytest.approx(5e8)
     assert workers.places == 6
-    assert crew(client(other=other, unlimited={"memory_limit": 0, "nthreads": 1})).room == pytest.approx(1.3e9)
-    assert crew(client()).room is None
+    assert worker_pool(client(other=other, unlimited={"memory_limit": 0, "nthreads": 1})).memory == pytest.approx(
+        1.3e9
+    )
+    assert worker_pool(client()).memory is None
     made = client()
     made.asynchronous = True
     with pytest.raises(vcc.InputError, match="asynchronous=True"):
-        crew(made)
+        worker_pool(made)
     del made.nthreads
     with pytest.raises(vcc.InputError, match=r"executor is a concurrent\.futures\.Executor"):
-        crew(made)
+        worker_pool(made)
 
 
 def test_each_task_has_one_thread_and_keeps_the_sums_of_others(tmp_path):
@@ -114,13 +116,13 @@ def test_each_task_has_one_thread_and_keeps_the_sums_of_others(tmp_path):
     plan = CAMERA.compile(stored)
     here = Drive(plan, stored, How(threads=1))
     elsewhere = Drive(plan, stored, How(memory_limit=10**9), AtOnce())
-    assert elsewhere.sent.how.threads == 1
-    assert elsewhere.sent.how.memory_limit == 10**9
+    assert elsewhere.portable.how.threads == 1
+    assert elsewhere.portable.how.memory_limit == 10**9
     assert elsewhere.need.fixed == here.need.fixed + 8 * here.need.raster
-    assert Drive(plan, stored, How(threads=3), AtOnce()).sent.how.threads == 3
-    assert elsewhere.sent.plan == replace(plan, made_for=None, notes=(), cautions=())
-    assert elsewhere.sent.plan.made_for is None
-    assert elsewhere.sent.plan.notes == elsewhere.sent.plan.cautions == ()
+    assert Drive(plan, stored, How(threads=3), AtOnce()).portable.how.threads == 3
+    assert elsewhere.portable.plan == replace(plan, made_for=None, notes=(), cautions=())
+    assert elsewhere.portable.plan.made_for is None
+    assert elsewhere.portable.plan.notes == elsewhere.portable.plan.cautions == ()
 
 
 # --- samples ---
@@ -130,17 +132,17 @@ def test_as_many_samples_are_sent_as_may_be(monkeypatch, tmp_path):
     given = light_field("uint8")
     size = 3 * 4 * 10 * 12
     for limit, refused in ((size, False), (size - 1, True)):
-        monkeypatch.setattr(sent, "SENT", limit)
+        monkeypatch.setattr(serialization, "SENT", limit)
         if refused:
             with pytest.raises(vcc.InputError, match="this light field takes 0 MB of memory"):
-                check_may_be_sent(given)
+                check_portable(given)
         else:
-            check_may_be_sent(given)
+            check_portable(given)
             with pytest.raises(vcc.InputError, match="at most 0 MB"):
-                check_may_be_sent(light_field())  # four times as large
-    check_may_be_sent(save_store(light_field(), tmp_path / "a.zarr"))
+                check_portable(light_field())  # four times as large
+    check_portable(save_store(light_field(), tmp_path / "a.zarr"))
     monkeypatch.undo()
-    assert sent.SENT == 64 * 1024**2
+    assert serialization.SENT == 64 * 1024**2
 
 
 def test_samples_that_are_sent_are_those_that_were_given(tmp_path):
@@ -148,12 +150,12 @@ def test_samples_that_are_sent_are_those_that_were_given(tmp_path):
     stored = save_store(given, tmp_path / "a.zarr")
     block = Block((1, 3), (0, 2), (4, 9), (3, 12))
     for samples, kept in ((given, 0), (stored, stored.stored_bytes)):
-        there = pickle.loads(pickle.dumps(Carried.of(samples)))
+        there = pickle.loads(pickle.dumps(PortableSamples.of(samples)))
         assert (there.stored_bytes, there.whole(), there.check_complete()) == (kept, None, None)
         np.testing.assert_array_equal(there.read(block), given.values[1:3, 0:2, 4:9, 3:12])
         assert there.grid.frame == given.frame
         assert there.grid.shape == SHAPE
-    made = Sent.of(CAMERA.compile(given), Carried.of(given), How())
+    made = PortableRun.of(CAMERA.compile(given), PortableSamples.of(given), How())
     assert made.samples.source is given.values
 
 
@@ -315,7 +317,7 @@ def test_a_cluster_is_asked_for_each_item_once_and_for_sums_before_others():
     client = Client()
     told: list[int] = []
     STARTED.clear()
-    found = crew(client).summed(Work(marked, "!", first=begin), range(70), brackets, told.append)
+    found = worker_pool(client).summed(Work(marked, "!", first=begin), range(70), brackets, told.append)
     tree = Tree(70, brackets)
     for number in range(70):
         tree.put(number, f"{number}!")
@@ -337,14 +339,14 @@ def test_a_cluster_is_asked_for_each_item_once_and_for_sums_before_others():
     assert all(named["retries"] == 3 for _, named in sums)
     assert not client.cancelled
     client.asked.clear()
-    assert crew(client).summed(Work(marked, "?"), ["a"], brackets, told.append) == "a?"
+    assert worker_pool(client).summed(Work(marked, "?"), ["a"], brackets, told.append) == "a?"
     assert [name for name, _, _ in client.asked] == ["_kept", "map"]
 
 
 def test_a_cluster_without_workers_is_waited_for_and_it_is_said():
     client = Client(hosts=())
     with pytest.warns(vcc.ResultWarning, match="tcp://made.up:1 has no workers yet"):
-        found = dict(crew(client).each(Work(marked, "!", first=begin), "ab"))
+        found = dict(worker_pool(client).each(Work(marked, "!", first=begin), "ab"))
     assert found == {0: "a!", 1: "b!"}
     assert [named for name, _, named in client.asked if name == "perform"] == [{"retries": 3}]
 
@@ -352,9 +354,9 @@ def test_a_cluster_without_workers_is_waited_for_and_it_is_said():
 def test_what_workers_have_is_asked_before_work():
     for version, words in (("0.1", "version 0.1 of the package"), (None, "none of the package")):
         with pytest.raises(vcc.InputError, match=f"worker tcp://0 has {words}"):
-            list(crew(Client(version=version)).each(Work(marked, "!"), "ab"))
+            list(worker_pool(Client(version=version)).each(Work(marked, "!"), "ab"))
     # What a worker raises when it is asked is no version: it may be busy.
-    assert dict(crew(Client(version=OSError())).each(Work(marked, "!"), "a")) == {0: "a!"}
+    assert dict(worker_pool(Client(version=OSError())).each(Work(marked, "!"), "a")) == {0: "a!"}
 
 
 @pytest.mark.parametrize("verb", ["each", "summed"])
@@ -363,7 +365,7 @@ def test_what_is_not_done_is_cancelled_when_work_ends(verb):
 
     def ended(states, error, status="running"):
         client = Client()
-        workers = crew(client)
+        workers = worker_pool(client)
         client.states = states
         made = client.map
 
@@ -401,7 +403,7 @@ def divided(shared, item):
 def test_a_scheduler_that_does_not_answer_is_told_and_nobody_is_cancelled_there(monkeypatch, failure, words):
     monkeypatch.setattr(executors, "LOOK", 0.01)
     client = Client()
-    workers = crew(client)
+    workers = worker_pool(client)
     assert client.looks == 1  # it is asked when it is taken
     client.states = {"b": "pending"}
 
@@ -416,4 +418,4 @@ def test_a_scheduler_that_does_not_answer_is_told_and_nobody_is_cancelled_there(
     client.scheduler = None
     client.status = "closed"
     with pytest.raises(vcc.InputError, match="scheduler that was given was lost"):
-        crew(client)
+        worker_pool(client)

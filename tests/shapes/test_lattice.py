@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 import vcc
 from vcc.shapes.lattice import LAYOUTS, CellApertures, CellBlock, Lattice, interleaved
 from vcc.shapes.patterns import Bounded, Circle, Open
-from vcc.shapes.sheets import Product
+from vcc.shapes.stacked_patterns import Product
 
 REACH = 12
 """Cells are listed out to this row and column, and looked at well inside."""

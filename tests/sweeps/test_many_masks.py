@@ -10,7 +10,7 @@ import pytest
 
 import vcc
 from tests.sweeps.rounding import gain
-from vcc.camera import captured_together
+from vcc.camera import captured_in_batches
 from vcc.plan.choice import mixture_of
 from vcc.plan.how import How
 from vcc.units import mm
@@ -62,8 +62,8 @@ def test_pictures_made_of_few_are_those_of_each_camera(case):
     mixture = mixture_of(several, field.grid, how)
     assert mixture is not None
     assert len(mixture.plans) < len(mixture.members)
-    found = captured_together(several, field, how)
-    by_three = captured_together(several, field, How(**options, threads=3))
+    found = captured_in_batches(several, field, how)
+    by_three = captured_in_batches(several, field, How(**options, threads=3))
     for n in (0, 3, MASKS - 1):
         exact = several[n].capture(field, how, engine="reference")
         tolerance = AGREEMENT * max(gain(several[n].compile(field, how)), 1.0)
@@ -86,8 +86,8 @@ def test_masks_that_are_met_otherwise_are_made_by_themselves():
 def test_a_store_is_gone_through_for_the_few_pictures_alone(tmp_path):
     several, field = cameras(20 * mm, cells=(3, 3)), light_field()
     stored = vcc.store.save_store(field, tmp_path / "field.zarr")
-    found = captured_together(several, stored, How(interpolation="linear", memory_limit=10**6))
-    alone = captured_together(several, field, How(interpolation="linear"))
+    found = captured_in_batches(several, stored, How(interpolation="linear", memory_limit=10**6))
+    alone = captured_in_batches(several, field, How(interpolation="linear"))
     brightest = max(image.values.max() for image in alone)  # one has only what rings beside closed cells
     for one, other in zip(found, alone, strict=True):
         np.testing.assert_allclose(one.values, other.values, rtol=0, atol=AGREEMENT * brightest)

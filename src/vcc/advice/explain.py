@@ -23,10 +23,10 @@ from vcc.optics.train import Train
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.parallax_rule import vergences
-from vcc.run.drive import Counted, Drive, begun
+from vcc.run.drive import Counted, Drive, warmed_up
 from vcc.run.executors import Work
-from vcc.run.needed import needed
-from vcc.run.sent import Sent
+from vcc.run.required_samples import required_samples
+from vcc.run.serialization import PortableRun
 
 COLUMNS = 80
 """Into which an explanation's lines fit, but for words that are longer."""
@@ -65,11 +65,11 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: An
     limits = _limits(train, samples.grid, how.scene_distance)
     text = wrapped("\n\n".join([_what(train, samples.grid), made, limits, *parts]))
     if samples.whole() is None:
-        more, seconds = of_store(Drive(*needed(plan, samples), how))
+        more, seconds = of_store(Drive(*required_samples(plan, samples), how))
         text = f"{text}\n\n{more}"
     by_executor = None
     if executor is not None:
-        more, by_executor = of_executor(Drive(*needed(plan, samples), how, executor), seconds)
+        more, by_executor = of_executor(Drive(*required_samples(plan, samples), how, executor), seconds)
         text = f"{text}\n\n{wrapped(more)}"
     result = Explanation(text)
     result.plan, result.expected_seconds, result.expected_seconds_by_executor = plan, seconds, by_executor
@@ -145,9 +145,9 @@ def of_executor(run: Drive, here: float | None) -> tuple[str, float | None]:
         run: by an executor, which runs a few views to foretell the time.
         here: seconds that all takes without it; None where that is not foretold.
     """
-    assert run.crew is not None
-    blocks, places = len(list(run.blocks)), run.crew.places
-    threads = run.sent.how.workers
+    assert run.worker_pool is not None
+    blocks, places = len(list(run.blocks)), run.worker_pool.places
+    threads = run.portable.how.workers
     each = f"each by {threads} thread{'' if threads == 1 else 's'} and within {run.limit / 1e6:.0f} MB"
     lines = [f"  {run.blocks.words}, {places} at once, {each}"]
     seconds = None
@@ -182,12 +182,12 @@ def expected_seconds(run: Drive, blocks: int, places: int) -> float:
 
 
 def _ask(run: Drive, blocks: Sequence[Block], first: bool = False) -> list[float]:
-    assert run.crew is not None
-    work = Work(_seconds, run.sent, first=begun if first else None)
-    return [result[0] for _, result in run.crew.each(work, blocks)]
+    assert run.worker_pool is not None
+    work = Work(_seconds, run.portable, first=warmed_up if first else None)
+    return [result[0] for _, result in run.worker_pool.each(work, blocks)]
 
 
-def _seconds(sent: Sent, block: Block) -> tuple[float, Any]:
+def _seconds(sent: PortableRun, block: Block) -> tuple[float, Any]:
     """How long a block takes where this runs, and its raster, so that it is sent."""
     drive = Drive(sent.plan, sent.samples, sent.how)
     start = time.perf_counter()

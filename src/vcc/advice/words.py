@@ -46,13 +46,13 @@ class SamplingItem:
         return "fine" if self.fine else "watch out"
 
     @property
-    def stated(self) -> str:
+    def finding(self) -> str:
         """Name, value and limit in words."""
         bound = "at least" if self.at_least else "at most"
         return f"{self.name}: {_quantity(self.value, self.unit)} ({bound} {_quantity(self.limit, self.unit)})"
 
     def __str__(self) -> str:
-        return f"{self.stated}: {self.verdict}. {self.advice}"
+        return f"{self.finding}: {self.verdict}. {self.advice}"
 
 
 # --- quantities ---
@@ -351,7 +351,7 @@ class SamplingLimits:
 def in_words(limits: SamplingLimits) -> str:
     """The main numbers and what to watch out for, a line each, indented: a section of `vcc.Camera.explain`."""
     lines = [limits.range_in_words(), *_main_numbers(limits), *limits.notes]
-    lines += [f"watch out: {item.stated}. {item.advice}" for item in _told_once(limits) if not item.fine]
+    lines += [f"watch out: {item.finding}. {item.advice}" for item in _without_repeats(limits) if not item.fine]
     return "\n".join(f"  {line}" for line in lines if line)
 
 
@@ -372,7 +372,7 @@ def _main_numbers(limits: SamplingLimits) -> list[str]:
     return [*lines, "; ".join(ends + [f"{item.name} {_quantity(item.value, 'm')}" for item in airy])]
 
 
-def _told_once(limits: SamplingLimits) -> list[SamplingItem]:
+def _without_repeats(limits: SamplingLimits) -> list[SamplingItem]:
     """The number of views says for all depths what disparities say for each, and often for both axes."""
     told = {item.advice: item for key, item in reversed(limits.items.items()) if not key.startswith("disparity")}
     if limits.depths is None:

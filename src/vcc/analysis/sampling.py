@@ -69,7 +69,7 @@ class SamplingAdvice(SamplingLimits, Shown):
             chosen = [item for item in self.items.values() if item.verdict == verdict]
             if chosen:
                 words.append(f"\n{_capital(verdict)}")
-                words += [_indented(f"{item.stated}. {item.advice}") for item in chosen]
+                words += [_indented(f"{item.finding}. {item.advice}") for item in chosen]
         if self.notes:
             words.append("\nNotes")
             words += [_indented(_capital(note) + ".") for note in self.notes]

@@ -98,7 +98,7 @@ def whole_number_between(
     if number is None or number < least or (most is not None and number > most):
         what = f"a whole number of {of}" if of else "a whole number"
         limits = f", {least} or more" if most is None else f" from {least} to {most}"
-        raise InputError(f"{name} is {what}{limits}, not {_told(value)}{_and(instead(value), way_out)}")
+        raise InputError(f"{name} is {what}{limits}, not {_shortened(value)}{_and(instead(value), way_out)}")
     return number
 
 
@@ -121,7 +121,7 @@ def counts(name: str, value: Any, *axes: str) -> tuple[int, ...]:
         one = whole_number(value)
         square = f"for as many each way write ({', '.join([str(one)] * len(axes))})" if one else ""
         raise InputError(
-            f"{name} is ({', '.join(axes)}), whole numbers of 1 or more, not {_told(value)}{_and(square)}"
+            f"{name} is ({', '.join(axes)}), whole numbers of 1 or more, not {_shortened(value)}{_and(square)}"
         )
     return numbers
 
@@ -176,7 +176,7 @@ def above_zero(
         return number
     limit = "" if math.isinf(most) else f" and at most {_with(most, unit)}"
     verb = f"is {what}," if what else "must be"
-    told = f"{_told(value)}{_and(instead(value), way_out)}"
+    told = f"{_shortened(value)}{_and(instead(value), way_out)}"
     raise InputError(f"{name} {verb} greater than {_with(0, unit)}{limit}, not {told}")
 
 
@@ -192,7 +192,7 @@ def zero_or_more(name: str, value: object, *, unit: str = "", most: float = math
             _check_length(name, number)
         return number
     wanted = f"{_with(0, unit)} or more" if math.isinf(most) else f"from 0 to {_with(most, unit)}"
-    raise InputError(f"{name} must be {wanted}, not {_told(value)}{_and(instead(value), way_out)}")
+    raise InputError(f"{name} must be {wanted}, not {_shortened(value)}{_and(instead(value), way_out)}")
 
 
 def finite(name: str, value: object, of: str = "") -> float:
@@ -209,7 +209,7 @@ def finite(name: str, value: object, of: str = "") -> float:
     number = _number(name, value)
     if not math.isfinite(number):
         wanted = f"a finite number{f' of {of}' if of else ''}"
-        raise InputError(f"{name} must be {wanted}, not {_told(value)}{_and(instead(value))}")
+        raise InputError(f"{name} must be {wanted}, not {_shortened(value)}{_and(instead(value))}")
     if of == "metres" and number != 0:
         _check_length(name, number, no_shorter=False)
     return number
@@ -230,9 +230,9 @@ def not_zero(name: str, value: object, *, unit: str = "m", way_out: str = "") ->
     number = _number(name, value)
     if math.isnan(number) and not isinstance(value, float | np.floating):
         of = "metres" if unit == "m" else unit
-        raise InputError(f"{name} is a number of {of}, not {_told(value)}{_and(instead(value), way_out)}")
+        raise InputError(f"{name} is a number of {of}, not {_shortened(value)}{_and(instead(value), way_out)}")
     if number == 0 or math.isnan(number):
-        raise InputError(f"{name} is {_told(value)} {unit}: it must not be 0{_and(way_out)}")
+        raise InputError(f"{name} is {_shortened(value)} {unit}: it must not be 0{_and(way_out)}")
     if unit == "m":
         _check_length(name, number, no_longer=False)
     return number
@@ -256,7 +256,7 @@ def pair(name: str, value: Any, what: str) -> tuple[float, float]:
         one = other = math.nan
     if not (math.isfinite(one) and math.isfinite(other)):
         parts = value if isinstance(value, tuple | list) else [value]
-        raise InputError(f"{name} is {what}, not {_told(value)}{_and(*map(instead, parts))}")
+        raise InputError(f"{name} is {what}, not {_shortened(value)}{_and(*map(instead, parts))}")
     for number in (one, other) if "metres" in what else ():
         _check_length(name, number, no_shorter=False)
     return one, other
@@ -487,7 +487,7 @@ def _check_length(name: str, number: float, *, no_shorter: bool = True, no_longe
         )
 
 
-def _told(value: Any) -> str:
+def _shortened(value: Any) -> str:
     return repr(value.item() if isinstance(value, np.generic) else value)
 
 

@@ -207,7 +207,7 @@ def read_json(data: bytes, name: str) -> dict[str, Any]:
     return found
 
 
-def stated_at(tree: Any, *keys: str) -> Any:
+def value_at(tree: Any, *keys: str) -> Any:
     """What stands in a tree of JSON under these keys; None if nothing does."""
     for key in keys:
         tree = tree.get(key) if isinstance(tree, dict) else None

@@ -72,7 +72,7 @@ _LENGTH = 12
 """Hexadecimal digits: by chance, two of a million cameras agree once in 500 times."""
 
 
-class Untold(Exception):
+class Unhashable(Exception):
     """Something that tells nothing of its content, a Python function for instance; the message says what."""
 
 
@@ -107,7 +107,7 @@ def _plain(thing: Any) -> Any:
     if isinstance(thing, dict) and all(isinstance(key, str) for key in thing):
         return {key: _plain(part) for key, part in thing.items()}
     if isinstance(thing, type) or not (dataclasses.is_dataclass(thing) or hasattr(thing, "compared")):
-        raise Untold(f"a {kind_in_words(type(thing))}")
+        raise Unhashable(f"a {kind_in_words(type(thing))}")
     if hasattr(thing, "compared"):
         return [type(thing).__name__, _plain(thing.compared())]
     compared = {each.name: getattr(thing, each.name) for each in dataclasses.fields(thing) if each.compare}

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 _LENGTH = struct.Struct("<I")
 
 
-class Damaged(ValueError):
+class DamagedMessage(ValueError):
     """Bytes that are no message."""
 
 
@@ -28,22 +28,22 @@ def unpacked(data: bytes) -> tuple[dict[str, Any], list[bytes]]:
         Damaged: the bytes are none.
     """
     if len(data) < _LENGTH.size:
-        raise Damaged("a message starts with its length")
+        raise DamagedMessage("a message starts with its length")
     (length,) = _LENGTH.unpack_from(data)
     end = _LENGTH.size + length
     if end > len(data):
-        raise Damaged("a message ends before its JSON")
+        raise DamagedMessage("a message ends before its JSON")
     try:
         message = json.loads(data[_LENGTH.size : end].decode(), parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
-        raise Damaged(f"a message is no JSON: {error}") from None
+        raise DamagedMessage(f"a message is no JSON: {error}") from None
     if not isinstance(message, dict):
-        raise Damaged("a message is a table")
+        raise DamagedMessage("a message is a table")
     lengths = message.pop("buffers", [])
     if not isinstance(lengths, list) or not all(type(each) is int and each >= 0 for each in lengths):
-        raise Damaged("buffers is a list of lengths")
+        raise DamagedMessage("buffers is a list of lengths")
     if end + sum(lengths) != len(data):
-        raise Damaged("a message's buffers do not fill it")
+        raise DamagedMessage("a message's buffers do not fill it")
     buffers = []
     for each in lengths:
         buffers.append(data[end : end + each])

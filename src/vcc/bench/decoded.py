@@ -129,7 +129,7 @@ class Decoding:
             return {"distance": _finite(distance)}, [picture]
         middle = decoded.views.view(*decoded.views.grid.middle_view).to_numpy()
         pictures = [_jpeg(_sheet(decoded.views), decoded.white), _jpeg(middle, decoded.white), picture]
-        return _told(decoded, distance, asked), pictures
+        return _answer(decoded, distance, asked), pictures
 
     def _of(self, asked: Asked) -> Decoded:
         kept = self._decoded
@@ -160,7 +160,7 @@ def _with_warnings(work: Callable[..., Result], *given: Any) -> tuple[Result, li
         return work(*given), [str(each.message) for each in caught]
 
 
-def _told(decoded: Decoded, distance: float, asked: Asked) -> Json:
+def _answer(decoded: Decoded, distance: float, asked: Asked) -> Json:
     nearest, farthest = _range(asked, distance)
     nv, nu, nt, ns = decoded.views.shape[:4]
     way = {"lenslets": "lenslets", "cosines": "a mask of cosines"}[decoded.decoder.way]

@@ -268,7 +268,7 @@ def _looking_at(plan: Plan, core: Rays, fine: Grid, coarse: Grid) -> Plan:
     find their mean with less noise where they look at means, and where neighbours look at the same ones.
     """
     coarse_from_fine = coarse.frame.inverse() @ fine.frame
-    (top, _), (left, _), (above, _), (before, _) = plan.beside
+    (top, _), (left, _), (above, _), (before, _) = plan.halo
     border = Affine.translation(left, top, before, above)  # as many samples, coarse as fine
     nv, nu, nt, ns = plan.shape(coarse.shape)[:4]
     made = replace(

@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.bench.carried import Damaged, packed, unpacked
+from vcc.bench.carried import DamagedMessage, packed, unpacked
 from vcc.bench.offered import Offered
 from vcc.bench.session import Broken, Session
 
@@ -242,7 +242,7 @@ async def _received(socket: WebSocket, session: Session) -> bool:
             session.receive(*unpacked(await socket.receive_bytes()))
         except WebSocketDisconnect:
             return True
-        except (Damaged, Broken, KeyError) as error:  # KeyError: text where bytes are expected
+        except (DamagedMessage, Broken, KeyError) as error:  # KeyError: text where bytes are expected
             words = f"no message of a bench: {error}"
             with contextlib.suppress(RuntimeError):
                 await socket.close(BROKEN, words.encode()[:120].decode(errors="ignore"))

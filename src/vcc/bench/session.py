@@ -579,7 +579,7 @@ class Session:
         far_near = vergences(field.grid, None)
         scene = None if far_near is None else (float(far_near.min()), float(far_near.max()))
         told = {item.advice: item for item in sampling_limits(train, field.grid, scene).to_watch}
-        said += [f"{item.stated}. {item.advice}" for item in told.values()]
+        said += [f"{item.finding}. {item.advice}" for item in told.values()]
         return [{"element": self._element_named_in(words), "words": words} for words in said]
 
     def _element_named_in(self, words: str) -> int | None:

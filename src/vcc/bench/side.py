@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vcc.advice.words import distance_in_words
 from vcc.base.units import short
-from vcc.bench.snapping import snaps_of_elements, snaps_of_sensor, told_once
+from vcc.bench.snapping import snaps_of_elements, snaps_of_sensor, without_repeats
 from vcc.fields.grid import Grid
 from vcc.fields.samples import InMemory
 from vcc.optics import CellDeflection, Element, Faces, FirstOrder, Lens, Prism
@@ -91,7 +91,7 @@ def side(
     span = Span(AXIS, -half, half)
     focus = focused_distance(train)
     scene = {} if grid is None else {f"{name} of the scene": z for name, z in scene_distances(grid).items()}
-    places = told_once(scene | ({} if focus is None else {"what is sharp now": focus}))
+    places = without_repeats(scene | ({} if focus is None else {"what is sharp now": focus}))
     pulled = snaps_of_elements(elements, train, places)
     return {
         "from": _short(start),

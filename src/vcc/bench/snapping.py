@@ -135,7 +135,7 @@ def _in_order(snaps: list[Json]) -> list[Json]:
     return sorted(snaps, key=lambda snap: float(snap["z"]))
 
 
-def told_once(distances: Mapping[str, float]) -> dict[str, float]:
+def without_repeats(distances: Mapping[str, float]) -> dict[str, float]:
     """Distances, metres by name, without those that another one before them says already."""
     found: dict[str, float] = {}
     for name, distance in distances.items():

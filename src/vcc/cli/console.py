@@ -86,7 +86,7 @@ def progress(task: str) -> Iterator[Progress]:
 
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield _Foretold(task)
+        yield _Estimate(task)
         return
     with Bars(console=console, transient=True) as bar:
         running = bar.add_task(task, total=None)
@@ -97,7 +97,7 @@ SOON, LONG = 5.0, 30.0
 """Seconds of work after which its time is foretold, and from which on that is worth a line."""
 
 
-class _Foretold:
+class _Estimate:
     """Progress that says once how long it will take, when that can be told and is long.
 
     Args:

@@ -29,8 +29,8 @@ from vcc.cli.options import (
     Whole,
     above_zero,
     exposed,
+    given_options,
     quantity,
-    told,
 )
 from vcc.cli.store_words import video_written, written
 from vcc.formats import read_geometry
@@ -115,7 +115,7 @@ def convert(
         output = free_output(output, overwrite)
         show(_to_store(light_field, output, storing, packing, overwrite, reading))
     else:
-        if wrong := told(storing):
+        if wrong := given_options(storing):
             raise InputError(
                 f"{', '.join(wrong)} {'is' if len(wrong) == 1 else 'are'} for stores: end OUT in .zarr"
             )
@@ -200,7 +200,7 @@ def _with_its_codes(
         return reading.light_field(source), "linear", None
     facts = read_geometry(source, **reading.given(Arrangement))
     assumed = [name for name in facts.unknown if getattr(reading, name) is None]
-    facts.stated.check(reading.transfer)
+    facts.metadata.check(reading.transfer)
     as_stored, transfer = facts.codes
     field = dataclasses.replace(reading, transfer=as_stored).in_memory(source)
     if field.values.dtype.kind != "u" or reading.transfer == "as-is":

@@ -16,7 +16,7 @@ from vcc.camera_file import load_camera
 from vcc.cli.console import free_output, progress, show
 from vcc.cli.decode_cosines import Cosines, through_a_mask
 from vcc.cli.decode_lenslets import Lenslets, through_lenslets
-from vcc.cli.options import FolderNames, OutputFile, Overwrite, ViewExposure, exposed, told
+from vcc.cli.options import FolderNames, OutputFile, Overwrite, ViewExposure, exposed, given_options
 from vcc.cli.raw_recordings import Recorded
 from vcc.formats.writing import kind_of, save_light_field
 from vcc.light_field import LightField
@@ -54,10 +54,10 @@ def decode(
     exposed(written.exposure, kind_of(output, written.kind))  # what cannot be written, before the work
     camera = None if recorded.camera is None else load_camera(recorded.camera)
     if camera is not None and way_of(camera) == "cosines":
-        _refuse(told(lenslets), "for lenslets, and this camera has a mask of cosines")
+        _refuse(given_options(lenslets), "for lenslets, and this camera has a mask of cosines")
         field, way = through_a_mask(raw, camera, recorded, cosines)
     else:
-        _refuse(told(cosines), "for a mask of cosines, and there is none")
+        _refuse(given_options(cosines), "for a mask of cosines, and there is none")
         field, way = through_lenslets(raw, camera, recorded, lenslets)
     write(field, output, written, raw)
     show(f"  made of {raw}: {way}")

@@ -16,7 +16,7 @@ from vcc.base.reading import expanded, reading, shown
 from vcc.base.units import short
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
-from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, told
+from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, given_options
 from vcc.cli.store_words import looked_at, places_of, store_facts, video_facts
 from vcc.cli.view_grid import Views, draw
 from vcc.fields.grid import SAMPLES_IN_WORDS, pair
@@ -68,7 +68,7 @@ def describe(
         InputError: what its reader says, or an option that does not fit it.
     """
     path = expanded(light_field)
-    given = [*told(how, but=("transfer",)), *(["--keep"] if keep else [])]
+    given = [*given_options(how, but=("transfer",)), *(["--keep"] if keep else [])]
     if given and (is_store(path) or lytro_lfp.recognised(path)):
         what = "a store, which states its cameras" if is_store(path) else "a raw recording: it has no views yet"
         raise InputError(f"{path} is {what}: leave out {', '.join(given)}")
@@ -215,8 +215,8 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         "views are": ("parallel" if math.isinf(focus) else f"converge {short(focus)} away")
         + assumed("focus_distance"),
     }
-    if facts.stated.said:
-        lines["numbers"] = f"{facts.stated.in_words}, as the pictures say"
+    if facts.metadata.said:
+        lines["numbers"] = f"{facts.metadata.in_words}, as the pictures say"
     if facts.unknown:
         options = ", ".join(f"--{name.replace('_', '-')}" for name in facts.unknown)
         keep = "; with --keep they are kept in the folder" if facts.files else ""
@@ -226,7 +226,7 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
     if facts.disparity_range is not None:
         low, highest = facts.disparity_range
         lines["disparities"] = f"{low:.3g} to {highest:.3g} pixels per view (stated)"
-    for number, remark in enumerate(facts.remarks):
+    for number, remark in enumerate(facts.notices):
         lines["remark" if number == 0 else f"remark {number + 1}"] = remark
     return lines
 

@@ -213,7 +213,7 @@ def exposed(exposure: float | Literal["auto"], kind: Kind) -> dict[str, Any]:
 # --- records ---
 
 
-def told(record: Any, *, but: tuple[str, ...] = ()) -> list[str]:
+def given_options(record: Any, *, but: tuple[str, ...] = ()) -> list[str]:
     """The options of a record that are not at their defaults, as they are typed."""
     fields = [field for field in dataclasses.fields(record) if field.name not in but]
     changed = [field.name for field in fields if getattr(record, field.name) != field.default]
@@ -309,7 +309,7 @@ class Reading(Arrangement, ViewCameras):
             return open_light_field(path, progress=advance, **self.given())
 
     def _check_nothing_told(self, path: Path) -> None:
-        if names := told(self, but=("transfer",)):
+        if names := given_options(self, but=("transfer",)):
             raise InputError(f"{path} is a store, which states its cameras: leave out {', '.join(names)}")
 
     def in_memory(self, path: Path) -> LightField:

@@ -13,9 +13,16 @@ from vcc.base.errors import InputError, ResultWarning
 from vcc.base.reading import expanded
 from vcc.cli.options import Size
 from vcc.files import transfer
+from vcc.files.image_metadata import CameraMark, ImageMetadata
+from vcc.files.images_with_metadata import (
+    ImageWithMetadata,
+    check_agrees,
+    clipping,
+    light_of,
+    read_with_metadata,
+    unknown,
+)
 from vcc.files.pictures import READ_ENDINGS
-from vcc.files.stated import StatedPicture, check_told, clipping, light_of, read_stated, unknown
-from vcc.files.statement import CameraMark, Statement
 from vcc.formats.lytro_lfp import read_lytro
 from vcc.optics.electronics import Electronics
 from vcc.optics.train import Train
@@ -68,7 +75,7 @@ class RawRecording:
     largest: float
     color_filter: Tile | None
     turned: bool = False
-    statement: Statement | None = None
+    metadata: ImageMetadata | None = None
 
     def light(self) -> NDArray[np.float64]:
         """0 for none, 1 for the most."""
@@ -85,7 +92,7 @@ class RawRecording:
     @property
     def in_words(self) -> str:
         """What the file says, for people; empty where it says nothing."""
-        return "" if self.statement is None else f"{self.path.name} says: {self.statement.in_words}"
+        return "" if self.metadata is None else f"{self.path.name} says: {self.metadata.in_words}"
 
 
 def read_raw(path: Path, camera: Train | None, color_filter: str | None, recorded: Recorded) -> RawRecording:
@@ -110,10 +117,10 @@ def read_raw(path: Path, camera: Train | None, color_filter: str | None, recorde
     if path.suffix.lower() not in READ_ENDINGS:
         known = ", ".join((*READ_ENDINGS, *_LYTRO))
         raise InputError(f"{path} is no recording that can be read: its name must end in {known}")
-    picture = read_stated(path)
-    if picture.statement is not None:
-        return _stated(picture, picture.statement, color_filter, recorded)
-    return _told(picture, camera, color_filter, recorded)
+    picture = read_with_metadata(path)
+    if picture.metadata is not None:
+        return _with_metadata(picture, picture.metadata, color_filter, recorded)
+    return _as_given(picture, camera, color_filter, recorded)
 
 
 def check_alike(raw: RawRecording, other: RawRecording | None) -> None:
@@ -122,8 +129,8 @@ def check_alike(raw: RawRecording, other: RawRecording | None) -> None:
     Raises:
         InputError: one file says what its numbers are, and the other does not.
     """
-    if other is not None and (raw.statement is None) != (other.statement is None):
-        says, silent = (raw, other) if other.statement is None else (other, raw)
+    if other is not None and (raw.metadata is None) != (other.metadata is None):
+        says, silent = (raw, other) if other.metadata is None else (other, raw)
         raise InputError(
             f"{says.in_words}, and {silent.path} does not say what its numbers are: they are not of one kind. "
             "Give recordings that were written alike"
@@ -136,7 +143,7 @@ def check_camera(raw: RawRecording, camera: Train | None, told: Path | None) -> 
     Warns:
         ResultWarning: it did.
     """
-    made = None if raw.statement is None else raw.statement.camera
+    made = None if raw.metadata is None else raw.metadata.camera
     if camera is None or told is None or made is None or made.hash is None:
         return
     given = CameraMark.of(camera)
@@ -163,34 +170,36 @@ def _read_lytro(path: Path, color_filter: str | None, recorded: Recorded) -> Raw
     return _as_recorded(RawRecording(path, lytro.mosaic, dark, most, lytro.color_filter, bool(recorded.upright)))
 
 
-def _stated(picture: StatedPicture, said: Statement, color_filter: str | None, recorded: Recorded) -> RawRecording:
+def _with_metadata(
+    picture: ImageWithMetadata, metadata: ImageMetadata, color_filter: str | None, recorded: Recorded
+) -> RawRecording:
     """Of a file that says what its numbers are: irradiance."""
     path = picture.path
-    check_told(path, said, recorded.transfer or "")
-    if recorded.upright not in (None, said.upright):
+    check_agrees(path, metadata, recorded.transfer or "")
+    if recorded.upright not in (None, metadata.upright):
         option = "--upright" if recorded.upright else "--upside-down"
-        raise InputError(f"{path} says that its numbers are {said.in_words}: leave out {option}")
+        raise InputError(f"{path} says that its numbers are {metadata.in_words}: leave out {option}")
     if recorded.black is not None:
-        raise InputError(f"{path} says that its numbers are {said.in_words}: leave out --black")
+        raise InputError(f"{path} says that its numbers are {metadata.in_words}: leave out --black")
     tile: Tile | None = color_filter
-    if said.recording is not None:
-        tile = said.recording.color_filter
+    if metadata.recording is not None:
+        tile = metadata.recording.color_filter
         if color_filter not in (None, tile):
             raise InputError(f"{path} says that its colour filter is {tile}: leave out --color-filter")
-    if said.clipped and said.recording is None:
+    if metadata.clipped and metadata.recording is None:
         warnings.warn(clipping(picture), ResultWarning, stacklevel=2)
-    if said.transfer == "srgb" and picture.samples.dtype == np.uint8:
+    if metadata.transfer == "srgb" and picture.samples.dtype == np.uint8:
         warnings.warn(
             f"{path} has 8 bits: light is known to a step of the sRGB curve, up to 0.9 % of white. 16 bits "
             "(.tif), .exr and .npy keep more",
             ResultWarning,
             stacklevel=2,
         )
-    return _as_recorded(RawRecording(path, light_of(picture), None, 1.0, tile, said.upright, said))
+    return _as_recorded(RawRecording(path, light_of(picture), None, 1.0, tile, metadata.upright, metadata))
 
 
-def _told(
-    picture: StatedPicture, camera: Train | None, color_filter: str | None, recorded: Recorded
+def _as_given(
+    picture: ImageWithMetadata, camera: Train | None, color_filter: str | None, recorded: Recorded
 ) -> RawRecording:
     """Of a file that does not say what its numbers are."""
     path, numbers, black = picture.path, picture.samples, recorded.black

@@ -25,7 +25,7 @@ from vcc.cli.options import (
 )
 from vcc.fields.samples import Samples
 from vcc.image import load_image
-from vcc.run.sent import check_may_be_sent
+from vcc.run.serialization import check_portable
 from vcc.sweeps import PSNR, DeblurringError, Design, contact_sheet, sharpness
 from vcc.sweeps import sweep as swept_by
 from vcc.sweeps.design import Kind
@@ -84,7 +84,7 @@ class MakingMany(Executing):
 
     executor: Who = None
 
-    def check_sent(self, light_field: Samples, path: Path) -> None:
+    def check_portable(self, light_field: Samples, path: Path) -> None:
         """Refuse a light field in memory that is too large to be sent.
 
         Raises:
@@ -92,7 +92,7 @@ class MakingMany(Executing):
         """
         try:
             if self.executor is not None:
-                check_may_be_sent(light_field)
+                check_portable(light_field)
         except InputError as error:
             raise InputError(
                 f"{path} is read into memory, and is too large to be sent to all that work: vcc convert {path} "
@@ -145,7 +145,7 @@ def sweep(
     asked = Design(dict(set), design, count, seed, camera.parent)
     asked.of(optics)  # refused before the light field is read
     field, metrics = reading.light_field(light_field), told.metrics
-    executing.check_sent(field, light_field)
+    executing.check_portable(field, light_field)
     kept = {"output": output} if stored else {"pictures": False}
     with executing.opened() as executor, progress("Sweeping") as advance:
         swept = swept_by(optics, field, asked, how, metrics=metrics, executor=executor, progress=advance, **kept)

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded
-from vcc.cli.options import MAKING, Given, above_zero, duration, quantity, told
+from vcc.cli.options import MAKING, Given, above_zero, duration, given_options, quantity
 from vcc.motion.moving_camera import TOLERANCE
 from vcc.store import StoredVideo, is_video
 
@@ -43,7 +43,7 @@ class Timing(Given):
             InputError: times for light that stays as it is and a camera that stands still, or none for one that
                 moves.
         """
-        given, stays = told(self), expanded(light_field).exists() and not is_video(light_field)
+        given, stays = given_options(self), expanded(light_field).exists() and not is_video(light_field)
         if moves and self.exposure_time is None:
             raise InputError(
                 f"{camera} changes over time (table [moving]): say how long its shutter is open, "

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from vcc.base import late
+from vcc.base import lazy_import
 from vcc.base.errors import InputError
 from vcc.plan.how import EngineName
 from vcc.plan.protocol import Abilities, Engine
@@ -57,7 +57,7 @@ def chosen(name: EngineName | None, values: Any) -> EngineName:
 
 def engine(name: EngineName) -> Engine:
     """The engine of a name."""
-    return cast(Engine, late.module(ENGINES[name][0]))
+    return cast(Engine, lazy_import.module(ENGINES[name][0]))
 
 
 def abilities(name: EngineName) -> Abilities:
@@ -71,4 +71,4 @@ def on_gpu(values: Any) -> Any:
     Raises:
         InputError: numba-cuda is not installed, there is no GPU, or an array of another library in main memory.
     """
-    return late.module(ENGINES["cuda"][0]).resident(values)
+    return lazy_import.module(ENGINES["cuda"][0]).resident(values)

@@ -32,8 +32,8 @@ from vcc.engines.cuda_arrays import (
     given_back,
     int32,
     launch,
-    sent_all,
     taken,
+    to_device_all,
 )
 from vcc.engines.rays_compiled import given, looked_up_as
 from vcc.plan import operators
@@ -89,7 +89,9 @@ def back(
     with cuda_arrays.in_turn_with(values):
         return Gradient.of(
             partial(cuda_back.samples_back, core, values, raster) if samples else None,
-            partial(cuda_back.numbers_back, core, values, raster, wanted, threads=threads) if wanted else None,
+            partial(cuda_back.footprint_gradients, core, values, raster, wanted, threads=threads)
+            if wanted
+            else None,
             progress,
         )
 
@@ -163,7 +165,7 @@ def traced_on_gpu(core: Rays, values: Any, beside: int) -> tuple[Any, Any]:
     sensor, points, aim, steps = _last_used.of(core)
     pictures = cuda.device_array((2, rows, columns, channels), np.float32)
     tallies, of_columns = cuda.device_array((rows, columns), np.int64), cuda.device_array(columns, np.int64)
-    tables = sent_all(field), sensor, points._replace(beside=beside), aim, steps
+    tables = to_device_all(field), sensor, points._replace(beside=beside), aim, steps
     launch(kernels.trace(channels, bool(aim.by_cell)), (columns, rows), 0, *tables, pictures, tallies)
     halves = pictures.reshape(2, rows * columns * channels)
     launch(kernels.put_together, halves.shape[1:], 0, halves)
@@ -171,7 +173,7 @@ def traced_on_gpu(core: Rays, values: Any, beside: int) -> tuple[Any, Any]:
     return pictures, of_columns
 
 
-_last_used = LastUsed(lambda core: tuple(map(sent_all, given(core, 0))))
+_last_used = LastUsed(lambda core: tuple(map(to_device_all, given(core, 0))))
 
 
 # --- views sharpened, for samples that are kept there; see `vcc.plan.operators.SharpenViews` ---

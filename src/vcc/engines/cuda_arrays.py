@@ -141,16 +141,16 @@ def this_gpu() -> int:
     return 0 if SIMULATED else int(cuda.get_current_device().id)
 
 
-def sent(array: NDArray[Any], stream: Any = 0) -> Any:
+def to_device(array: NDArray[Any], stream: Any = 0) -> Any:
     """A copy on the GPU."""
     return cuda.to_device(np.ascontiguousarray(array), stream=stream)
 
 
-def sent_all(given: Any) -> Any:
+def to_device_all(given: Any) -> Any:
     """A named tuple, and those in it, with copies on the GPU of the arrays."""
     if isinstance(given, np.ndarray):
-        return sent(given)
-    return type(given)(*map(sent_all, given)) if hasattr(given, "_fields") else given
+        return to_device(given)
+    return type(given)(*map(to_device_all, given)) if hasattr(given, "_fields") else given
 
 
 def brought(array: Any, stream: Any = 0) -> NDArray[Any]:
@@ -210,7 +210,7 @@ def resident(values: Any) -> Any:
     """
     if is_on_gpu(values):
         return values
-    return sent(values.astype(np.float32) if values.dtype == np.float16 else values)
+    return to_device(values.astype(np.float32) if values.dtype == np.float16 else values)
 
 
 def is_of_numba(values: Any) -> bool:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.engines import cuda_back_kernels as kernels
-from vcc.engines.cuda_arrays import brought, cuda, given_back, is_on_gpu, launch, sent, zeros
+from vcc.engines.cuda_arrays import brought, cuda, given_back, is_on_gpu, launch, to_device, zeros
 from vcc.engines.cuda_footprint_kernels import Source
 from vcc.engines.cuda_footprints import ROOM, Piece, Pieces, divided
 from vcc.engines.cuda_tables import Tables, mask_rows, tables_of
@@ -83,7 +83,7 @@ def check_known(core: Footprints, wanted: Collection[str]) -> None:
             )
 
 
-def numbers_back(
+def footprint_gradients(
     core: Footprints,
     values: Any,
     raster: NDArray[np.floating],
@@ -116,8 +116,8 @@ def numbers_back(
                 of_taps[:, piece.start : piece.stop] = back.tap_sums(piece, back.agreeing(piece, source, -1))
             for n, texture in textures.items():
                 given = tables.weights, tables.places, tables.grid, tables.textures.step, n, piece.start, texture
-                told = back.agreeing(piece, source, n)
-                launch(kernels.texture_back, texture.shape[::-1], piece.stream, told, *given)
+                products = back.agreeing(piece, source, n)
+                launch(kernels.texture_back, texture.shape[::-1], piece.stream, products, *given)
     tell(progress, 1, 1)
     found = {f"masks[{n}].texture": core.scale * _summed(texture) for n, texture in textures.items()}
     if of_taps is not None:
@@ -136,7 +136,7 @@ class _Back:
     def __init__(self, tables: Tables, raster: Any) -> None:
         self.tables, self.core, self.fine = tables, tables.core, tables.fine
         self.channels = raster.shape[2]
-        self.raster = sent(raster.astype(np.float32)) if isinstance(raster, np.ndarray) else raster
+        self.raster = to_device(raster.astype(np.float32)) if isinstance(raster, np.ndarray) else raster
         self.scale = np.float32(self.core.scale)
         self.n = self.fine.columns * self.channels
         """Values in a row of finer samples."""
@@ -169,7 +169,9 @@ class _Back:
             row_ends = np.searchsorted(self.core.view_rows[rows], np.arange(nv + 1))
             each = np.arange(nv), np.arange(len(views))
             to_finer = each[0] * finer_view, each[1] * nv * finer_view
-            return tuple(map(sent, (rows, row_ends, columns, ends, each[0] * nu * view, views * view, *to_finer)))
+            return tuple(
+                map(to_device, (rows, row_ends, columns, ends, each[0] * nu * view, views * view, *to_finer))
+            )
 
         *taps, begin, further, finer_begin, finer_further = tables.once(
             ("readers", shape, tuple(views.tolist())), placed
@@ -177,7 +179,7 @@ class _Back:
         readers, flat = kernels.Readers(*taps), gradient.reshape(math.prod(shape))
         into = target = kernels.Target(flat, begin, further, ns * channels)
         if tables.divided is not None:
-            finer = tables.room("divided", (len(views), nv, fine.rows, self.n))
+            finer = tables.buffer("divided", (len(views), nv, fine.rows, self.n))
             into = kernels.Target(finer.reshape(math.prod(finer.shape)), finer_begin, finer_further, self.n)
         places = fine.columns, fine.rows, nv * len(views)
         if tables.along is None:
@@ -198,7 +200,7 @@ class _Back:
     def _mixed(self, columns: Any, stream: Any) -> Any:
         """See `kernels.mix_back`; columns: of view taps, on the GPU."""
         rows, wide = self.core.raster_shape
-        mixed = self.tables.room("mixed", (columns.shape[0], rows, self.n))
+        mixed = self.tables.buffer("mixed", (columns.shape[0], rows, self.n))
         flat = self.raster.reshape(rows, wide * self.channels)
         kernel = kernels.mix_back(self._spread[1][1].shape[2])
         launch(kernel, mixed.shape[::-1], stream, flat, columns, *self._spread[1], self.channels, mixed)
@@ -219,7 +221,7 @@ class _Back:
                 Taps(part.first, part.shares).by_sample(n)
                 for part, n in zip(self.fine.divided_as, self.core.samples, strict=True)
             ]
-            return tuple((sent(one.first), sent(one.weights)) for one in turned)
+            return tuple((to_device(one.first), to_device(one.weights)) for one in turned)
 
         return self.tables.once("undivided", made)  # type: ignore[no-any-return]
 
@@ -229,35 +231,45 @@ class _Back:
         """The samples of a piece, divided if need be; opened: those of closed taps, too."""
         if self.tables.divided is None:
             return piece.source
-        used = sent(np.ones(self.core.weights.shape, np.float32)) if opened else self.tables.weights
+        used = to_device(np.ones(self.core.weights.shape, np.float32)) if opened else self.tables.weights
         return divided(self.tables, piece, self.channels, used)
 
     def agreeing(self, piece: Piece, source: Source, left_out: int) -> Any:
         """How each sample agrees with the raster's weights, through all masks but one, in a room of the tables."""
         tables, fine = self.tables, self.fine
         columns = piece.stop - piece.start
-        told = tables.room("told", (columns, len(self.core.view_rows), fine.rows, fine.columns))
+        products = tables.buffer("products", (columns, len(self.core.view_rows), fine.rows, fine.columns))
         places = fine.columns, fine.rows, columns * len(self.core.view_rows)
         if tables.along is None:
             given = source, self.raster, tables.places, tables.grid, tables.footprint, tables.textures
-            launch(kernels.met_sheared(self.channels), places, piece.stream, *given, left_out, piece.start, told)
-            return told
-        here = tables.once(("columns", piece.start, piece.stop), lambda: sent(np.arange(piece.start, piece.stop)))
+            launch(
+                kernels.met_sheared(self.channels), places, piece.stream, *given, left_out, piece.start, products
+            )
+            return products
+        here = tables.once(
+            ("columns", piece.start, piece.stop), lambda: to_device(np.arange(piece.start, piece.stop))
+        )
         mixed = self._mixed(here, piece.stream)
         along = source, mixed, *self._spread[0], tables.places, tables.grid, tables.textures
-        launch(kernels.met_in_rows(self.channels), places, piece.stream, *along, left_out, piece.start, told)
-        return told
+        launch(kernels.met_in_rows(self.channels), places, piece.stream, *along, left_out, piece.start, products)
+        return products
 
-    def tap_sums(self, piece: Piece, told: Any) -> Array:
+    def tap_sums(self, piece: Piece, products: Any) -> Array:
         """Sums over the samples of each view tap of a piece, (rows of taps, columns of taps)."""
-        lines = cuda.device_array(told.shape[:3], np.float64)
-        launch(kernels.sum_lines, (told.shape[2], told.shape[0] * told.shape[1]), piece.stream, told, lines)
+        lines = cuda.device_array(products.shape[:3], np.float64)
+        launch(
+            kernels.sum_lines,
+            (products.shape[2], products.shape[0] * products.shape[1]),
+            piece.stream,
+            products,
+            lines,
+        )
         return np.asarray(brought(lines, piece.stream).sum(axis=2).T)
 
 
 def _on_pixels(axis: Axis) -> tuple[Any, Any]:
     first, _, shares = axis.table()
-    return sent(first), sent(shares[:, :, 0].astype(np.float32))
+    return to_device(first), to_device(shares[:, :, 0].astype(np.float32))
 
 
 def _summed(parts: Any) -> Array:

@@ -138,15 +138,15 @@ def met_in_rows(channels: int) -> Any:
     """The kernel that says how samples of so many channels agree with what the raster says of them."""
 
     @cuda.jit
-    def kernel(source, mixed, first, shares, places, grid, masks, left_out, start, told):  # type: ignore[no-untyped-def]
-        """told[p, b, l, k] = masks but one · Σ_c sample · Σ share · mixed[p], of view tap (b, start + p).
+    def kernel(source, mixed, first, shares, places, grid, masks, left_out, start, products):  # type: ignore[no-untyped-def]
+        """products[p, b, l, k] = masks but one · Σ_c sample · Σ share · mixed[p], of view tap (b, start + p).
 
         source: `Source`. mixed, first, shares: see `rows_back`. places, grid, masks: see `gather`.
         """
         x, y, z = cuda.grid(3)
         wide, high, deep = cuda.gridsize(3)
         part = cuda.local.array(channels, float32)
-        columns, taps, rows, samples = told.shape
+        columns, taps, rows, samples = products.shape
         last = mixed.shape[1] - 1
         for tap in range(z, columns * taps, deep):
             p, b = tap // taps, tap % taps
@@ -166,7 +166,7 @@ def met_in_rows(channels: int) -> Any:
                         whole += part[c] * float32(source.values[at + c])
                     at_k, at_l = grid.first_k + k / grid.refine, grid.first_l + l / grid.refine
                     through = passed(masks, places, b, start + p, at_k, at_l, left_out)
-                    told[p, b, l, k] = whole * through
+                    products[p, b, l, k] = whole * through
 
     return kernel
 
@@ -240,12 +240,12 @@ def met_sheared(channels: int) -> Any:
     """As `met_in_rows` where rows and columns do not part."""
 
     @cuda.jit
-    def kernel(source, raster, places, grid, footprint, masks, left_out, start, told):  # type: ignore[no-untyped-def]
-        """told[p, b, m, n]: see `met_in_rows`; raster: (rows, columns, channels)."""
+    def kernel(source, raster, places, grid, footprint, masks, left_out, start, products):  # type: ignore[no-untyped-def]
+        """products[p, b, m, n]: see `met_in_rows`; raster: (rows, columns, channels)."""
         x, y, z = cuda.grid(3)
         wide, high, deep = cuda.gridsize(3)
         part = cuda.local.array(channels, float32)
-        columns, taps, rows, samples = told.shape
+        columns, taps, rows, samples = products.shape
         for tap in range(z, columns * taps, deep):
             p, b = tap // taps, tap % taps
             for m in range(y, rows, high):
@@ -256,7 +256,7 @@ def met_sheared(channels: int) -> Any:
                     for c in range(channels):
                         whole += part[c] * float32(source.values[at + c])
                     k, l = grid.first_k + n / grid.refine, grid.first_l + m / grid.refine
-                    told[p, b, m, n] = whole * passed(masks, places, b, start + p, k, l, left_out)
+                    products[p, b, m, n] = whole * passed(masks, places, b, start + p, k, l, left_out)
 
     return kernel
 
@@ -295,17 +295,17 @@ def give_back(fine, down, across, channels, target):  # type: ignore[no-untyped-
 
 
 @cuda.jit
-def sum_lines(told, lines):  # type: ignore[no-untyped-def]
-    """lines[p, b, l] = Σ_k told[p, b, l, k]."""
+def sum_lines(products, lines):  # type: ignore[no-untyped-def]
+    """lines[p, b, l] = Σ_k products[p, b, l, k]."""
     y, z = cuda.grid(2)
     high, deep = cuda.gridsize(2)
-    columns, taps, rows, samples = told.shape
+    columns, taps, rows, samples = products.shape
     for tap in range(z, columns * taps, deep):
         p, b = tap // taps, tap % taps
         for l in range(y, rows, high):
             total = float64(0)
             for k in range(samples):
-                total += told[p, b, l, k]
+                total += products[p, b, l, k]
             lines[p, b, l] = total
 
 
@@ -333,16 +333,16 @@ def counted(place, point):  # type: ignore[no-untyped-def]
 
 
 @cuda.jit
-def texture_back(told, weights, places, grid, step, m, start, texture):  # type: ignore[no-untyped-def]
-    """texture[i, r, c] += Σ over taps (b, start + p), b = i, i + parts, …, of weight · told · what point (r, c)
+def texture_back(products, weights, places, grid, step, m, start, texture):  # type: ignore[no-untyped-def]
+    """texture[i, r, c] += Σ over taps (b, start + p), b = i, i + parts, …, of weight · products · what point (r, c)
     counts.
 
-    told: (columns of taps, rows of taps, rows of samples, columns of samples). step: of all masks, (masks, 2, 2).
+    products: (columns of taps, rows of taps, rows of samples, columns of samples). step: (masks, 2, 2).
     texture: (parts, rows, columns), sums that are put together afterwards.
     """
     x, y, z = cuda.grid(3)
     wide, high, deep = cuda.gridsize(3)
-    columns, taps, rows, samples = told.shape
+    columns, taps, rows, samples = products.shape
     parts = texture.shape[0]
     along_k, along_l = step[m, 0, 0], step[m, 0, 1]  # columns of the texture
     down_k, down_l = step[m, 1, 0], step[m, 1, 1]
@@ -370,6 +370,6 @@ def texture_back(told, weights, places, grid, step, m, start, texture):  # type:
                                 count = counted(column_l + along_k * k / grid.refine, c)
                                 count *= counted(row_l + down_k * k / grid.refine, r)
                                 if count != 0:
-                                    one += count * told[p, b, l, k]
+                                    one += count * products[p, b, l, k]
                         total += weights[b, a] * one
                 texture[i, r, c] += total

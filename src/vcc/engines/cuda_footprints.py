@@ -26,9 +26,9 @@ from vcc.engines.cuda_arrays import (
     given_back,
     is_on_gpu,
     launch,
-    sent,
     taken,
     this_gpu,
+    to_device,
     wait_for,
     zeros,
 )
@@ -154,7 +154,7 @@ class Pieces:
 
         def places() -> tuple[Any, Any]:
             further = (self.core.view_columns - first) * view
-            return sent(self.core.view_rows * (nu * view)), sent(further)
+            return to_device(self.core.view_rows * (nu * view)), to_device(further)
 
         begin, further = self.tables.once((*span, *values.shape), places)
         return kernels.Source(values.reshape(math.prod(values.shape)), begin, further, ns * channels)
@@ -236,7 +236,7 @@ class _Run:
         if words:
             source = source._replace(values=source.values.view(np.uint32))
         shape = (piece.stop - piece.start, fours * kernels.ROWS, source.pitch)
-        sums = self.tables.room("sums", shape)
+        sums = self.tables.buffer("sums", shape)
         masks = mask_rows(self.tables, tuple(range(piece.start, piece.stop)), piece.stream)
         launch(
             kernels.sum_rows(each, words, masked, batch),
@@ -280,7 +280,7 @@ def divided(tables: Tables, piece: Piece, channels: int, used: Any) -> kernels.S
     core, fine = tables.core, tables.fine
     line, count = fine.columns * channels, len(core.view_rows)
     shape = (piece.stop - piece.start, count, fine.rows, line)
-    made = tables.room("divided", shape)
+    made = tables.buffer("divided", shape)
     launch(
         kernels.divide,
         (line, fine.rows, shape[0] * count),
@@ -290,7 +290,7 @@ def divided(tables: Tables, piece: Piece, channels: int, used: Any) -> kernels.S
 
     def places() -> tuple[Any, Any]:
         further = (np.arange(len(core.view_columns)) - piece.start) * (count * fine.rows * line)
-        return sent(np.arange(count) * (fine.rows * line)), sent(further)
+        return to_device(np.arange(count) * (fine.rows * line)), to_device(further)
 
     begin, further = tables.once(("divided", piece.start, line), places)
     return kernels.Source(made.reshape(math.prod(shape)), begin, further, line)

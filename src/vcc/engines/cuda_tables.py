@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.engines import cuda_footprint_kernels as kernels
 from vcc.engines import footprint_tables as tables
-from vcc.engines.cuda_arrays import LastUsed, cuda, launch, sent
+from vcc.engines.cuda_arrays import LastUsed, cuda, launch, to_device
 from vcc.engines.footprint_samples import FineGrid, on_raster, taps_along, textures
 from vcc.plan.footprints.model import Footprints
 
@@ -60,7 +60,7 @@ class Tables(Brief):
             self.kept[key] = make()
         return self.kept[key]
 
-    def room(self, name: str, shape: tuple[int, ...]) -> Any:
+    def buffer(self, name: str, shape: tuple[int, ...]) -> Any:
         """Room for float32 numbers, the same from run to run: new memory takes longer than many a kernel."""
         size, known = math.prod(shape), self.kept.get(name)
         if known is None or known.size < size:
@@ -84,10 +84,12 @@ def tables_of(core: Footprints) -> Tables:
 
 def _made(core: Footprints) -> Tables:
     fine = FineGrid(core)
-    weights = sent(core.weights.astype(np.float32))
+    weights = to_device(core.weights.astype(np.float32))
     divided = None
     if fine.divided_as is not None:
-        divided = tuple((sent(part.first), sent(part.shares.astype(np.float32))) for part in fine.divided_as)
+        divided = tuple(
+            (to_device(part.first), to_device(part.shares.astype(np.float32))) for part in fine.divided_as
+        )
     grid, footprint = on_raster(core, fine)
     at = np.zeros((len(core.masks), *core.weights.shape, 2))
     for place, mask in zip(at, core.masks, strict=True):
@@ -99,10 +101,10 @@ def _made(core: Footprints) -> Tables:
         weights,
         divided,  # type: ignore[arg-type]
         _along(core, fine) if core.separable else None,
-        kernels.Places(sent(core.x), sent(core.y), sent(at)),
-        grid._replace(step=sent(core.step)),
+        kernels.Places(to_device(core.x), to_device(core.y), to_device(at)),
+        grid._replace(step=to_device(core.step)),
         footprint,
-        tables.Textures(sent(values), sent(size), sent(step)),
+        tables.Textures(to_device(values), to_device(size), to_device(step)),
     )
 
 
@@ -113,7 +115,10 @@ def _along(core: Footprints, fine: FineGrid) -> tuple[tuple[kernels.Quads, int],
     """How rows of the raster gather rows of samples, by fours, and columns columns."""
     down, across = taps_along(core, fine)
     *quads, batch = _quads(down.first, down.weights)
-    return (kernels.Quads(*map(sent, quads)), batch), (sent(across.first.astype(np.int32)), sent(across.weights))
+    return (kernels.Quads(*map(to_device, quads)), batch), (
+        to_device(across.first.astype(np.int32)),
+        to_device(across.weights),
+    )
 
 
 def _quads(
@@ -151,7 +156,7 @@ def mask_rows(tables: Tables, columns: tuple[int, ...], stream: Any) -> kernels.
     core, width = tables.core, tables.fine.columns
     near, off = tables.once("mask rows", lambda: _mask_places(tables))
     groups, total, begin = tables.once(("masks", columns), lambda: _mask_groups(tables, columns))
-    lines = tables.room("lines", (max(total * width, 1),))
+    lines = tables.buffer("lines", (max(total * width, 1),))
     high = max((len(mask.texture) for mask in core.masks), default=0) + 2 * kernels.DARK
     places = width, high, groups.mask.size
     launch(kernels.mask_lines, places, stream, tables.textures, groups, core.refine, width, lines)
@@ -167,7 +172,7 @@ def _mask_places(tables: Tables) -> tuple[Any, Any]:
     rows = np.array([len(mask.texture) for mask in core.masks], np.int32)
     shape = (*row.shape, fine.rows)
     near, off = cuda.device_array(shape, np.int32), cuda.device_array(shape, np.float32)
-    given = sent(row), sent(step), sent(rows), near, off
+    given = to_device(row), to_device(step), to_device(rows), near, off
     launch(kernels.mask_places, (shape[3], shape[2], shape[0] * shape[1]), 0, *given)
     return near, off
 
@@ -192,5 +197,5 @@ def _mask_groups(tables: Tables, columns: tuple[int, ...]) -> tuple[kernels.Mask
             groups.append((m, float(place + mask.step[0, 0] * tables.fine.first_column), total))
             total += high
     kinds = np.int32, np.float64, np.int64
-    made = kernels.MaskGroups(*(sent(np.array([g[n] for g in groups], kind)) for n, kind in enumerate(kinds)))
-    return made, total, sent(begin)
+    made = kernels.MaskGroups(*(to_device(np.array([g[n] for g in groups], kind)) for n, kind in enumerate(kinds)))
+    return made, total, to_device(begin)

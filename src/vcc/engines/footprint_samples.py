@@ -14,7 +14,7 @@ from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines.compiled import read_as
-from vcc.engines.vector_sums import LANES, SHORTEST, room
+from vcc.engines.vector_sums import LANES, SHORTEST, aligned_buffer
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import REACH, TIE, Division, Taps, taps
 
@@ -152,7 +152,7 @@ class MaskColumns:
                 total += high - low
         line = pitch // self.shared
         if self.lines.shape[0] < total:
-            self.lines = room(total, line)
+            self.lines = aligned_buffer(total, line)
             self.lines[:] = 0  # and so beyond the samples' last column
 
         def sample(piece: MaskPiece) -> None:

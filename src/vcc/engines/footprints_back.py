@@ -22,7 +22,7 @@ from vcc.engines import footprint_back_kernels as kernels
 from vcc.engines import footprint_tables as tables
 from vcc.engines.footprint_axes import Axis, axes
 from vcc.engines.footprint_samples import FineGrid, MaskColumns, no_masks, on_raster, textures, view_of
-from vcc.engines.vector_sums import EIGHT, room
+from vcc.engines.vector_sums import EIGHT, aligned_buffer
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import Taps
 
@@ -92,7 +92,7 @@ class _ByColumns(_Back):
         core, fine = self.core, self.fine
         self.down, self.sideways = (_spread(axis) for axis in axes(core, fine))
         self.tiles = _eight_side_by_side(self.raster, self.sideways.shares.shape[2])
-        self.mixed = room(core.raster_shape[0], self.n)
+        self.mixed = aligned_buffer(core.raster_shape[0], self.n)
         self.masks = MaskColumns(core, fine, 1, 1, self.pool)
         self.weights = (core.weights * core.scale).astype(np.float32)
         done = 0
@@ -187,6 +187,6 @@ def _eight_side_by_side(raster: Weights, beyond: int) -> Weights:
     rows, columns, channels = raster.shape
     tall = np.zeros((-(-rows // EIGHT) * EIGHT, (columns + beyond) * channels), dtype=np.float32)
     tall[:rows, : columns * channels] = raster.reshape(rows, -1)
-    tiles = room(len(tall) // EIGHT, tall.shape[1], EIGHT)
+    tiles = aligned_buffer(len(tall) // EIGHT, tall.shape[1], EIGHT)
     tiles[:] = tall.reshape(-1, EIGHT, tall.shape[1]).swapaxes(1, 2)
     return tiles

@@ -18,7 +18,7 @@ from vcc.base.workers import Workers
 from vcc.engines import many_kernels
 from vcc.engines.vector_sums import SHORTEST
 from vcc.plan.footprints.mixtures import Mixture
-from vcc.plan.protocol import Room
+from vcc.plan.protocol import OutputBuffers
 
 PIECE = 2**10
 """Values of a picture that are made at once, at most, or a row of it: as many of the few stay in the cache."""
@@ -52,7 +52,7 @@ class Mixer:
         mixture: how they are made.
         pictures: those that its plans make, (rows, columns[, channels]).
         threads: how many work at once. The same bytes for any number.
-        room: where pictures of cameras go; None makes room here.
+        output_buffers: where pictures of cameras go; None allocates them here.
     """
 
     def __init__(
@@ -60,10 +60,10 @@ class Mixer:
         mixture: Mixture,
         pictures: Sequence[NDArray[np.float32]],
         threads: int,
-        room: Room | None = None,
+        output_buffers: OutputBuffers | None = None,
     ) -> None:
         self.shape, self.threads = pictures[0].shape, threads
-        self.members, self.room = mixture.members, room
+        self.members, self.output_buffers = mixture.members, output_buffers
         members, _, width = mixture.numbers.shape
         self.numbers = mixture.numbers.reshape(members, -1).astype(np.float32)
         across = _even(mixture.across, self.shape[1])
@@ -98,7 +98,11 @@ class Mixer:
     def _begun(self, pool: Workers, first: int, count: int) -> tuple[NDArray[np.float32], Iterator[None]]:
         """Some of the pictures, and what says when they are done."""
         numbers = self.numbers[first : first + count]
-        made = self.room(self.members[first : first + count]) if self.room is not None and len(numbers) else None
+        made = (
+            self.output_buffers(self.members[first : first + count])
+            if self.output_buffers is not None and len(numbers)
+            else None
+        )
         if made is None:
             made = np.empty((len(numbers), *self.shape), dtype=np.float32)
         channels = math.prod(self.shape[2:])

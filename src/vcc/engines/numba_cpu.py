@@ -23,11 +23,11 @@ from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines import ray_transpose, rays_compiled, sharpening_kernels
 from vcc.engines.footprint_columns import ByColumns, band_height, bands
-from vcc.engines.footprint_numbers import numbers_back
+from vcc.engines.footprint_gradients import footprint_gradients
 from vcc.engines.footprint_samples import FineGrid, on_raster, textures, view_of
 from vcc.engines.footprints_back import samples_back
 from vcc.engines.footprints_of_many import rasters, rasters_by_turns
-from vcc.engines.ray_numbers import ray_numbers_back
+from vcc.engines.ray_gradients import ray_gradients
 from vcc.engines.ray_patches import patches_of
 from vcc.engines.vector_sums import EIGHT
 from vcc.plan import operators
@@ -117,11 +117,11 @@ def back(
     """
     if isinstance(core, Rays):
         to_samples = partial(ray_transpose.scattered, core, values.shape, raster, beside, threads)
-        to_numbers = partial(ray_numbers_back, core, values, raster, wanted, beside, threads)
+        to_numbers = partial(ray_gradients, core, values, raster, wanted, beside, threads)
     else:
         core.check_wanted(wanted)
         to_samples = partial(samples_back, core, values.shape, raster, threads)
-        to_numbers = partial(numbers_back, core, values, raster, wanted, threads)
+        to_numbers = partial(footprint_gradients, core, values, raster, wanted, threads)
     return Gradient.of(to_samples if samples else None, to_numbers if wanted else None, progress)
 
 

@@ -61,7 +61,7 @@ _allocating_back = compiled(fastmath={"contract", "nsz", "reassoc"})
 
 
 @_allocating
-def room():  # type: ignore[no-untyped-def]
+def working_arrays():  # type: ignore[no-untyped-def]
     """Where rays are traced: (rays, near, images, flipped); see `cells_at` and `turn_to`."""
     rays = Packet(np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET))
     return rays, np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
@@ -195,7 +195,7 @@ def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # t
         The number, in the tile, of the first pixel that was not traced: as many as there are once all were. After
         ``ended[0]`` is true it means nothing.
     """
-    return find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, room())
+    return find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, working_arrays())
 
 
 @_compiled
@@ -316,7 +316,7 @@ def lit_by(share, n, lit):  # type: ignore[no-untyped-def]
 
 
 @_inlined_back
-def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, told):  # type: ignore[no-untyped-def]
+def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, gradients):  # type: ignore[no-untyped-def]
     """Trace a packet of rays, which ``ways[0][0]`` holds at the sensor, and go back with what they find.
 
     ``ways``: (what rays are before each step and behind all, and their indices (steps + 2, 5, rays); which are not
@@ -331,33 +331,35 @@ def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, to
             for p in range(n):
                 kept[number + 1, q, p] = kept[number, q, p]
         to_indices(field.index_from_ray, packet_of(kept[number + 1]), n)
-        field_back(field, weights[place[0], place[1]], n, kept[number + 1], lit, bar, told.motion, told.scale)
-        moved_back(field.index_from_ray.reshape(-1), n, kept[number], bar, told.indices)
-        of_steps = told.steps, told.matrices, told.shares, told.slopes, told.points
+        field_back(
+            field, weights[place[0], place[1]], n, kept[number + 1], lit, bar, gradients.motion, gradients.scale
+        )
+        moved_back(field.index_from_ray.reshape(-1), n, kept[number], bar, gradients.indices)
+        of_steps = gradients.steps, gradients.matrices, gradients.shares, gradients.slopes, gradients.points
         for step in range(number - 1, -1, -1):
             step_back(steps, step, drawn, kept[step], bar, found, of_steps)
         if aim.by_cell:
-            of_cells = told.cells, told.kinds, told.borders, sums
+            of_cells = gradients.cells, gradients.kinds, gradients.borders, sums
             cell_back(drawn, images, aim.cells, cell, kept[0], bar, of_cells)
         else:
-            window_back(drawn, aim.window, kept[0], bar, told.window, told.scatter, told.points)
-        pixel_back(drawn, place, bar, told.sensor)
+            window_back(drawn, aim.window, kept[0], bar, gradients.window, gradients.scatter, gradients.points)
+        pixel_back(drawn, place, bar, gradients.sensor)
 
 
 @_allocating_back
-def numbers_of_tiles(field, sensor, points, aim, steps, weights, ended, told, tiles):  # type: ignore[no-untyped-def]
-    """What the pixels of tiles say of all numbers, added to ``told``; what is given: `vcc.engines.ray_tables`.
+def gradients_of_tiles(field, sensor, points, aim, steps, weights, ended, gradients, tiles):  # type: ignore[no-untyped-def]
+    """Add the pixels' gradients of some tiles to ``gradients``; what is given: `vcc.engines.ray_tables`.
 
     ``weights``: (rows, columns, channels), of the picture. ``tiles``: (tiles, 4). Once ``ended[0]`` is true,
     nobody wants them, and the kernel returns.
     """
     kept = np.empty((len(steps.codes) + 2, 5, PACKET))
     ways = kept, np.empty(PACKET), np.empty((5, PACKET)), np.empty((2, PACKET)), np.empty((2, 4))
-    numbers_within(field, sensor, points, aim, steps, weights, ended, told, tiles, room(), ways)
+    gradients_within(field, sensor, points, aim, steps, weights, ended, gradients, tiles, working_arrays(), ways)
 
 
 @_back
-def numbers_within(field, sensor, points, aim, steps, weights, ended, told, tiles, within, ways):  # type: ignore[no-untyped-def]
+def gradients_within(field, sensor, points, aim, steps, weights, ended, gradients, tiles, within, ways):  # type: ignore[no-untyped-def]
     """As `numbers_of_tiles`, within what `room` gives, and the ways of `packet_back`."""
     table, samples, _, seed = points
     cells = aim.cells
@@ -375,4 +377,6 @@ def numbers_within(field, sensor, points, aim, steps, weights, ended, told, tile
                     for done in range(0, samples, PACKET):
                         drawn = Drawn(table, first + done, min(PACKET, samples - done), flipped)
                         aim_rays(aim, drawn, middle, sensor.sensitive, images, at_sensor)
-                        packet_back(field, drawn, aim, images, near[q], steps, (row, column), weights, ways, told)
+                        packet_back(
+                            field, drawn, aim, images, near[q], steps, (row, column), weights, ways, gradients
+                        )

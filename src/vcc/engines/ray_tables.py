@@ -220,7 +220,7 @@ class Drawn(NamedTuple):
     flipped: NDArray[np.int64]
 
 
-class Told(NamedTuple):
+class RayGradients(NamedTuple):
     """What the rays of some tiles say of the numbers: sums to which `vcc.engines.ray_loops.numbers_of_tiles` adds.
 
     Args:
@@ -236,7 +236,7 @@ class Told(NamedTuple):
         borders: likewise.
         indices: (20,), index_from_ray.
         motion: (4,).
-        steps: (steps, 20), see `vcc.engines.ray_numbers`.
+        steps: (steps, 20), see `vcc.engines.ray_gradients`.
         matrices: (steps, 20): the affine maps of steps that are such; only read.
         shares: like the tables of `Steps`; empty where nobody wants it.
         slopes: likewise.

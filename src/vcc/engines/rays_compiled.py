@@ -89,7 +89,7 @@ def _tile_of_parts(
 ) -> int:
     """As `_tile`, of the parts of views that the tile looks at; each thread has its own room for them."""
     if not hasattr(own, "room"):
-        own.room = parts.room()
+        own.room = parts.buffers()
         views = (*core.views[:2], *parts.size)
         own.field = looked_up_as(replace(core, views=views), own.room[0], parts.channels)
     rows = patches.rows[tile.first_row // patches.tile]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vcc.base.progress import Progress, tell
 from vcc.engines.rays import memory_of_rays, scattered, traced
 from vcc.engines.reference_back import divided, footprints_back, indices
-from vcc.engines.reference_ray_numbers import ray_numbers_back
+from vcc.engines.reference_ray_gradients import ray_gradients
 from vcc.plan import operators
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import shares
@@ -62,7 +62,7 @@ def back(
         return footprints_back(core, values, raster, samples, wanted, progress)
     return Gradient.of(
         partial(scattered, core, values.shape, raster, beside) if samples else None,
-        partial(ray_numbers_back, core, values, raster, wanted, beside, threads) if wanted else None,
+        partial(ray_gradients, core, values, raster, wanted, beside, threads) if wanted else None,
         progress,
     )
 

@@ -23,7 +23,7 @@ from vcc.base.lookup import smooth_back
 from vcc.base.progress import Progress, tell
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import share_slopes, shares
-from vcc.plan.numbers import numbers
+from vcc.plan.parameters import parameters
 from vcc.plan.protocol import Gradient
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ def footprints_back(
     channels = values.shape[4] if values.ndim == 5 else 1
     weights = np.asarray(raster, dtype=np.float64).reshape(*core.raster_shape, channels)
     into = np.zeros(values.shape) if samples else None
-    found = {name: np.zeros(one.shape) for name, one in numbers(core).items() if name in wanted}
+    found = {name: np.zeros(one.shape) for name, one in parameters(core).items() if name in wanted}
     total = core.weights.size
     for done, (b, a) in enumerate(np.ndindex(core.weights.shape)):
         tell(progress, done, total)
@@ -62,12 +62,12 @@ def footprints_back(
         here = core.view_rows[b], core.view_columns[a]
         met = tap.gathered(weights)
         if into is not None:
-            told = met * (core.scale * core.weights[b, a] * tap.passed)[..., None]
-            into[here] += _divided_back(core, told).reshape(into[here].shape)
+            gradients = met * (core.scale * core.weights[b, a] * tap.passed)[..., None]
+            into[here] += _divided_back(core, gradients).reshape(into[here].shape)
         if wanted:
             view = values[here].astype(np.float64).reshape(*core.samples, channels)
-            for name, told in tap.numbers_back(weights, met, divided(core, view), wanted).items():
-                found[name] += told
+            for name, gradients in tap.gradients(weights, met, divided(core, view), wanted).items():
+                found[name] += gradients
     tell(progress, total, total)
     return Gradient(into, found)
 
@@ -167,21 +167,22 @@ class _Tap(Brief):
     def _slopes_of_any_row(self) -> tuple[Array, Array, Array]:
         return share_slopes(*self.across(0))
 
-    def numbers_back(self, weights: Array, met: Array, light: Array, wanted: Collection[str]) -> dict[str, Array]:
+    def gradients(self, weights: Array, met: Array, light: Array, wanted: Collection[str]) -> dict[str, Array]:
         """What the raster's weights say of numbers, through this tap alone; light: L, met: H."""
         core, b, a = self.core, self.b, self.a
-        told: dict[str, Array] = {}
+        gradients: dict[str, Array] = {}
         whole = (met * light).sum(axis=2)
         of_taps = np.zeros(core.weights.shape)
         of_taps[b, a] = (whole * self.passed).sum()
-        told["weights"] = core.scale * of_taps
-        told["scale"] = np.asarray(core.weights[b, a] * of_taps[b, a])
+        gradients["weights"] = core.scale * of_taps
+        gradients["scale"] = np.asarray(core.weights[b, a] * of_taps[b, a])
         for n in range(len(core.masks)):
             if any(name.startswith(f"masks[{n}].") for name in wanted):
-                told |= self.mask_back(n, core.scale * core.weights[b, a] * whole * self.passed_but(n))
+                gradients |= self.mask_back(n, core.scale * core.weights[b, a] * whole * self.passed_but(n))
         if not MOVING.isdisjoint(wanted):
-            told |= self.places_back(core.scale * core.weights[b, a] * weights, light * self.passed[..., None])
-        return {name: told[name] for name in wanted}
+            through = light * self.passed[..., None]
+            gradients |= self.places_back(core.scale * core.weights[b, a] * weights, through)
+        return {name: gradients[name] for name in wanted}
 
     def mask_back(self, n: int, weights: Array) -> dict[str, Array]:
         """What weights of a mask's transmission at the samples say of the mask."""
@@ -191,7 +192,9 @@ class _Tap(Brief):
         )
         row, column = np.zeros(mask.row.shape), np.zeros(mask.column.shape)
         row[self.b, self.a], column[self.b, self.a] = of_row.sum(), of_column.sum()
-        step = np.array([[(told * self.k).sum(), (told.T * self.l).sum()] for told in (of_column, of_row)])
+        step = np.array(
+            [[(gradients * self.k).sum(), (gradients.T * self.l).sum()] for gradients in (of_column, of_row)]
+        )
         return {
             f"masks[{n}].{name}": one
             for name, one in {"texture": texture, "column": column, "row": row, "step": step}.items()

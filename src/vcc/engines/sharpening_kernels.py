@@ -89,7 +89,7 @@ class Parts:
         self._factors, self._whole = _factors(weights, values.dtype)
         self.kind, self.size = _kept_in_parts(values.dtype), size
 
-    def room(self) -> tuple[NDArray[Any], NDArray[Any]]:
+    def buffers(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Where parts are put, flat and `AT_ONCE` numbers longer than they are, and where rows are filtered."""
         length = self.size[1] * self.channels
         count = int(np.prod(self._views.shape[:2])) * self.size[0] * length

@@ -47,7 +47,7 @@ PLACE, NUMBER = ir.IntType(64), ir.IntType(32)
 FLAGS = ["contract"]
 
 
-def room(*shape: int) -> NDArray[np.float32]:
+def aligned_buffer(*shape: int) -> NDArray[np.float32]:
     """An array whose first number stands where a vector may begin: one that lies across two lines of the cache
     takes as long as two. NumPy's own arrays begin anywhere.
     """

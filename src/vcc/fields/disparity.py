@@ -148,7 +148,7 @@ class Disparities:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What is known, and the range; other processes find maps that are not in the samples that they get."""
-        return _told, (self.maps() if self.known else None, self.range())
+        return _with_default, (self.maps() if self.known else None, self.range())
 
     @property
     def known(self) -> bool:
@@ -187,7 +187,7 @@ class Disparities:
         return Disparities(find=lambda progress: self.maps(progress).piece(ranges), measure=measured, whole=self)
 
 
-def _told(maps: DisparityMaps | None, ends: tuple[float, float] | None) -> Disparities:
+def _with_default(maps: DisparityMaps | None, ends: tuple[float, float] | None) -> Disparities:
     return Disparities(maps, measure=partial(_same, ends))
 
 

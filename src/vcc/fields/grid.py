@@ -333,7 +333,7 @@ def axes_agree(frame: Affine) -> bool:
     return bool((np.abs(linear[across, within]) <= 1e-9 * np.abs(linear).max(axis=1)[across]).all())
 
 
-def told_along_u(
+def along_u(
     frame: Affine, across: tuple[float, float] | None, down: tuple[float, float] | None
 ) -> tuple[float, float] | None:
     """(lowest, highest) disparity along u of what views show along both axes: turned by 90°, the same scene.

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base import late
+from vcc.base import lazy_import
 from vcc.base.affine import Affine
 from vcc.base.checks import above_zero
 from vcc.base.describe import Brief
@@ -109,7 +109,7 @@ def plane_sweep(
     softened = [(arm, _as_if_moved(arm.views[arm.middle], arm.axis)) for arm in cross]
     along = [np.array([grid.disparities_along(arm.along, one) for one in tried], float) for arm in cross]
     guide = cross[0].views[cross[0].middle].mean(axis=0)
-    kernels = late.module("vcc.engines.sweep_kernels")
+    kernels = lazy_import.module("vcc.engines.sweep_kernels")
     costs = kernels.costs(softened, along, guide, window, progress)
     step = float(tried[1] - tried[0])
     best = kernels.smoothest(costs, guide, step, len(cross))

@@ -24,9 +24,9 @@ from vcc.fields.grid import (
     Block,
     Grid,
     Sample,
+    along_u,
     check_frame,
     check_shape,
-    told_along_u,
 )
 from vcc.fields.parallax import disparity_range
 from vcc.fields.plane_sweep import disparity_maps
@@ -335,7 +335,7 @@ def _range_of(values: Any, frame: Affine) -> tuple[float, float] | None:
     if not has_values(values):
         return None
     views = to_numpy(values[rows, columns, ...])
-    return told_along_u(
+    return along_u(
         frame,
         disparity_range(views, "u") if views.shape[1] > 1 else None,
         disparity_range(views, "v") if views.shape[0] > 1 else None,

@@ -28,7 +28,7 @@ from vcc.prescriptions.model import Reference
 from vcc.shapes import height_maps, kernels, lattice, patterns, surfaces, zernike
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern
-from vcc.shapes.sheets import Product
+from vcc.shapes.stacked_patterns import Product
 from vcc.shapes.surface import Surface
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.files import jpeg_headers
-from vcc.files.claims import check_claim
+from vcc.files.declared_sizes import check_declared_size
 from vcc.files.netpbm import read_netpbm
 from vcc.files.npy import read_npy
 
@@ -70,7 +70,7 @@ def read_exr_channels(path: Path) -> dict[str, NDArray[Any]]:
                 raise Unsuitable("this OpenEXR file has several samples for a pixel (deep); flatten it")
             first, last = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
             width, height = (max(0, int(n)) for n in last - first + 1)
-            check_claim(4 * width * height * len(header["channels"]), path.stat().st_size, "it")
+            check_declared_size(4 * width * height * len(header["channels"]), path.stat().st_size, "it")
     with OpenEXR.File(str(path), separate_channels=True) as file:
         return {name: np.asarray(channel.pixels) for name, channel in file.channels().items()}
 
@@ -89,7 +89,7 @@ def _check_png(data: bytes) -> None:
             width, height = (int.from_bytes(data[n : n + 4], "big") for n in (place + 8, place + 12))
             bits, colour = data[place + 16], data[place + 17]
             channels = _PNG_CHANNELS.get(colour, 4)
-            check_claim(width * height * channels * (2 if bits > 8 else 1), len(data), "it")
+            check_declared_size(width * height * channels * (2 if bits > 8 else 1), len(data), "it")
         if name == b"IEND":
             return
         place += 12 + length
@@ -109,8 +109,8 @@ def _decode_jpeg(data: bytes, tables: bytes | None = None) -> NDArray[Any]:
 
     jpeg = jpeg_headers.parsed(data)
     claimed = jpeg.height * jpeg.width * len(jpeg.sampling) * (1 if jpeg.bits == 8 else 2)
-    check_claim(claimed, len(data), "it")
-    check_claim(claimed * len(jpeg.scans) // _SCANS, len(data), f"it, in {len(jpeg.scans)} scans,")
+    check_declared_size(claimed, len(data), "it")
+    check_declared_size(claimed * len(jpeg.scans) // _SCANS, len(data), f"it, in {len(jpeg.scans)} scans,")
     if jpeg_headers.least_bytes(jpeg) > len(data):
         raise ValueError(f"{jpeg.width}×{jpeg.height} pixels take more than its {len(data):,} bytes")
     samples: NDArray[Any] = imagecodecs.jpeg8_decode(data, tables=tables)
@@ -155,9 +155,9 @@ def _check_tiff(page: Any, path: Path) -> None:
     """
     size, width = path.stat().st_size, page.dtype.itemsize
     palette = 3 if page.colormap is not None else 1
-    check_claim(math.prod(page.shaped) * palette * width, size, "it")
+    check_declared_size(math.prod(page.shaped) * palette * width, size, "it")
     if page.is_tiled:
-        check_claim(math.prod(page.chunked) * math.prod(page.chunks) * width, size, "its tiles")
+        check_declared_size(math.prod(page.chunked) * math.prod(page.chunks) * width, size, "its tiles")
     places = list(zip(page.dataoffsets, page.databytecounts, strict=False))
     wanted = math.prod(page.chunked)
     there = [place for place in places[:wanted] if place[0] > 0 < place[1] and sum(place) <= size]
@@ -180,7 +180,7 @@ def _read_bmp(path: Path) -> NDArray[Any]:
 
     data = path.read_bytes()
     with Image.open(io.BytesIO(data), formats=("BMP",)) as picture:
-        check_claim(3 * picture.width * picture.height, len(data), "it")
+        check_declared_size(3 * picture.width * picture.height, len(data), "it")
         if picture.info["compression"] not in _PLAIN_BMP:
             raise Unsuitable("this BMP is packed, which few programs do; save it as PNG")
         if picture.mode == "P":

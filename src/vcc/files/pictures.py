@@ -18,8 +18,8 @@ from vcc.base.showing import Shown
 from vcc.files import transfer
 from vcc.files.atomic import said_by_disk
 from vcc.files.destination import Destination, Target
+from vcc.files.image_metadata import ImageMetadata, in_png, metadata_of, tiff_tags, write_npy
 from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_png
-from vcc.files.statement import Statement, in_png, statement_of, tiff_tags, write_npy
 
 READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
 """The endings that `read_picture` knows."""
@@ -140,7 +140,7 @@ def refuse_coded(path: Path, wanted: str) -> None:
     Raises:
         InputError: it was written for people (sRGB, exposed), or as the raw numbers of a sensor.
     """
-    said = statement_of(path)
+    said = metadata_of(path)
     if said is not None and (said.transfer == "srgb" or not said.is_neutral):
         raise InputError(
             f"{path} says that its numbers are {said.in_words}: {wanted}, so this is another picture. Write the "
@@ -171,7 +171,7 @@ def save_picture(
     values: NDArray[np.float32],
     target: Target,
     *,
-    statement: Statement,
+    statement: ImageMetadata,
     exposure: Exposure = "auto",
     bits: int | None = None,
     format: str | None = None,
@@ -195,7 +195,7 @@ def save_picture(
 
 
 def save_numbers(
-    values: NDArray[Any], target: Target, statement: Statement, words: str, format: str | None = None
+    values: NDArray[Any], target: Target, statement: ImageMetadata, words: str, format: str | None = None
 ) -> SavedPicture:
     """Write a camera's raw numbers as they are: linear, not scaled, not turned.
 
@@ -277,7 +277,7 @@ def averaged(values: NDArray[Any], factor: int) -> NDArray[np.float32]:
 
 
 def write_codes(
-    codes: NDArray[Any], path: Path, ending: str, statement: Statement, *, png_level: int | None = None
+    codes: NDArray[Any], path: Path, ending: str, statement: ImageMetadata, *, png_level: int | None = None
 ) -> None:
     """Write stored numbers as they are, in a PNG or a TIFF that says what they are.
 
@@ -305,7 +305,7 @@ def write_codes(
 
 
 def _save_linear(
-    values: NDArray[np.float32], place: Destination, statement: Statement, exposure: Exposure, bits: int | None
+    values: NDArray[np.float32], place: Destination, statement: ImageMetadata, exposure: Exposure, bits: int | None
 ) -> SavedPicture:
     ending = place.ending
     if exposure not in ("auto", 1):
@@ -322,7 +322,7 @@ def _save_linear(
 
 
 def _save_display(
-    values: NDArray[np.float32], place: Destination, statement: Statement, exposure: Exposure, bits: int | None
+    values: NDArray[np.float32], place: Destination, statement: ImageMetadata, exposure: Exposure, bits: int | None
 ) -> SavedPicture:
     ending = place.ending
     if bits is None:

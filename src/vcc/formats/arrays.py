@@ -24,7 +24,7 @@ from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
 from vcc.fields.view_arrays import all_samples
 from vcc.files.atomic import atomic_path
-from vcc.files.claims import LIGHT_FIELD, check_claim
+from vcc.files.declared_sizes import LIGHT_FIELD, check_declared_size
 from vcc.files.npy import read_npy
 from vcc.formats.grid import Decoded, Geometry
 
@@ -152,7 +152,7 @@ def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
 def _check_unpacked(loaded: np.lib.npyio.NpzFile, path: Path) -> None:
     """Refuse arrays that unpack to more than so few bytes may hold."""
     members = [] if loaded.zip is None else loaded.zip.infolist()
-    check_claim(sum(member.file_size for member in members), path.stat().st_size, str(path), LIGHT_FIELD)
+    check_declared_size(sum(member.file_size for member in members), path.stat().st_size, str(path), LIGHT_FIELD)
 
 
 _MEMBER, _HEAD = b"PK\3\4", 30

@@ -53,7 +53,7 @@ def dark_words(light: Mapping[Place, float]) -> str:
     )
 
 
-def dark_remark(views: Mapping[Place, NDArray[Any]]) -> str:
+def dark_notice(views: Mapping[Place, NDArray[Any]]) -> str:
     """A word on views that are dark, and what to do with them; empty for none.
 
     Args:

@@ -17,9 +17,9 @@ from vcc.fields.samples import Samples
 from vcc.fields.view_arrays import all_samples
 from vcc.files import transfer as curves
 from vcc.files.atomic import atomic_path
+from vcc.files.image_metadata import ImageMetadata
+from vcc.files.images_with_metadata import check_usual
 from vcc.files.pictures import read_picture, read_stored, write_codes
-from vcc.files.stated import check_usual
-from vcc.files.statement import Statement
 from vcc.formats import orders
 from vcc.formats.grid import Decoded, weights_apart
 from vcc.formats.orders import Order, counted_from, running_numbers
@@ -92,7 +92,7 @@ def read(
         values=ordered(samples),
         transfer="srgb",
         weights=None if weights is None else ordered(weights),
-        remarks=remarks,
+        notices=remarks,
     )
 
 
@@ -132,7 +132,7 @@ def save(
     codes = curves.encode(values, bits)
     tiled = put_together(codes, kind)
     with atomic_path(path) as temporary:
-        write_codes(tiled, temporary, ".png", Statement("radiance", transfer="srgb"))
+        write_codes(tiled, temporary, ".png", ImageMetadata("radiance", transfer="srgb"))
     return path
 
 

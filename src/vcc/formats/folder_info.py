@@ -16,7 +16,7 @@ from vcc.files.pictures import read_picture
 from vcc.formats.cameras import Cameras, Pair
 from vcc.formats.grid import DEFAULT_SPACING, Decoded, Geometry, ViewGrid
 from vcc.formats.hci import parameters_file
-from vcc.formats.stated_views import StatedViews
+from vcc.formats.views_with_metadata import ViewsWithMetadata
 
 
 @dataclass(frozen=True, repr=False)
@@ -66,9 +66,9 @@ class FolderInfo(Brief):
     missing: tuple[tuple[int, int], ...] = ()
     transfer: Literal["srgb", "linear"] = "srgb"
     frame: Affine | None = None
-    remarks: tuple[str, ...] = ()
+    notices: tuple[str, ...] = ()
     sample: Sample = "mean"
-    stated: StatedViews = field(default_factory=lambda: StatedViews({}, None))
+    metadata: ViewsWithMetadata = field(default_factory=lambda: ViewsWithMetadata({}, None))
 
     @property
     def codes(self) -> tuple[Literal["as-is", "auto"], Literal["srgb", "linear"]]:
@@ -76,7 +76,7 @@ class FolderInfo(Brief):
 
         Numbers that were exposed or turned when they were written are had as linear light only.
         """
-        return ("as-is", self.transfer) if self.stated.is_neutral else ("auto", "linear")
+        return ("as-is", self.transfer) if self.metadata.is_neutral else ("auto", "linear")
 
     @property
     def picture_shape(self) -> tuple[int, ...]:
@@ -101,16 +101,16 @@ def info_of_grid(grid: ViewGrid) -> FolderInfo:
             "pictures were cropped or scaled, sensor_size_mm, disp_min and disp_max)"
         )
     info = _info(grid.format, grid.shape, first.shape, bits, grid.geometry)
-    said = StatedViews.of(grid.present.values())
+    said = ViewsWithMetadata.of(grid.present.values())
     transfer = said.transfer or info.transfer
-    return replace(info, files=grid.files, missing=grid.missing, transfer=transfer, stated=said)
+    return replace(info, files=grid.files, missing=grid.missing, transfer=transfer, metadata=said)
 
 
 def info_of_file(decoded: Decoded) -> FolderInfo:
     """What a decoded file holds."""
     shape, bits = decoded.values.shape, decoded.values.dtype.itemsize * 8
     info = _info(decoded.format, shape[:2], shape[2:], bits, decoded.geometry)
-    info = replace(info, transfer=decoded.transfer, remarks=decoded.remarks, frame=decoded.frame)
+    info = replace(info, transfer=decoded.transfer, notices=decoded.notices, frame=decoded.frame)
     if decoded.frame is None:
         return info
     linear = decoded.frame.linear

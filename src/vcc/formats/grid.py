@@ -98,7 +98,7 @@ class Decoded(Brief):
     depth: NDArray[Any] | None = None
     disparity: NDArray[Any] | None = None
     weights: NDArray[Any] | None = None
-    remarks: tuple[str, ...] = ()
+    notices: tuple[str, ...] = ()
     metadata: dict[str, Any] = field(default_factory=dict)
 
 

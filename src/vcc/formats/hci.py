@@ -83,14 +83,14 @@ def read_geometry(folder: Path) -> Geometry | None:
     height = positive("intrinsics", "image_resolution_y_px")
     baseline = positive("extrinsics", "baseline_mm") * mm
     between_rows = baseline
-    if not math.isnan(_number(settings, "extrinsics", "baseline_y_mm", folder, needed=False)):
+    if not math.isnan(_number(settings, "extrinsics", "baseline_y_mm", folder, required=False)):
         between_rows = positive("extrinsics", "baseline_y_mm") * mm
     sensor = positive("intrinsics", "sensor_size_mm") * mm
     focal_length = positive("intrinsics", "focal_length_mm") * mm
     focus = _number(settings, "extrinsics", "focus_distance_m", folder)
     checks.zero_or_more(f"{parameters_file(folder)}: focus_distance_m", focus)
-    low = _number(settings, "meta", "disp_min", folder, needed=False)
-    high = _number(settings, "meta", "disp_max", folder, needed=False)
+    low = _number(settings, "meta", "disp_min", folder, required=False)
+    high = _number(settings, "meta", "disp_max", folder, required=False)
     return Geometry(
         spacing=(between_rows, baseline),
         slope_per_pixel=sensor / focal_length / max(width, height),
@@ -192,12 +192,12 @@ def _number(
     key: str,
     folder: Path,
     *,
-    needed: bool = True,
+    required: bool = True,
 ) -> float:
     """A number of the file; NaN for one that is not there and not needed."""
     text = settings.get(section, key, fallback=None) if settings is not None else None
     if text is None:
-        if not needed:
+        if not required:
             return math.nan
         raise InputError(f"{parameters_file(folder)} does not state {key} in its section [{section}]. Add it")
     try:

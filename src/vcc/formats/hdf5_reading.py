@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.files.claims import LIGHT_FIELD, check_claim
+from vcc.files.declared_sizes import LIGHT_FIELD, check_declared_size
 from vcc.formats import hdf5, hdf5_texts
 
 _DEFLATE, _SHUFFLE, _FLETCHER32, _LZF = 1, 2, 3, 32000  # registered numbers of filters
@@ -88,7 +88,7 @@ def numbers(data: Any, path: Path) -> NDArray[Any]:
 
     Raises:
         InputError: no numbers, none at all, some that were never written, that are in another file or damaged, or
-            more than a file of this size may hold (`vcc.files.claims`).
+            more than a file of this size may hold (`vcc.files.declared_sizes`).
     """
     if data.shape is None or data.size == 0 or data.dtype.kind not in "uif" or data.dtype.itemsize > 8:
         raise InputError(f"{path}: {data.name} holds {_kind(data)}, not numbers")
@@ -107,7 +107,7 @@ def references(data: Any, path: Path) -> list[Any]:
     h5py = hdf5.library()
     if data.shape is None or h5py.check_ref_dtype(data.dtype) is not h5py.Reference:
         raise InputError(f"{path}: {data.name} holds {_kind(data)}, not references")
-    check_claim(data.nbytes, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
+    check_declared_size(data.nbytes, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
     return [data.file[reference] for reference in data[...].ravel()]
 
 
@@ -160,7 +160,7 @@ def _kind(data: Any) -> str:
 
 def _stored(data: Any, path: Path) -> NDArray[Any]:
     """The elements of a data set, once it is known that all of them are in the file."""
-    check_claim(data.nbytes, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
+    check_declared_size(data.nbytes, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
     if data.external or data.is_virtual:
         raise InputError(f"{path}: {data.name} lies in another file, which is not read. Copy it into this one")
     if data.chunks is not None:
@@ -175,7 +175,7 @@ def _stored(data: Any, path: Path) -> NDArray[Any]:
 def _from_chunks(data: Any, path: Path) -> NDArray[Any]:
     size, chunk = path.stat().st_size, data.chunks
     wanted = math.prod(-(-n // step) for n, step in zip(data.shape, chunk, strict=True))
-    check_claim(wanted * math.prod(chunk) * data.dtype.itemsize, size, f"{path}: {data.name}", LIGHT_FIELD)
+    check_declared_size(wanted * math.prod(chunk) * data.dtype.itemsize, size, f"{path}: {data.name}", LIGHT_FIELD)
     masks: dict[tuple[int, ...], int] = {}
 
     def note(info: Any) -> None:

@@ -93,7 +93,7 @@ def read(path: Path) -> Decoded:
         ),
         frame=None if intrinsics is None else frame_of(intrinsics.T, path),
         weights=weights,
-        remarks=tuple(remarks),
+        notices=tuple(remarks),
         metadata=metadata,
     )
 

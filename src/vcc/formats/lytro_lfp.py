@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
-from vcc.base.reading import expanded, reading, stated_at
+from vcc.base.reading import expanded, reading, value_at
 from vcc.formats.grid import Decoded
 from vcc.formats.lytro_container import Container, begins_as_container
 
@@ -248,7 +248,7 @@ class _Recording:
     def levels(self, name: str) -> tuple[float, float, float, float] | None:
         """The black or white levels of the pixels of a tile, row by row."""
         for image in self._images():
-            if isinstance(stated_at(self.metadata, *image, "pixelFormat", name), dict):
+            if isinstance(value_at(self.metadata, *image, "pixelFormat", name), dict):
                 found = [self._number(*image, "pixelFormat", name, kind) for kind in _PLACES[self.color_filter]]
                 if None in found:
                     raise self._container.fault(f"its metadata state {name} levels for some of the colours only")
@@ -260,7 +260,7 @@ class _Recording:
     def color_matrix(self) -> NDArray[np.float64] | None:
         """From the camera's colours to sRGB."""
         for name in ("ccm", "ccmRgbToSrgbArray"):
-            given = stated_at(self.metadata, "image", "color", name)
+            given = value_at(self.metadata, "image", "color", name)
             if given is None:
                 continue
             try:
@@ -291,7 +291,7 @@ class _Recording:
 
     def _stated(self, *keys: str) -> Any:
         for image in self._images():
-            found = stated_at(self.metadata, *image, *keys)
+            found = value_at(self.metadata, *image, *keys)
             if found is not None:
                 return found
         return None
@@ -304,7 +304,7 @@ class _Recording:
                 f"its picture ({self._image_name}) is not in the file. Copy it again from where it came from"
             )
         bits = self._stated("pixelPacking", "bitsPerPixel")
-        size = (stated_at(self.metadata, "image", "height"), stated_at(self.metadata, "image", "width"))
+        size = (value_at(self.metadata, "image", "height"), value_at(self.metadata, "image", "width"))
         for packing in _PACKINGS:
             shape = packing.shape if None in size else size
             if not all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in shape):
@@ -330,7 +330,7 @@ class _Recording:
         )
 
     def _camera(self, packing: _Packing) -> str:
-        make, model = (stated_at(self.metadata, "camera", key) for key in ("make", "model"))
+        make, model = (value_at(self.metadata, "camera", key) for key in ("make", "model"))
         words = [word for word in (make, model) if isinstance(word, str) and word]
         return " ".join(words) if words else packing.camera
 
@@ -345,7 +345,7 @@ class _Recording:
         return _CORNERS[corner]
 
     def _number(self, *keys: str) -> float | None:
-        value = stated_at(self.metadata, *keys)
+        value = value_at(self.metadata, *keys)
         if value is None:
             return None
         try:
@@ -374,7 +374,7 @@ def _frame(container: Container) -> dict[str, Any]:
     """
     contents = container.contents()
     for keys in (("frames",), ("picture", "frameArray")):
-        frames = stated_at(contents, *keys)
+        frames = value_at(contents, *keys)
         if isinstance(frames, list) and frames and isinstance(frames[0], dict):
             frame = frames[0].get("frame")
             if isinstance(frame, dict) and _is_there(container, frame, _made_of_it(contents)):
@@ -388,7 +388,7 @@ def _frame(container: Container) -> dict[str, Any]:
 
 def _made_of_it(contents: dict[str, Any]) -> list[str]:
     """What a container says that it holds besides, or instead of, a recording."""
-    found = [stated_at(contents, *keys) for keys in (("accelerations",), ("picture", "accelerationArray"))]
+    found = [value_at(contents, *keys) for keys in (("accelerations",), ("picture", "accelerationArray"))]
     kinds = [
         each.get("type") for some in found if isinstance(some, list) for each in some if isinstance(each, dict)
     ]

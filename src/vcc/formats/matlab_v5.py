@@ -13,7 +13,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from vcc.files.claims import LIGHT_FIELD
+from vcc.files.declared_sizes import LIGHT_FIELD
 
 _HEADER = 128
 _BYTE_ORDERS = {b"IM": "little", b"MI": "big"}

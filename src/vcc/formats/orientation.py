@@ -32,7 +32,7 @@ class Moved:
     """How the views were rearranged, and what to say of it."""
 
     steps: tuple[str, ...] = ()
-    remark: str = ""
+    notice: str = ""
 
 
 _FORCED: dict[str, tuple[str, ...]] = {
@@ -71,7 +71,7 @@ def rearranged(
         return values, Moved(_FORCED[choice])
     found = seen or look(values)
     if frame is not None:
-        return values, Moved(remark=_frame_remark(frame, found))
+        return values, Moved(notice=_frame_notice(frame, found))
     steps, said = [], []
     directions = stated.directions
     if found.verdict.startswith("transposed"):
@@ -112,7 +112,7 @@ def look(values: NDArray[Any]) -> parallax.Orientation:
     return parallax.orientation(values)
 
 
-def _frame_remark(frame: Affine, found: parallax.Orientation) -> str:
+def _frame_notice(frame: Affine, found: parallax.Orientation) -> str:
     """A word where a frame that the format states and the parallax of the pictures contradict each other."""
     linear = frame.linear
     opposite = linear[0, 0] * linear[2, 2] * linear[1, 1] * linear[3, 3] < 0

@@ -78,7 +78,7 @@ def read(path: Path) -> Decoded:
         transfer="linear",
         geometry=geometry,
         frame=frame,
-        remarks=tuple(remarks),
+        notices=tuple(remarks),
         metadata={"camera": model} if model else {},
     )
 

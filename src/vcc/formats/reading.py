@@ -22,14 +22,14 @@ from vcc.fields.samples import check_samples
 from vcc.files.transfer import decode
 from vcc.formats import containers
 from vcc.formats.cameras import Cameras
-from vcc.formats.dark_views import dark_remark
+from vcc.formats.dark_views import dark_notice
 from vcc.formats.folder_info import FolderInfo, Given, cameras_for, info_of_file, info_of_grid
 from vcc.formats.folders import find_grid, towards_positions
 from vcc.formats.grid import Decoded, Geometry, ViewGrid
+from vcc.formats.notices import assumed_notice, overruled_notice, vergence_notice
 from vcc.formats.orders import Order
 from vcc.formats.orientation import OrientationChoice, look, looked_at, rearranged
 from vcc.formats.reading_views import read_views
-from vcc.formats.remarks import assumed_remark, overruled_remark, vergence_remark
 from vcc.formats.sparse import SparseViews
 from vcc.light_field import LightField
 
@@ -183,8 +183,8 @@ def open_sparse_views(
             grid.present, info.picture_shape, _STORED[info.bits], **_how_stored(info, transfer), progress=progress
         )
     assumed = [name for name in info.unknown if name not in given.names]
-    dark = dark_remark(dict(zip(grid.present, pictures, strict=True)))
-    said = (assumed_remark(info, path, grid.geometry, assumed), overruled_remark(info, given), dark)
+    dark = dark_notice(dict(zip(grid.present, pictures, strict=True)))
+    said = (assumed_notice(info, path, grid.geometry, assumed), overruled_notice(info, given), dark)
     for remark in filter(None, said):
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
     frame = cameras.frame((*grid.shape, *info.picture_shape))
@@ -223,13 +223,13 @@ class _Opened:
     """
 
     info: FolderInfo
-    stated: Geometry
+    geometry: Geometry
     cameras: Cameras | None
     values: NDArray[Any]
     counted: bool
     truth: NDArray[Any] | None
     seen: _Seen
-    remark: str
+    notice: str
 
 
 def _with(options: dict[str, Any], files_outside: bool) -> dict[str, Any]:
@@ -311,9 +311,9 @@ def _how_stored(info: FolderInfo, transfer: Transfer) -> dict[str, Any]:
     """
     if transfer == "as-is":
         return {"linear": True}
-    info.stated.check(transfer)
+    info.metadata.check(transfer)
     linear = (info.transfer if transfer == "auto" else transfer) == "linear"
-    return {"linear": linear, "stated": None if info.stated.is_usual else info.stated}
+    return {"linear": linear, "stated": None if info.metadata.is_usual else info.metadata}
 
 
 def _put_in_order(
@@ -322,7 +322,7 @@ def _put_in_order(
     """The light field with its views in the order that is asked for, and what to say of it."""
     info, cameras, seen = opened.info, opened.cameras, opened.seen
     values, moved = rearranged(
-        opened.values, orientation, opened.stated, info.frame, opened.truth, seen.orientation
+        opened.values, orientation, opened.geometry, info.frame, opened.truth, seen.orientation
     )
     if not opened.counted:
         check_samples(values)
@@ -338,12 +338,12 @@ def _put_in_order(
     grid = Grid(values.shape, frame, values.dtype, info.sample, disparity_range, shown)
     light_field = LightField.of(values, grid)
     views = {(row, column): values[row, column] for row, column in np.ndindex(values.shape[:2])}
-    remarks = (*info.remarks, opened.remark, moved.remark, dark_remark(views))
+    remarks = (*info.notices, opened.notice, moved.notice, dark_notice(views))
     if cameras is None:
         return light_field, remarks
     assumed = [name for name in info.unknown if name not in given.names]
-    vergence = vergence_remark(_shown(light_field, seen)) if cameras.are_parallel else ""
-    said = (assumed_remark(info, path, opened.stated, assumed), overruled_remark(info, given))
+    vergence = vergence_notice(_shown(light_field, seen)) if cameras.are_parallel else ""
+    said = (assumed_notice(info, path, opened.geometry, assumed), overruled_notice(info, given))
     return light_field, (*remarks, *said, vergence)
 
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
-from vcc.files.claims import LIGHT_FIELD, check_claim
+from vcc.files.declared_sizes import LIGHT_FIELD, check_declared_size
 from vcc.files.pictures import read_picture, read_png_into
 from vcc.files.transfer import decode
-from vcc.formats.stated_views import StatedViews
+from vcc.formats.views_with_metadata import ViewsWithMetadata
 
 _THREADS = 2  # decoding releases the interpreter's lock
 
@@ -29,7 +29,7 @@ def read_views(
     stored: type[np.generic],
     *,
     linear: bool,
-    stated: StatedViews | None = None,
+    stated: ViewsWithMetadata | None = None,
     progress: Progress | None = None,
     first: Collection[tuple[int, int]] = (),
     meanwhile: Callable[[NDArray[Any]], None] | None = None,
@@ -58,7 +58,7 @@ def read_views(
     shape = (len(files), *picture)
     stored_bytes = sum(file.stat().st_size for file in set(files.values()) if file.is_file())
     folder = next(iter(files.values())).parent
-    check_claim(math.prod(shape) * np.dtype(stored).itemsize, stored_bytes, str(folder), LIGHT_FIELD)
+    check_declared_size(math.prod(shape) * np.dtype(stored).itemsize, stored_bytes, str(folder), LIGHT_FIELD)
     try:
         values: NDArray[Any] = np.empty(shape, kind)
     except MemoryError:

@@ -18,7 +18,7 @@ from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.fields.samples import Samples
 from vcc.files.atomic import atomic_path
-from vcc.files.claims import LIGHT_FIELD, check_claim
+from vcc.files.declared_sizes import LIGHT_FIELD, check_declared_size
 from vcc.files.pictures import Exposure
 from vcc.formats.exposing import Codes
 from vcc.formats.grid import Decoded
@@ -104,7 +104,7 @@ def read(
                     if frames[-1].shape != frames[0].shape:
                         raise InputError(f"{path}: the size of the picture changes at frame {decoded}")
                     if len(frames) == 1:
-                        remarks = _remarks(frame, stream)
+                        remarks = _notices(frame, stream)
                 decoded += 1
                 end = frame.time or 0.0
                 tell(progress, decoded, stream.frames)
@@ -132,7 +132,7 @@ def read(
         format=kind,
         values=values,
         transfer="srgb",
-        remarks=tuple(remarks),
+        notices=tuple(remarks),
         metadata={"frames": decoded, "frames_per_second": float(stream.average_rate or 0)},
     )
 
@@ -236,7 +236,9 @@ def _check_claim(frame: Any, count: int, path: Path) -> None:
     """Refuse so many frames of this size, if the file is too small for them: frames that repeat need no bytes."""
     width = 1 if _bits(frame) <= 8 else 2
     try:
-        check_claim(3 * frame.height * frame.width * count * width, path.stat().st_size, str(path), LIGHT_FIELD)
+        check_declared_size(
+            3 * frame.height * frame.width * count * width, path.stat().st_size, str(path), LIGHT_FIELD
+        )
     except InputError as error:
         raise InputError(f"{error}, or take fewer frames with every=, first= and last=") from None
 
@@ -262,7 +264,7 @@ def _picture(frame: Any, path: Path) -> NDArray[Any]:
     return np.rot90(samples, frame.rotation // 90)
 
 
-def _remarks(frame: Any, stream: Any) -> list[str]:
+def _notices(frame: Any, stream: Any) -> list[str]:
     said = ["its frames are taken as views from places in equal steps, and its samples as sRGB"]
     if frame.interlaced_frame:
         said.append("it is interlaced: every other row is from another moment. Deinterlace it first")

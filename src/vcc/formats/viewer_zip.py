@@ -31,8 +31,8 @@ from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.base.reading import most_unpacked, read_bytes
 from vcc.base.units import mm
+from vcc.files.images_with_metadata import check_usual
 from vcc.files.pictures import read_picture
-from vcc.files.stated import check_usual
 from vcc.formats.grid import Decoded, Geometry, Place, arrange
 
 ENDINGS = (".zip", ".xml")
@@ -86,7 +86,7 @@ def read(path: Path, *, progress: Progress | None = None) -> Decoded:
         values=values,
         transfer="linear" if values.dtype.kind == "f" else "srgb",
         geometry=Geometry(spacing=spacing, spacing_unit="mm" if spacing else "", directions=(1, 1)),
-        remarks=(remark,) if has_depth else (),
+        notices=(remark,) if has_depth else (),
     )
 
 

@@ -21,9 +21,9 @@ from vcc.base.progress import Progress, tell
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import refusal
+from vcc.files.image_metadata import ImageMetadata
 from vcc.files.parts import check_name, clear_leftovers, part_of
 from vcc.files.pictures import Exposure, save_picture, write_codes
-from vcc.files.statement import Statement
 from vcc.formats import arrays, eslf, lftoolbox, video
 from vcc.formats.cameras import Cameras, cameras_of
 from vcc.formats.exposing import Codes, stored_view
@@ -192,7 +192,7 @@ def save_folder(
     text, remark = _parameters(grid, cameras_of(grid), path, kind)
     rows, columns = grid.shape[:2]
     codes = Codes(light_field, bits, transfer, exposure)
-    linear = Statement("radiance")
+    linear = ImageMetadata("radiance")
     coded = replace(linear, transfer=transfer, exposure=codes.exposure, automatic=exposure == "auto")
     with _new_folder(path) as folder:
         if text:

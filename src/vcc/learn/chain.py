@@ -163,12 +163,12 @@ class Chain:
             train = put(self.train, dict(values))
             with self._parts.keeping():
                 computed = self._computed(train)
-            made = _Made(key, train, computed.plan, computed.plan.numbers(), computed.linears)
+            made = _Made(key, train, computed.plan, computed.plan.parameters(), computed.linears)
             self._check_form(made.numbers)
             self._made = made
         return self._made
 
-    def _beside(self, values: Values, name: str, index: tuple[int, ...], step: float) -> Train | InputError:
+    def _with_step(self, values: Values, name: str, index: tuple[int, ...], step: float) -> Train | InputError:
         """The train with one number of a parameter moved by a step; what it refuses."""
         here = np.array(values[name], dtype=np.float64) if name in values else read(self.train, name)
         here[index] += step
@@ -177,9 +177,9 @@ class Chain:
         except InputError as error:
             return error
 
-    def _numbers(self, train: Train, name: str) -> Numbers:
+    def _plan_parameters(self, train: Train, name: str) -> Numbers:
         try:
-            numbers = self._computed(train).plan.numbers()
+            numbers = self._computed(train).plan.parameters()
             self._check_form(numbers)
         except InputError as error:
             raise InputError(f"there is no derivative to {name}: {error}") from None
@@ -193,18 +193,18 @@ class Chain:
         By a central difference; beside the end of what a camera allows by one of three points on this side of it.
         """
         step = self._steps[name]
-        before, behind = (self._beside(values, name, index, side * step) for side in (-1, 1))
+        before, behind = (self._with_step(values, name, index, side * step) for side in (-1, 1))
         if isinstance(before, Train) and isinstance(behind, Train):
-            low, high = (self._numbers(train, name) for train in (before, behind))
+            low, high = (self._plan_parameters(train, name) for train in (before, behind))
             return _combined(((-0.5, low), (0.5, high)), step, wanted)
         if isinstance(before, InputError) and isinstance(behind, InputError):
             raise InputError(f"there is no derivative to {name}: {before}")
         side = -1 if isinstance(behind, InputError) else 1
-        near, far = (self._beside(values, name, index, n * side * step) for n in (1, 2))
+        near, far = (self._with_step(values, name, index, n * side * step) for n in (1, 2))
         if isinstance(near, InputError) or isinstance(far, InputError):
             raise InputError(f"there is no derivative to {name}: {near if isinstance(near, InputError) else far}")
         here = self._at(values).numbers
-        parts = (-1.5, here), (2.0, self._numbers(near, name)), (-0.5, self._numbers(far, name))
+        parts = (-1.5, here), (2.0, self._plan_parameters(near, name)), (-0.5, self._plan_parameters(far, name))
         return _combined(parts, side * step, wanted)
 
     # --- what is refused

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vcc.advice.explain import explained
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.values import Untold, fingerprint
+from vcc.base.values import Unhashable, fingerprint
 from vcc.engines import abilities, chosen
 from vcc.fields.grid import Grid
 from vcc.fields.samples import InMemory, Samples
@@ -81,9 +81,9 @@ class Work:
         seen = disparities and [round(float(each), 3) for each in disparities]
         decisive = [field.name for field in fields(How) if field.name not in (*OF_THE_RUN, "seed")]
         return {
-            "camera": _told(self.camera),
-            "light field": _told(grid.shape[:4], grid.frame.matrix, grid.sample, grid.extent, seen),
-            "options": _told({name: getattr(how, name) for name in decisive}),
+            "camera": _reported(self.camera),
+            "light field": _reported(grid.shape[:4], grid.frame.matrix, grid.sample, grid.extent, seen),
+            "options": _reported({name: getattr(how, name) for name in decisive}),
         }
 
     @property
@@ -98,10 +98,10 @@ class Work:
         return Work.of, (self.camera, self.light_field, self.how, self.chain.names)  # all is decided alike there
 
 
-def _told(*parts: Any) -> str:
+def _reported(*parts: Any) -> str:
     try:
         return fingerprint(*parts)
-    except Untold:
+    except Unhashable:
         return ""
 
 
@@ -311,7 +311,7 @@ class Call:
                 if samples:
                     of_fields[m] = part.samples if n == 0 else of_fields[m] + part.samples
                 total = total + replace(part, samples=None)
-            pulled.append(chain.pull(one, total.numbers) if wanted else {})
+            pulled.append(chain.pull(one, total.gradients) if wanted else {})
         return _stacked(of_fields) if samples else None, {
             name: np.stack([one[name] for one in pulled])
             if name in self.several

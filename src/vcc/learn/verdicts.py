@@ -79,10 +79,10 @@ def following(chain: Chain, name: str) -> Collection[str]:
     here = read(chain.train, name)
     # Each of its numbers by another amount, so that no changes make up for one another.
     some = STEP * scale(chain.train, name) * np.random.default_rng(0).uniform(0.5, 1.0, here.shape)
-    start = chain.plan().numbers()
+    start = chain.plan().parameters()
     for moved in (here + some, here - some):
         try:
-            numbers = chain.plan({name: moved}).numbers()
+            numbers = chain.plan({name: moved}).parameters()
         except InputError:  # at an end of what its element takes, or of what was decided
             continue
         return [number for number, value in numbers.items() if not np.array_equal(value, start[number])]

@@ -17,9 +17,9 @@ from vcc.base import checks
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
+from vcc.base.notices import Notices
 from vcc.base.progress import Progress, tell
-from vcc.base.remarks import Remarks
-from vcc.camera import Camera, captured_together
+from vcc.camera import Camera, captured_in_batches
 from vcc.fields.sampled import library_of
 from vcc.fields.samples import Samples
 from vcc.image import Image
@@ -280,7 +280,7 @@ class _Work:
         self._moving, self._light, self._start, self._how = moving, light, start, how
         self._executor = executor
         self._kept: OrderedDict[State, _Gathered] = OrderedDict()
-        self._remarks, self._made, self._at_once = Remarks(), 0, 1
+        self._remarks, self._made, self._at_once = Notices(), 0, 1
 
     def gathered(self, exposure: float, tolerance: float, progress: Progress | None) -> Image:
         breaks = (*self._moving.breaks, *(time - self._start for time in self._light.breaks))
@@ -374,7 +374,7 @@ class _Work:
         """The pictures of cameras before one light field, by rays of their own numbers."""
         cameras, seeds = [camera for camera, _ in states], [self._how.seed + number for number in numbers]
         if self._executor is None and len(cameras) > 1:
-            return captured_together(cameras, samples, self._how, seeds=seeds)
+            return captured_in_batches(cameras, samples, self._how, seeds=seeds)
         return [
             camera.capture(samples, replace(self._how, seed=seed), executor=self._executor)
             for camera, seed in zip(cameras, seeds, strict=True)

@@ -22,8 +22,8 @@ from vcc.base.values import Value
 from vcc.fields.grid import Block, Grid
 from vcc.optics.train import Train
 from vcc.plan.depth_rule import ViewsBetween
-from vcc.plan.numbers import numbers, with_numbers
 from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews, DarkBorder
+from vcc.plan.parameters import parameters, with_parameters
 from vcc.plan.protocol import Core
 
 NUMBERED = ("core", "before", "after")
@@ -110,9 +110,9 @@ class Plan(Value, Shown):
         return max((operator.reach for operator in self.before), default=0)
 
     @property
-    def beside(self) -> tuple[tuple[int, int], ...]:
+    def halo(self) -> tuple[tuple[int, int], ...]:
         """Dark samples that are put (before, after) those of a piece along (v, u, t, s)."""
-        return next((o.beside for o in self.before if isinstance(o, DarkBorder)), ((0, 0),) * 4)
+        return next((o.halo for o in self.before if isinstance(o, DarkBorder)), ((0, 0),) * 4)
 
     @property
     def smear(self) -> tuple[float, float]:
@@ -152,7 +152,7 @@ class Plan(Value, Shown):
 
     def _of_views(self, found: Any) -> Any:
         """What is found of views, (v, u, …), without the dark ones that are put beside them."""
-        (top, bottom), (left, right), *_ = self.beside
+        (top, bottom), (left, right), *_ = self.halo
         return found[top : found.shape[0] - bottom, left : found.shape[1] - right]
 
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
@@ -163,22 +163,22 @@ class Plan(Value, Shown):
             factor *= one
         return (np.dtype(np.float32) if kind == np.float16 else kind), factor  # compiled code takes no half
 
-    def numbers(self) -> dict[str, NDArray[np.float64]]:
+    def parameters(self) -> dict[str, NDArray[np.float64]]:
         """The numbers of the core and of what is done before and after it: ``"core.x"``, ``"after[0].down"``."""
         return {
             name + rest if rest.startswith("[") else f"{name}.{rest}": value
             for name in NUMBERED
-            for rest, value in numbers(getattr(self, name)).items()
+            for rest, value in parameters(getattr(self, name)).items()
         }
 
-    def with_numbers(self, changed: Mapping[str, Any]) -> Plan:
+    def with_parameters(self, changed: Mapping[str, Any]) -> Plan:
         """The same with some numbers changed, by the names of `numbers`; the others stay."""
         parts: dict[str, dict[str, Any]] = {name: {} for name in NUMBERED}
         for full, value in changed.items():
             name = next(name for name in NUMBERED if full.startswith((f"{name}.", f"{name}[")))
             parts[name][full.removeprefix(name).lstrip(".")] = value
         return replace(
-            self, **{name: with_numbers(getattr(self, name), part) for name, part in parts.items() if part}
+            self, **{name: with_parameters(getattr(self, name), part) for name, part in parts.items() if part}
         )
 
     def check_fits(self, train: Train, grid: Grid) -> None:

@@ -229,7 +229,7 @@ class DarkBorder(Value):
         beside: (before, after) along (v, u, t, s): how many samples.
     """
 
-    beside: tuple[tuple[int, int], ...]
+    halo: tuple[tuple[int, int], ...]
 
     reach = 0
     copies = True
@@ -237,9 +237,9 @@ class DarkBorder(Value):
     def apply(self, values: Any) -> Any:
         """Samples (v, u, t, s[, channels]) with the border, of their type."""
         if isinstance(values, np.ndarray):
-            return np.pad(values, [*self.beside, *[(0, 0)] * (values.ndim - 4)])
+            return np.pad(values, [*self.halo, *[(0, 0)] * (values.ndim - 4)])
         xp = array_namespace(values)
-        for axis, beside in enumerate(self.beside):
+        for axis, beside in enumerate(self.halo):
             dark = [
                 xp.zeros(
                     (*values.shape[:axis], n, *values.shape[axis + 1 :]), dtype=values.dtype, device=device(values)
@@ -252,7 +252,7 @@ class DarkBorder(Value):
 
     def transpose(self, values: Any) -> Any:
         """Samples with the border cut off."""
-        cut = (slice(a, n - b) for (a, b), n in zip(self.beside, values.shape[:4], strict=True))
+        cut = (slice(a, n - b) for (a, b), n in zip(self.halo, values.shape[:4], strict=True))
         return values[(*cut, ...)]
 
     def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
@@ -261,16 +261,16 @@ class DarkBorder(Value):
 
     def block(self, block: Block) -> Block:
         """What a block's light reaches: itself and as much of a border on each side as the piece has."""
-        grown = ((first, stop + a + b) for (first, stop), (a, b) in zip(block.ranges, self.beside, strict=True))
+        grown = ((first, stop + a + b) for (first, stop), (a, b) in zip(block.ranges, self.halo, strict=True))
         return Block(*grown)
 
     def made_of(self, pixels: Any) -> Any:
         """The same, where they stand without the border."""
-        return pixels - np.array(self.beside)[2:, :1]
+        return pixels - np.array(self.halo)[2:, :1]
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
         """With the border."""
-        grown = (n + a + b for n, (a, b) in zip(shape[:4], self.beside, strict=True))
+        grown = (n + a + b for n, (a, b) in zip(shape[:4], self.halo, strict=True))
         return (*grown, *shape[4:])
 
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:

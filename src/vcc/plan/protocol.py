@@ -14,7 +14,7 @@ from vcc.base.progress import Progress, part_of
 from vcc.base.workers import Workers
 from vcc.fields.grid import Block
 
-Room = Callable[[Sequence[int]], NDArray[np.float32] | None]
+OutputBuffers = Callable[[Sequence[int]], NDArray[np.float32] | None]
 """Gives the memory (cameras, rows, columns[, channels]) in which pictures of some cameras, by their numbers, are
 made, if there is any; new memory takes long."""
 
@@ -63,11 +63,11 @@ class Gradient(Brief):
 
     Args:
         samples: like the samples that the core took, (v, u, t, s[, channels]); None where nobody asked.
-        numbers: by their names (`vcc.plan.numbers`), float64, each of its number's shape.
+        numbers: by their names (`vcc.plan.parameters`), float64, each of its number's shape.
     """
 
     samples: Any = None
-    numbers: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    gradients: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -91,12 +91,12 @@ class Gradient(Brief):
 
     def __add__(self, other: Gradient) -> Gradient:
         """What two rasters, or two parts of one, say of the same samples and numbers."""
-        names = dict.fromkeys([*self.numbers, *other.numbers])
+        names = dict.fromkeys([*self.gradients, *other.gradients])
         none = self.samples is None or other.samples is None
         return Gradient(
             (self.samples if other.samples is None else other.samples) if none else self.samples + other.samples,
             {
-                name: sum(each.numbers[name] for each in (self, other) if name in each.numbers)  # type: ignore[misc]
+                name: sum(each.gradients[name] for each in (self, other) if name in each.gradients)  # type: ignore[misc]
                 for name in names
             },
         )
@@ -191,7 +191,7 @@ class Engine(Protocol):
             raster: weights of the raster's values, (rows, columns, channels).
             samples: whether the derivative to the samples is wanted: an array of their shape, float32 (float64
                 where the engine is `Abilities.double`).
-            wanted: names of the core's numbers to which it is wanted (`vcc.plan.numbers.numbers` of the core).
+            wanted: names of the core's numbers to which it is wanted (`vcc.plan.parameters.numbers` of the core).
             beside: see `run`.
             threads: how many work at once.
             progress: called with (done, total).
@@ -271,11 +271,11 @@ class Core(Protocol):
         """What runs on a block of samples; the parts' rasters add up."""
         ...
 
-    def needed(self, wanted: Collection[str]) -> Collection[str]:
+    def required(self, wanted: Collection[str]) -> Collection[str]:
         """The numbers of a part to which derivatives make up those to some of the core's numbers."""
         ...
 
-    def whole_numbers(
+    def full_gradients(
         self, block: Block, numbers: Mapping[str, NDArray[np.float64]]
     ) -> dict[str, NDArray[np.float64]]:
         """Derivatives to the numbers of a `part`, by name, as those to the core's own; the parts' add up."""

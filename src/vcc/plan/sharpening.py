@@ -64,7 +64,7 @@ def symmetric(wanted: Callable[[Array], Array], half: int) -> Array:
     return np.concatenate([side[::-1], [1 - 2 * side.sum()], side])
 
 
-def weights_beside(losses: float, step: float, spline: bool = False) -> int:
+def filter_half_width(losses: float, step: float, spline: bool = False) -> int:
     """How many weights a filter of `along_axis` has on each side of its middle: of a series, or of a fit."""
     size = abs(step)
     if size < 1e-3 or losses < 1e-9:
@@ -87,7 +87,7 @@ def along_axis(losses: float, step: float, spline: bool = False, beside: int | N
         An odd number of weights of sum 1; a single one where nothing is lost.
     """
     size = abs(step)
-    half = weights_beside(losses, step, spline) if beside is None else beside
+    half = filter_half_width(losses, step, spline) if beside is None else beside
     if half == 0:
         return np.ones(1)
     if spline:

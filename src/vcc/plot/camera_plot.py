@@ -102,7 +102,7 @@ def plot_camera(
     ]
     half = half_height(camera, paths, axis)
     wanted = axes is None if magnified is None else magnified is not False
-    array = _array_to_magnify(camera, axis, half, needed=bool(magnified)) if wanted else None
+    array = _array_to_magnify(camera, axis, half, required=bool(magnified)) if wanted else None
     beside = None if isinstance(magnified, bool) else magnified
     own_figure = axes is None
     if axes is None:
@@ -182,14 +182,14 @@ def draw_paths(axes: Axes, distance: float, paths: Paths, axis: int, colour: str
 # --- a magnified piece of an array ---
 
 
-def _array_to_magnify(camera: Train, axis: int, half: float, needed: bool) -> Stage | None:
+def _array_to_magnify(camera: Train, axis: int, half: float, required: bool) -> Stage | None:
     """The last array of cells before the sensor; None where it has none, or (unless needed) none that is small."""
     arrays = [
         stage
         for stage in camera.stages
         if isinstance(stage.faces.bending, CellDeflection) and stage.z < camera.sensor.z
     ]
-    if needed:
+    if required:
         if not arrays:
             raise InputError("magnified needs an array of cells before the sensor, and this camera has none")
         return arrays[-1]

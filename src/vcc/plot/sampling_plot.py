@@ -102,7 +102,7 @@ def _draw_lengths(axes: Axes, advice: SamplingLimits) -> None:
     """Bars of lengths on a logarithmic axis, the sensor's pixel first; each limit a line."""
     items = [item for item in advice.items.values() if item.unit == "m" and item.value > 0]
     pixel = f"pixel of the sensor: {short(advice.pixel, digits=3)}"
-    names = [name.replace(" um", " µm") for name in (pixel, *(item.stated for item in items))]
+    names = [name.replace(" um", " µm") for name in (pixel, *(item.finding for item in items))]
     values = np.array([advice.pixel, *(item.value for item in items)]) / um
     limits = [math.nan, *(item.limit / um for item in items)]
     colours = [style.QUIET, *(style.BLUE if item.fine else style.ORANGE for item in items)]

@@ -30,7 +30,7 @@ from vcc.plan.protocol import Gradient, Partial
 from vcc.run.blocks import Blocks, cut_evenly
 from vcc.run.drive import Counted, Drive, dark_of_neighbours
 from vcc.run.executors import Work
-from vcc.run.sent import Sent
+from vcc.run.serialization import PortableRun
 
 Array = NDArray[np.float64]
 
@@ -91,10 +91,12 @@ class Backwards:
         # Closed taps of views, too, would add to the picture if they were opened: their views are looked at.
         self.opened = self.plan
         if "core.weights" in wanted:
-            self.opened = self.plan.with_numbers({"core.weights": self.plan.numbers()["core.weights"] * 0 + 1})
+            self.opened = self.plan.with_parameters(
+                {"core.weights": self.plan.parameters()["core.weights"] * 0 + 1}
+            )
         self.drive = drive if self.opened is self.plan else drive.looking_as(self.opened)
-        if wanted and (unknown := sorted(set(wanted) - set(self.plan.numbers()))):
-            raise InputError(f"the plan has no number {unknown[0]!r}: plan.numbers() names those that there are")
+        if wanted and (unknown := sorted(set(wanted) - set(self.plan.parameters()))):
+            raise InputError(f"the plan has no parameter {unknown[0]!r}; plan.parameters() lists all")
         parted = [_parted(name) for name in wanted]
         self.of_core = {rest for part, _, rest in parted if part == "core"}
         self.of_before, self.of_after = (
@@ -228,7 +230,7 @@ class Backwards:
             yield self._part(blocks[0], values, raster, samples, progress)
             return
         counted = Counted(progress, sum(map(drive.used_in, blocks)))
-        if drive.crew is not None:
+        if drive.worker_pool is not None:
             yield from self._parts_by_others(raster, counted)
             return
         for block in blocks:
@@ -240,12 +242,15 @@ class Backwards:
     def _parts_by_others(self, raster: Array, counted: Counted) -> Iterator[tuple[Block, Gradient]]:
         """What each block says of its samples, in order; no more are there at a time than `AHEAD` says."""
         drive, blocks = self.drive, self._blocks
-        assert drive.crew is not None
+        assert drive.worker_pool is not None
         assert not self._reads, "others are asked about samples alone"
-        work, each = Work(_share_of, SentBack(drive.sent, raster), first=_begun), AHEAD * max(drive.crew.places, 1)
+        work, each = (
+            Work(_share_of, PortableBack(drive.portable, raster), first=_begun),
+            AHEAD * max(drive.worker_pool.places, 1),
+        )
         for start in range(0, len(blocks), each):
             found = {}
-            for number, part in drive.crew.each(work, blocks[start : start + each]):
+            for number, part in drive.worker_pool.each(work, blocks[start : start + each]):
                 found[number] = part
                 counted.add(drive.used_in(blocks[start + number]))
             work = replace(work, first=None)
@@ -292,23 +297,23 @@ class Backwards:
             values,
             raster,
             samples=samples or bool(self.of_before),
-            wanted=core.needed(self.of_core),
+            wanted=core.required(self.of_core),
             threads=drive.threads,
             progress=progress,
         )
-        numbers = drive.core.whole_numbers(ahead, found.numbers)
+        numbers = drive.core.full_gradients(ahead, found.gradients)
         if "scale" in numbers:
             numbers["scale"] = numbers["scale"] * drive.radiance
         numbers = _named("core.", {name: numbers[name] for name in self.of_core})
         if found.samples is None:
             return block, Gradient(None, numbers)
         row, column = block.rows[0] - around.rows[0], block.columns[0] - around.columns[0]
-        (top, bottom), (left, right), *_ = self.plan.beside
+        (top, bottom), (left, right), *_ = self.plan.halo
         inner = found.samples[
             row : row + block.shape[0] + top + bottom, column : column + block.shape[1] + left + right
         ]
         block, part = self._before(block, inner, samples)
-        return block, replace(part, numbers={**numbers, **part.numbers})
+        return block, replace(part, gradients={**numbers, **part.gradients})
 
     def _before(self, block: Block, weights: NDArray[Any], samples: bool) -> tuple[Block, Gradient]:
         """What weights of a block's samples as the core takes them say of those that they are made of."""
@@ -317,7 +322,7 @@ class Backwards:
         grown, beside = self.drive.with_reach(block)
         if any(beside):
             for view in np.ndindex(weights.shape[:2]):
-                dark_of_neighbours(weights[view], beside, self.plan.beside[2])
+                dark_of_neighbours(weights[view], beside, self.plan.halo[2])
             weights = np.pad(weights, [(0, 0), (0, 0), beside, *[(0, 0)] * (weights.ndim - 3)])
         before, given = self.plan.before, []
         numbers: dict[str, Array] = {}
@@ -335,7 +340,7 @@ class Backwards:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SentBack(Brief):
+class PortableBack(Brief):
     """All that a block's way back needs but which block it is.
 
     Args:
@@ -343,7 +348,7 @@ class SentBack(Brief):
         raster: weights of the raster, (rows, columns, channels).
     """
 
-    ahead: Sent
+    ahead: PortableRun
     raster: Array
 
     @property
@@ -352,12 +357,12 @@ class SentBack(Brief):
         return Backwards(Drive.of_linear(self.ahead.plan, self.ahead.samples, self.ahead.how))
 
 
-def _share_of(sent: SentBack, block: Block) -> tuple[Block, Gradient]:
+def _share_of(sent: PortableBack, block: Block) -> tuple[Block, Gradient]:
     """What a block says, in another thread or process, or on another machine."""
     return sent.backwards.part(block, sent.raster)
 
 
-def _begun(sent: SentBack, _: None) -> None:
+def _begun(sent: PortableBack, _: None) -> None:
     """What whoever goes back does first."""
     sent.backwards.begin()
 

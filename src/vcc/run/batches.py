@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base import late
+from vcc.base import lazy_import
 from vcc.base.cached import is_computed, preset
 from vcc.base.workers import Workers
 from vcc.engines import abilities, chosen
@@ -23,9 +23,9 @@ from vcc.fields.samples import Samples
 from vcc.plan.footprints.mixtures import Mixture
 from vcc.plan.how import How
 from vcc.plan.model import Plan
-from vcc.plan.protocol import Partial, Room
+from vcc.plan.protocol import OutputBuffers, Partial
 from vcc.run.drive import Drive, Recorded, made_of, over_blocks
-from vcc.run.needed import needed_by_all
+from vcc.run.required_samples import required_by_all
 
 COMING = 8
 """Plans that come one after the other are run so many together for each thread, at most."""
@@ -44,7 +44,7 @@ def rasters_each(drives: Sequence[Drive]) -> list[Partial]:
 
 
 def recorded_each(
-    plans: Iterable[Plan], samples: Samples, how: How, room: Room | None = None
+    plans: Iterable[Plan], samples: Samples, how: How, output_buffers: OutputBuffers | None = None
 ) -> Iterator[tuple[Plan, Recorded]]:
     """What `vcc.run.drive.drive` gives of several plans of one light field, in their order.
 
@@ -56,36 +56,38 @@ def recorded_each(
         plans: all that is done by one engine.
         samples: as in `vcc.run.drive.drive`.
         how: likewise.
-        room: where pictures of NumPy are put by the threads that make them.
+        output_buffers: where pictures of NumPy are put by the threads that make them.
     """
     coming = samples.whole() is not None and not isinstance(plans, Sequence)
     if coming:
         drives: Iterable[Drive] = (Drive(plan, samples, how) for plan in plans)
     elif listed := list(plans):
-        cut, part = needed_by_all(listed, samples)
+        cut, part = required_by_all(listed, samples)
         drives = [Drive(plan, part, how) for plan in cut]
     else:
         return
     first = 0
     with Workers(how.workers) as pool:
         for batch in _batches(drives, coming):
-            places = room and room(range(first, first + len(batch)))
+            places = output_buffers and output_buffers(range(first, first + len(batch)))
             first += len(batch)
             found = _made(batch, pool, _finishing(batch, places))
             yield from zip((drive.plan for drive in batch), found, strict=True)
 
 
-def recorded_mixed(mixture: Mixture, samples: Samples, how: How, room: Room | None = None) -> Iterator[Recorded]:
+def recorded_mixed(
+    mixture: Mixture, samples: Samples, how: How, output_buffers: OutputBuffers | None = None
+) -> Iterator[Recorded]:
     """What `vcc.run.drive.drive` gives of several cameras whose pictures are sums of a few.
 
     Args:
         mixture: how.
         samples: as in `vcc.run.drive.drive`.
         how: likewise.
-        room: where pictures are made.
+        output_buffers: where pictures are made.
     """
     few = [recorded.values for _, recorded in recorded_each(mixture.plans, samples, how)]
-    mixer = late.module("vcc.engines.mixed").Mixer(mixture, few, how.workers, room)
+    mixer = lazy_import.module("vcc.engines.mixed").Mixer(mixture, few, how.workers, output_buffers)
     for values, missing in zip(mixer.pictures(), mixture.missing, strict=True):
         yield Recorded(values, missing.share, missing.reason)
 
@@ -104,7 +106,7 @@ def _batches(drives: Iterable[Drive], coming: bool = False) -> Iterator[list[Dri
     """
     batch: list[Drive] = []
     for drive in drives:
-        if batch and (len(batch) >= _most(batch[0], coming) or not _together(batch[0], drive)):
+        if batch and (len(batch) >= _most(batch[0], coming) or not _in_one_batch(batch[0], drive)):
             yield batch
             batch = [_after(batch[0], drive)]
         else:
@@ -113,13 +115,13 @@ def _batches(drives: Iterable[Drive], coming: bool = False) -> Iterator[list[Dri
         yield batch
 
 
-def _together(one: Drive, other: Drive) -> bool:
+def _in_one_batch(one: Drive, other: Drive) -> bool:
     return one.shared is not None and one.shared == other.shared
 
 
 def _after(last: Drive, drive: Drive) -> Drive:
     """A plan on its way, with the samples that the last one has prepared where its own are the same."""
-    if drive.in_memory and _together(last, drive) and is_computed(last, "prepared"):
+    if drive.in_memory and _in_one_batch(last, drive) and is_computed(last, "prepared"):
         preset(drive, prepared=last.prepared)
     return drive
 

@@ -124,7 +124,7 @@ class Need:
         pixels = math.prod(plan.core.raster_shape) * (grid.channels or 1)
         grown = math.prod(plan.shape(grid.shape)[2:]) * kept
         times = 1 + 16 / kept if copies else 1.0
-        border = max(2 * plan.core.border + sum(beside) for beside in plan.beside[:2])
+        border = max(2 * plan.core.border + sum(beside) for beside in plan.halo[:2])
         raster = (16 if plan.by_rays else 8) * pixels
         single = 4 * pixels if plan.by_rays else 0
         return cls((1 + SUMS) * raster + single + engine_memory, grown, times, border, raster, plan.by_rays)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base import late
+from vcc.base import lazy_import
 from vcc.base.cached import cached, is_computed, preset
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
@@ -35,9 +35,9 @@ from vcc.plan.model import Plan
 from vcc.plan.protocol import Core, Partial
 from vcc.plan.rays.model import Rays
 from vcc.run.blocks import SUMS, Blocks, Need, cut_evenly
-from vcc.run.executors import Tree, Work, crew, memory_of_task
-from vcc.run.needed import needed
-from vcc.run.sent import Carried, Sent
+from vcc.run.executors import Tree, Work, memory_of_task, worker_pool
+from vcc.run.required_samples import required_samples
+from vcc.run.serialization import PortableRun, PortableSamples
 
 SHARED = 0.5
 """Share of the memory that a block takes at which several plans look; the rest is for their sums."""
@@ -85,13 +85,13 @@ def drive(
         samples: in memory, or read block by block (by rays once for each doubling that a tolerance asks for).
         how: engine, threads, tolerance and memory; the rest is the plan's.
         progress: called with (done, total).
-        executor: who runs the blocks (`vcc.run.executors.crew`); None runs them here, one after the other.
+        executor: who runs the blocks (`vcc.run.executors.worker_pool`); None runs them here, one after the other.
 
     Raises:
         InputError: an engine that does not take these arrays; of samples that are read, views that are missing or
             damaged, or a memory limit that is too small; what an executor does not take, or one that dies.
     """
-    return Drive(*needed(plan, samples), how or How(), executor).recorded(progress)
+    return Drive(*required_samples(plan, samples), how or How(), executor).recorded(progress)
 
 
 class Drive:
@@ -104,7 +104,7 @@ class Drive:
         executor: who runs the blocks, each with one thread unless ``how`` says how many; None runs them here.
 
     Attributes:
-        crew: who runs the blocks, or None.
+        worker_pool: runs the blocks; None runs them here.
         plan: as given.
         how: as given.
         given: the samples that were given.
@@ -126,16 +126,16 @@ class Drive:
     def __init__(self, plan: Plan, samples: Samples, how: How, executor: Any = None) -> None:
         samples.check_complete()
         self.executor = executor
-        self.crew = None if executor is None else crew(executor)
-        if self.crew is not None:
-            samples = Carried.of(samples)
+        self.worker_pool = None if executor is None else worker_pool(executor)
+        if self.worker_pool is not None:
+            samples = PortableSamples.of(samples)
         if how.tolerance is not None and not plan.by_rays:
             raise InputError("tolerance is for pictures made by rays; footprints have no sampling error")
         self.plan, self.how = plan, how
         self.given, self.samples = samples, samples
         self.name = chosen(how.engine, samples.whole())
         self.engine, self.able, self.threads = engine(self.name), abilities(self.name), how.workers
-        self.limit: float = memory_of_task(how.memory_limit, self.crew)
+        self.limit: float = memory_of_task(how.memory_limit, self.worker_pool)
         if plan.views_between is not None:
             self._look_between(plan.views_between)
         kind = to_dtype(samples.whole()) if self.in_memory else self.samples.grid.kind
@@ -182,26 +182,26 @@ class Drive:
     @cached
     def need(self) -> Need:
         """What blocks take of memory."""
-        threads = self.threads if self.crew is None else self.sent.how.workers
+        threads = self.threads if self.worker_pool is None else self.portable.how.workers
         taken = self.engine.memory(self.plan.core, self.channels, threads)
         need = Need.of(self.plan, self.samples.grid, taken, self.able.copies)
         if self.plan.views_between is None:  # views made in between keep what they are made of
             need = need.with_readers(threads, self.limit)
-        if isinstance(self.plan.core, Rays) and self.able.bands and not any(map(any, self.plan.beside)):
+        if isinstance(self.plan.core, Rays) and self.able.bands and not any(map(any, self.plan.halo)):
             need = replace(need, bands=self.plan.core.bands)
-        return need if self.crew is None else need.with_sums()
+        return need if self.worker_pool is None else need.with_sums()
 
     @property
     @cached
-    def sent(self) -> Sent:
+    def portable(self) -> PortableRun:
         """What goes to those that run the blocks elsewhere."""
-        assert isinstance(self.given, Carried)
+        assert isinstance(self.given, PortableSamples)
         how = replace(
             self.how,
             threads=self.how.threads or 1,
-            memory_limit=math.ceil(memory_of_task(self.how.memory_limit, self.crew)),
+            memory_limit=math.ceil(memory_of_task(self.how.memory_limit, self.worker_pool)),
         )
-        return Sent.of(self.plan, self.given, how)
+        return PortableRun.of(self.plan, self.given, how)
 
     @property
     @cached
@@ -243,7 +243,9 @@ class Drive:
         if self.plan.in_focus is not None:
             share = self.plan.in_focus.share
             share = share if picture.ndim == 2 else share[..., None]
-            as_they_are = Drive(*needed(self.plan.in_focus.plan, self.given), self.how, self.executor).recorded()
+            as_they_are = Drive(
+                *required_samples(self.plan.in_focus.plan, self.given), self.how, self.executor
+            ).recorded()
             picture = picture + share * (as_they_are.values - picture)
         return Recorded(
             picture.astype(np.float32, copy=False) if isinstance(picture, np.ndarray) else picture,
@@ -286,7 +288,7 @@ class Drive:
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
             return self._run(self._with_rays(beside), self.taken, beside, progress)
-        if self.crew is None:
+        if self.worker_pool is None:
             return over_blocks([self], listed, beside, progress)[0]
         return self._by_others(listed, beside, progress)
 
@@ -327,7 +329,7 @@ class Drive:
     def shared(self) -> Any:
         """What plans that are run together have in common: which samples they look at, and what is done with these
         before; None where that is another thing for each plan, or a matter of several rounds."""
-        if self.crew is not None or self.how.tolerance is not None or self.plan.views_between:
+        if self.worker_pool is not None or self.how.tolerance is not None or self.plan.views_between:
             return None
         if self.in_memory:
             return (self.samples, self.plan.before) if self.is_one_block else None
@@ -364,12 +366,12 @@ class Drive:
 
     def _by_others(self, blocks: list[Block], beside: int, progress: Progress | None) -> Partial:
         """The sum of what blocks give that an executor's workers run."""
-        assert self.crew is not None
+        assert self.worker_pool is not None
         used = list(filter(self.used_in, blocks))
         counted = Counted(progress, sum(map(self.used_in, used)))
         asked, views = [(block, beside) for block in used], [self.used_in(block) for block in used]
-        work = Work(_share_of, self.sent, first=begun)
-        total = self.crew.summed(work, asked, _sum_of_shares, lambda n: counted.add(views[n]))
+        work = Work(_share_of, self.portable, first=warmed_up)
+        total = self.worker_pool.summed(work, asked, _sum_of_shares, lambda n: counted.add(views[n]))
         if self.plan.views_between is not None:
             self.samples.made, self.samples.unseen = total.made, total.unseen  # type: ignore[attr-defined]
         return _in_double(total.part)
@@ -411,7 +413,7 @@ class Drive:
         around = self.around(block)
         room = self._room(self.plan.shape((*around.shape, *self.samples.grid.shape[4:])))
         (a, b), (c, d) = block.rows, block.columns
-        top, left = (before for before, _ in self.plan.beside[:2])
+        top, left = (before for before, _ in self.plan.halo[:2])
 
         def put(place: tuple[int, int]) -> None:
             row, column = a + place[0], c + place[1]
@@ -441,7 +443,7 @@ class Drive:
         """The samples of one view of a block, read with as many more rows of pixels as operators before reach."""
         one, (above, below) = self.with_reach(replace(block, rows=(row, row + 1), columns=(column, column + 1)))
         threads = self.threads if self.need.readers == 1 else 1  # others are at other views
-        (top, _), (left, _), *beside = self.plan.beside
+        (top, _), (left, _), *beside = self.plan.halo
         view = self.engine.prepared(self.plan.before, self.samples.read(one), threads)[top, left]
         view = view[above : view.shape[0] - below]
         dark_of_neighbours(view, (above, below), beside[0])
@@ -456,7 +458,9 @@ class Drive:
                 "pass light_field.replaced(numpy.asarray(values)), or between_views='auto', which carries "
                 "gradients"
             )
-        denser = partial(late.module("vcc.engines.depth_views").DenserViews, self.given, between, self.threads)
+        denser = partial(
+            lazy_import.module("vcc.engines.depth_views").DenserViews, self.given, between, self.threads
+        )
         if whole is not None:
             # As few bytes as serve well, and as many as a block of one view takes.
             self.samples = denser(held=0.0)  # of which only the grid is asked
@@ -530,14 +534,14 @@ class Share(Brief):
     unseen: int
 
 
-def _share_of(sent: Sent, asked: tuple[Block, int]) -> Share:
+def _share_of(sent: PortableRun, asked: tuple[Block, int]) -> Share:
     """What a block gives, in another thread or process, or on another machine."""
     drive = Drive(sent.plan, sent.samples, sent.how)
     part = drive.part(*asked, Counted(None, 0))
     return Share(part, getattr(drive.samples, "made", 0), getattr(drive.samples, "unseen", 0))
 
 
-def begun(sent: Sent, _: None) -> None:
+def warmed_up(sent: PortableRun, _: None) -> None:
     """What whoever runs blocks does first."""
     Drive(sent.plan, sent.samples, sent.how).begin()
 

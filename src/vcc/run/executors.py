@@ -1,9 +1,9 @@
-"""Work done by others: threads, processes, other machines.
+"""Work that others run: threads, processes, clusters.
 
-A task is a function of ours, what all tasks share (packed once) and an item of its own. `crew` takes any
-`concurrent.futures.Executor`, or a client of Dask as it is, and gives two verbs: `Crew.each`, results as they
-come, and `Crew.summed`, their sum. Sums are taken by one fixed tree (`Tree`), whoever finishes first: the same
-numbers added in the same order give the same bytes from run to run, on one machine or on many.
+A task is a function of ours, the data that all tasks share (packed once) and one item. `worker_pool` accepts
+any `concurrent.futures.Executor` or a Dask client and returns a pool with two methods: `WorkerPool.each`
+yields results as they arrive, `WorkerPool.summed` returns their sum. The order of additions is one fixed tree
+(`Tree`), whichever task finishes first: sums have the same bytes in each run, on one machine or many.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ TOGETHER = 8
 RETRIES = 3
 """How often a cluster does a task again that failed."""
 LOOK = 1.0
-"""Seconds after which somebody looks whether a crew that says nothing is still there."""
+"""Seconds after which somebody looks whether a pool that reports nothing still runs."""
 LEAST_ROOM = 2**26
 """Bytes for a task without which nobody need begin."""
 SILENT = 60.0
@@ -60,8 +60,8 @@ class Work:
     first: Function | None = None
 
 
-class Crew(Protocol):
-    """Who does the work. An executor that `crew` was given stays the caller's: nobody here shuts it down."""
+class WorkerPool(Protocol):
+    """Runs the work. An executor given to `worker_pool` stays the caller's: nobody here shuts it down."""
 
     @property
     def places(self) -> int:
@@ -69,7 +69,7 @@ class Crew(Protocol):
         ...
 
     @property
-    def room(self) -> float | None:
+    def memory(self) -> float | None:
         """Bytes of memory that each of these may take; None where nobody says."""
         ...
 
@@ -104,7 +104,7 @@ class Crew(Protocol):
         ...
 
 
-def crew(executor: Any) -> Crew:
+def worker_pool(executor: Any) -> WorkerPool:
     """Who does the work, by what a user gives.
 
     Args:
@@ -123,7 +123,7 @@ def crew(executor: Any) -> Crew:
     )
 
 
-def memory_of_task(asked: int | None, workers: Crew | None) -> float:
+def memory_of_task(asked: int | None, workers: WorkerPool | None) -> float:
     """Bytes that one task may take, or what is run here.
 
     Args:
@@ -133,17 +133,17 @@ def memory_of_task(asked: int | None, workers: Crew | None) -> float:
     Raises:
         InputError: more than the workers have.
     """
-    room = None if workers is None else workers.room
-    if room is None:
+    memory = None if workers is None else workers.memory
+    if memory is None:
         return MEMORY_LIMIT // 4 if asked is None else asked
-    if room < LEAST_ROOM or (asked is not None and asked > room):
+    if memory < LEAST_ROOM or (asked is not None and asked > memory):
         needed = LEAST_ROOM if asked is None else asked
         raise InputError(
-            f"the least of the executor's workers has {max(room, 0) / 1e6:.0f} MB for each task, beside "
+            f"the least of the executor's workers has {max(memory, 0) / 1e6:.0f} MB for each task, beside "
             f"Python and its libraries, and {needed / 1e6:.0f} MB are asked for: give workers more memory, or "
             "fewer threads each" + ("" if asked is None else ", or pass a smaller limit")
         )
-    return min(MEMORY_LIMIT // 4, room) if asked is None else asked
+    return min(MEMORY_LIMIT // 4, memory) if asked is None else asked
 
 
 # --- tasks ---
@@ -283,7 +283,7 @@ class Pool:
         executor: its ``submit`` is called.
     """
 
-    room = None
+    memory = None
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
@@ -294,7 +294,7 @@ class Pool:
         return int(getattr(self._executor, "_max_workers", 1))
 
     def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
-        """See `Crew.each`."""
+        """See `WorkerPool.each`."""
         parcel, futures = Parcel.of((work.function, work.shared)), []
         if work.first is not None:
             perform(None, Parcel.of((work.first, work.shared)))
@@ -310,7 +310,7 @@ class Pool:
                     future.cancel()
 
     def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
-        """See `Crew.summed`; what comes is added here."""
+        """See `WorkerPool.summed`; what comes is added here."""
         tree = Tree(len(items), add)
         with closing(self.each(work, items)) as results:
             for number, result in results:
@@ -373,7 +373,7 @@ class Cluster:
         return sum(self._client.nthreads().values())
 
     @property
-    def room(self) -> float | None:
+    def memory(self) -> float | None:
         """What the least of the workers has for each of its threads, without spilling to disk."""
         workers = self._client.scheduler_info()["workers"].values()
         rooms = [
@@ -384,7 +384,7 @@ class Cluster:
         return min(rooms, default=None)
 
     def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
-        """See `Crew.each`."""
+        """See `WorkerPool.each`."""
         futures = self._mapped(work, items)
         try:
             for number in _finished(futures, self._look):
@@ -395,7 +395,7 @@ class Cluster:
             self._cancel(futures)
 
     def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
-        """See `Crew.summed`; what comes is added where it is, and one sum comes here."""
+        """See `WorkerPool.summed`; what comes is added where it is, and one sum comes here."""
         futures = self._mapped(work, items)
         total = self._tree(futures, add)
         try:
@@ -412,11 +412,11 @@ class Cluster:
     def _mapped(self, work: Work, items: Sequence[Any]) -> list[Any]:
         self._check_versions()
         if work.first is not None:
-            self._begin(self._sent(work.first, work.shared))
-        parcel = self._sent(work.function, work.shared)
+            self._begin(self._to_workers(work.first, work.shared))
+        parcel = self._to_workers(work.function, work.shared)
         return list(self._client.map(perform, items, parcel=parcel, pure=False, retries=RETRIES))
 
-    def _sent(self, function: Function, shared: Any) -> Any:
+    def _to_workers(self, function: Function, shared: Any) -> Any:
         """What tasks need, as the result of a task."""
         with warnings.catch_warnings():  # of a parcel of some megabytes, which goes to the scheduler once
             warnings.filterwarnings("ignore", "Sending large graph")

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base import late
+from vcc.base import lazy_import
 from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
@@ -26,7 +26,7 @@ from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.run.backwards import Backwards
 from vcc.run.drive import Drive
-from vcc.run.needed import needed
+from vcc.run.required_samples import required_samples
 
 
 class Slots(Protocol):
@@ -158,7 +158,7 @@ class Operator:
         Raises:
             InputError: deepinv is not there, or does not load; a scale that is not positive.
         """
-        physics = late.module("vcc.run.torch_physics")
+        physics = lazy_import.module("vcc.run.torch_physics")
         return physics.linear_physics(self, self.samples_shape, self.picture_shape, scale, options)
 
     def __repr__(self) -> str:
@@ -170,7 +170,7 @@ class Operator:
         return Drive.of_linear(self.plan, samples, self.how, executor)
 
     def _picture(self, samples: Samples, executor: Any, progress: Progress | None) -> NDArray[Any]:
-        drive = Drive.of_linear(*needed(self.plan, samples), self.how, executor)
+        drive = Drive.of_linear(*required_samples(self.plan, samples), self.how, executor)
         picture: NDArray[Any] = drive.picture(drive.rounds(progress))
         return picture
 

@@ -64,7 +64,7 @@ class Kernel(Shown, abc.ABC):
         s, t = self.deflections(xi, eta)
         return np.stack([s, t], axis=-1), np.full(xi.size, 1.0 / xi.size)
 
-    def steps_beside(self, steps_from_slopes: ArrayLike) -> tuple[int, int]:
+    def half_width_in_steps(self, steps_from_slopes: ArrayLike) -> tuple[int, int]:
         """(rows, columns) of a lattice that the kernel covers on each side of its middle; see `weights`."""
         width, height = np.abs(np.asarray(steps_from_slopes)) @ np.array(self.reach)
         half_width, half_height = (
@@ -94,7 +94,7 @@ class Kernel(Shown, abc.ABC):
                 steps.
         """
         matrix = checks.array("steps_from_slopes", steps_from_slopes, "a 2×2 matrix of numbers", 2, 2)
-        half_height, half_width = self.steps_beside(matrix) if beside is None else beside
+        half_height, half_width = self.half_width_in_steps(matrix) if beside is None else beside
         size = 2 * max(half_width, half_height) + 1
         if size > LARGEST_WEIGHTS:
             raise InputError(

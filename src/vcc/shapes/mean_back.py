@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.shapes.patterns import Bounded, Cells, Open, Pattern, is_grid
-from vcc.shapes.sheets import Product, Shifted, Tiles
+from vcc.shapes.stacked_patterns import Product, Shifted, Tiles
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.base import checks, late
+from vcc.base import checks, lazy_import
 from vcc.base.errors import InputError
 from vcc.fields.grid import pair
 from vcc.sources.views import CameraArray, ViewCamera
@@ -221,7 +221,7 @@ class DepthMapScene:
         )
         offset = (-camera.left * scale[0] - 0.5, -camera.top * scale[1] - 0.5)
         pinhole = _Pinhole(across, down, offset, scale, (camera.x, camera.y))
-        kernels = late.module("vcc.sources.depth_kernels")
+        kernels = lazy_import.module("vcc.sources.depth_kernels")
         for surface in self._surfaces:
             kernels.draw_surface(surface, pinhole, nearest, out)
         if kernels.fill_gaps(nearest, out):

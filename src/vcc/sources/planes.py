@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from vcc.base import checks, late
+from vcc.base import checks, lazy_import
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.base.units import short
@@ -306,7 +306,7 @@ class PlanesScene:
         down, across = (_starts_at(shifts[:, n : n + 1], grid.margins[n]) for n in (0, 1))
         picture = np.empty((1, *camera.pixels, 3), np.float32)
         one, endless = np.float32(1), np.float32(np.inf)
-        late.module("vcc.sources.kernels").views_of_row(rasters, down, across, 0, one, endless, picture)
+        lazy_import.module("vcc.sources.kernels").views_of_row(rasters, down, across, 0, one, endless, picture)
         return np.asarray(picture[0])
 
     def description(self) -> dict[str, Any]:
@@ -464,7 +464,7 @@ def _fill(
     top = scale if whole else np.float32(np.inf)
 
     def views(j: int) -> None:
-        late.module("vcc.sources.kernels").views_of_row(rasters, down, across, j, scale, top, values[j])
+        lazy_import.module("vcc.sources.kernels").views_of_row(rasters, down, across, j, scale, top, values[j])
 
     tasks = [pool.submit(views, j) for j in range(grid.views[0])]
     for done, task in enumerate(as_completed(tasks), 1):

@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.lookup import bilinear
+from vcc.files.images_with_metadata import light_in
 from vcc.files.picture_decoders import read_exr_channels
 from vcc.files.pictures import read_stored
-from vcc.files.stated import light_in
 from vcc.files.transfer import decode
 
 Array = NDArray[Any]

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vcc.base import checks, late
+from vcc.base import checks, lazy_import
 from vcc.base.errors import InputError
 from vcc.store.attributes import PICTURES
 
@@ -126,7 +126,7 @@ def chunk_pixels(view: tuple[int, ...], bytes_each: int, wanted: Pixels | None) 
 
 def know_pictures() -> None:
     """Tell Zarr of the codec that keeps views as pictures, which loads Zarr: it is a class of its kind."""
-    late.module("vcc.store.picture_codec")
+    lazy_import.module("vcc.store.picture_codec")
 
 
 def layout(

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from vcc.base.errors import InputError
-from vcc.base.reading import read_bytes, read_json, stated_at
+from vcc.base.reading import read_bytes, read_json, value_at
 
 IDENTITY = "identity"
 """The attribute that says which one it is."""
@@ -48,14 +48,14 @@ class Held:
     folder: Path
     what: str
     states: Callable[[Path], Any]
-    stated: str
+    attributes: str
     _seen: Stamp | None = None
 
     @classmethod
     def now(cls, folder: Path, what: str, states: Callable[[Path], Any]) -> Held:
         """What stands there now."""
         seen = _stamp(folder)  # before it is read: what comes in between is then looked at
-        return cls(folder, what, states, _told(folder, states), seen)
+        return cls(folder, what, states, _described(folder, states), seen)
 
     def check(self) -> None:
         """Refuse another one, or none, in its place.
@@ -71,7 +71,7 @@ class Held:
                 f"{self.folder} is gone: the {self.what} that was opened was removed, renamed or is being "
                 "replaced. Open it again where it is"
             )
-        if _told(self.folder, self.states) != self.stated:
+        if _described(self.folder, self.states) != self.attributes:
             raise InputError(
                 f"{self.folder} holds another {self.what} than the one that was opened: it was replaced or "
                 "changed since. Open it again"
@@ -93,7 +93,7 @@ class Held:
         self.check()  # once it is read: that it was there before says nothing
 
 
-def stated_of(folder: Path, key: str, array: str | None = None, but: tuple[str, ...] = ()) -> Any:
+def attributes_of(folder: Path, key: str, array: str | None = None, but: tuple[str, ...] = ()) -> Any:
     """What a group of Zarr states under a key, and an array in it, as far as that stays the same.
 
     Args:
@@ -102,7 +102,7 @@ def stated_of(folder: Path, key: str, array: str | None = None, but: tuple[str, 
         array: its name, where it is as it was made; its own attributes are left out.
         but: what writers that go on change.
     """
-    group = stated_at(read_json(read_bytes(folder / "zarr.json"), f"{folder / 'zarr.json'}"), "attributes", key)
+    group = value_at(read_json(read_bytes(folder / "zarr.json"), f"{folder / 'zarr.json'}"), "attributes", key)
     stays = _without(group, *but) if isinstance(group, dict) else None
     if array is None:
         return stays
@@ -124,7 +124,7 @@ def _stamp(folder: Path) -> Stamp | None:
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
-def _told(folder: Path, states: Callable[[Path], Any]) -> str:
+def _described(folder: Path, states: Callable[[Path], Any]) -> str:
     """A word for what a folder tells; what is wrong with it others say."""
     try:
         stated = states(folder)

@@ -27,11 +27,11 @@ from vcc.base.reading import (
     read_json,
     reading,
     shown,
-    stated_at,
+    value_at,
 )
 from vcc.base.words import first_few
 from vcc.fields.disparity import Disparities, DisparityMaps
-from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, told_along_u
+from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid, Sample, along_u
 from vcc.fields.parallax import Axis, disparity_range
 from vcc.fields.plane_sweep import disparity_maps
 from vcc.fields.sampled import Index, as_slice
@@ -44,7 +44,7 @@ from vcc.store.attributes import ARRAY, DTYPES, KEY, Attributes, Transfer
 from vcc.store.chunks import Chunked, Range, sharding
 from vcc.store.compression import know_pictures
 from vcc.store.disparity_maps import keep_maps, read_maps
-from vcc.store.held import Held, stated_of
+from vcc.store.held import Held, attributes_of
 from vcc.store.video_layout import VIDEO, places
 
 MEASURED_BYTES = 2**26
@@ -89,7 +89,7 @@ class StoredLightField(OnGrid):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Its address: whoever gets it opens the store for himself."""
-        stated = None if self.held is None else self.held.stated
+        stated = None if self.held is None else self.held.attributes
         return _opened_elsewhere, (self.path.absolute(), self.attributes, stated)
 
     @property
@@ -379,7 +379,7 @@ class StoredLightField(OnGrid):
             _, ranges = self.grid.piece((middle[0], middle[1], slice(first, first + rows)))
             values = self._samples(ranges)
             shown[1 - along] = disparity_range(values, axis)
-        return told_along_u(self.frame, *shown)
+        return along_u(self.frame, *shown)
 
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))
@@ -429,7 +429,7 @@ def _opened_elsewhere(path: Path, attributes: Attributes, stated: str | None) ->
         raise InputError(
             f"the store is not found on {platform.node()}: {error}. All that work on it read it under one path"
         ) from error
-    if stated is not None and (found.held is None or found.held.stated != stated):
+    if stated is not None and (found.held is None or found.held.attributes != stated):
         raise InputError(
             f"on {platform.node()}, {path} holds another light field than the one that was opened: open it "
             "again, and see that all that work on it read the same files"
@@ -439,7 +439,7 @@ def _opened_elsewhere(path: Path, attributes: Attributes, stated: str | None) ->
 
 def _identity(folder: Path) -> Any:
     """What tells a store from another; a writer that goes on with it changes nothing of that."""
-    return stated_of(folder, KEY, ARRAY, ("complete", "lossy"))
+    return attributes_of(folder, KEY, ARRAY, ("complete", "lossy"))
 
 
 def _check_array(folder: Path, array: Any, attributes: Attributes) -> None:
@@ -517,9 +517,9 @@ def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
             f"{folder / 'zarr.json'}: zarr_format {stated.get('zarr_format')!r}, node_type "
             f"{stated.get('node_type')!r}; a light field is a group of version 3"
         )
-    if stated_at(stated, "attributes", VIDEO) is not None:
+    if value_at(stated, "attributes", VIDEO) is not None:
         raise InputError(f"{folder} is a video of light fields: {_choice(folder)}")
-    attributes = Attributes.from_json(stated_at(stated, "attributes", KEY), folder)
+    attributes = Attributes.from_json(value_at(stated, "attributes", KEY), folder)
     where = folder / ARRAY / "zarr.json"
     if not where.is_file():
         raise InputError(f'{folder} has no array "{ARRAY}": {where} is missing')

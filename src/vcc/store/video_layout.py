@@ -17,7 +17,7 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
-from vcc.base.reading import read_bytes, read_json, shown, stated_at
+from vcc.base.reading import read_bytes, read_json, shown, value_at
 from vcc.fields.grid import Grid, Sample, check_shape
 from vcc.store.attributes import DTYPES, Attributes, Transfer, plain
 from vcc.store.held import IDENTITY
@@ -153,7 +153,7 @@ class VideoAttributes(Brief):
         Raises:
             InputError: no video, a newer version, or something missing or impossible (named).
         """
-        stated = stated_video(path)
+        stated = video_attributes(path)
         if stated is None:
             raise InputError(f"{path} is no video of light fields: vcc.store.open_store opens a store of one")
         version = checks.whole_number_between(f"{path}: format_version", stated.get("format_version"), 1)
@@ -173,7 +173,7 @@ class VideoAttributes(Brief):
         return cls(between, None if common is None else Common.from_json(common, path), provenance, identity)
 
 
-def stated_video(folder: Path) -> dict[str, Any] | None:
+def video_attributes(folder: Path) -> dict[str, Any] | None:
     """The attributes of a video as they are written; None where a folder is none.
 
     Raises:
@@ -182,7 +182,7 @@ def stated_video(folder: Path) -> dict[str, Any] | None:
     file = folder / "zarr.json"
     if not file.is_file():
         return None
-    stated = stated_at(read_json(read_bytes(file), f"{file}"), "attributes", VIDEO)
+    stated = value_at(read_json(read_bytes(file), f"{file}"), "attributes", VIDEO)
     return stated if isinstance(stated, dict) else None
 
 

@@ -12,9 +12,9 @@ from typing import Any, overload
 
 from vcc.base.errors import InputError
 from vcc.base.reading import check_path, expanded, reading, shown
-from vcc.store.held import Held, stated_of
+from vcc.store.held import Held, attributes_of
 from vcc.store.reading import StoredLightField, is_store, open_store
-from vcc.store.video_layout import VIDEO, Between, Common, Place, VideoAttributes, places, stated_video
+from vcc.store.video_layout import VIDEO, Between, Common, Place, VideoAttributes, places, video_attributes
 
 WHAT = "video"
 KEPT = 8
@@ -95,7 +95,7 @@ class StoredVideo(Sequence[StoredLightField]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What is open stays here."""
-        return _opened_elsewhere, (self.path.absolute(), self.attributes, self.places, self.held.stated)
+        return _opened_elsewhere, (self.path.absolute(), self.attributes, self.places, self.held.attributes)
 
     def __repr__(self) -> str:
         name = f"StoredVideo({self.path}: "
@@ -128,7 +128,7 @@ class StoredVideo(Sequence[StoredLightField]):
                 f"{place.words}, of {self.path} has another grid than the video states: {difference}. Copy the "
                 "frame again"
             )
-        stated = "" if frame.held is None else frame.held.stated
+        stated = "" if frame.held is None else frame.held.attributes
         if self._known.setdefault(place.number, stated) != stated:
             raise InputError(
                 f"{place.words}, of {self.path} is another one than before: it was replaced while the video was "
@@ -146,7 +146,7 @@ def _opened_elsewhere(
 
 def _identity(folder: Path) -> Any:
     """What tells a video from another; the grid comes with the first frame."""
-    return stated_of(folder, VIDEO, but=("grid",))
+    return attributes_of(folder, VIDEO, but=("grid",))
 
 
 def common_of(frame: StoredLightField) -> Common:
@@ -182,4 +182,4 @@ def open_video(path: str | PathLike[str]) -> StoredVideo:
 def is_video(path: str | PathLike[str]) -> bool:
     """Whether a folder is a video of light fields."""
     folder = expanded(path)
-    return is_store(folder) and stated_video(folder) is not None
+    return is_store(folder) and video_attributes(folder) is not None

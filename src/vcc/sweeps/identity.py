@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vcc.base.values import Untold, fingerprint
+from vcc.base.values import Unhashable, fingerprint
 from vcc.base.version import VERSION
 from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import Samples
@@ -33,7 +33,7 @@ def identity(cameras: Cameras, light_field: Samples, how: How) -> dict[str, Any]
             each.name: f"{each.values_in_words} ({fingerprint(list(each.values))})" for each in cameras.varied
         }
         camera = fingerprint(cameras.base)
-    except Untold:
+    except Unhashable:
         return None
     return {
         "version": VERSION,

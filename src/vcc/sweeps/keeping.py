@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.reading import check_path, expanded, in_words, read_bytes, read_json, reading, stated_at
+from vcc.base.reading import check_path, expanded, in_words, read_bytes, read_json, reading, value_at
 from vcc.base.version import VERSION
 from vcc.files.atomic import refusal
 from vcc.files.parts import check_name, clear_leftovers, part_of
@@ -263,7 +263,7 @@ def _stated(folder: Path) -> dict[str, Any]:
     if not (folder / "zarr.json").is_file():
         raise InputError(f"{folder} is no sweep: it {'is a file' if folder.is_file() else 'holds no zarr.json'}")
     stated = read_json(read_bytes(folder / "zarr.json"), f"{folder / 'zarr.json'}")
-    found = stated_at(stated, "attributes", KEY)
+    found = value_at(stated, "attributes", KEY)
     if not isinstance(found, dict) or not isinstance(found.get("format_version"), int):
         raise InputError(f'{folder} is a Zarr group, and no sweep: its attributes have no "{KEY}"')
     if found["format_version"] > FORMAT_VERSION:
@@ -318,7 +318,7 @@ def _make(
             zarr.storage.LocalStore(part), attributes={KEY: _statement(swept, description, metrics)}
         )
         for each in swept.coordinates:
-            axes = swept.axes if swept.together else (each.name,)
+            axes = swept.axes if swept.in_one_batch else (each.name,)
             _array(group, each.name, each.coordinates, axes, {"units": each.unit} if each.unit else {})
         for name, numbers in swept.numbers.items():
             _number(group, swept, name, numbers)
@@ -357,7 +357,7 @@ def _statement(swept: Sweep, description: dict[str, Any] | None, metrics: dict[s
 
 def _remark(swept: Sweep) -> dict[str, str]:
     """What xarray is told of arrays along one axis of several parameters."""
-    return {"coordinates": " ".join(each.name for each in swept.coordinates)} if swept.together else {}
+    return {"coordinates": " ".join(each.name for each in swept.coordinates)} if swept.in_one_batch else {}
 
 
 def _number(group: Any, swept: Sweep, name: str, values: NDArray[Any]) -> None:

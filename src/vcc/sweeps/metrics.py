@@ -17,7 +17,7 @@ from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.measures import psnr
-from vcc.base.values import Untold, fingerprint
+from vcc.base.values import Unhashable, fingerprint
 from vcc.camera import Camera
 from vcc.image import Image
 
@@ -176,7 +176,7 @@ def metrics_in_words(metrics: Mapping[str, Metric]) -> dict[str, str | None]:
     for name, metric in metrics.items():
         try:
             found[name] = fingerprint(metric)
-        except Untold:
+        except Unhashable:
             found[name] = None
     return found
 

@@ -70,7 +70,7 @@ class Sweep(Shown):
         return self.done.shape
 
     @property
-    def together(self) -> bool:
+    def in_one_batch(self) -> bool:
         """Whether all parameters change along one axis."""
         return self.axes != tuple(each.name for each in self.coordinates)
 
@@ -117,7 +117,7 @@ class Sweep(Shown):
         """A row for each camera: its parameters, and what is told of its picture."""
         count, columns = len(self), {}
         for axis, each in enumerate(self.coordinates):
-            places = np.indices(self.shape).reshape(len(self.shape), count)[0 if self.together else axis]
+            places = np.indices(self.shape).reshape(len(self.shape), count)[0 if self.in_one_batch else axis]
             columns[each.name] = each.coordinates[places]
         columns |= {name: values.reshape(-1) for name, values in self.numbers.items()}
         return Table(columns, {each.name: each.unit for each in self.coordinates})
@@ -136,7 +136,7 @@ class Sweep(Shown):
 
     def values(self, index: Sequence[int]) -> list[str]:
         """The values of a camera's parameters in words."""
-        places = [index[0]] * len(self.coordinates) if self.together else index
+        places = [index[0]] * len(self.coordinates) if self.in_one_batch else index
         return [each.labels[n] for each, n in zip(self.coordinates, places, strict=True)]
 
     def labels(self, index: Sequence[int]) -> str:
@@ -181,7 +181,7 @@ class Results:
         """The numbers of the cameras whose pictures are not there."""
         return [int(n) for n in np.flatnonzero(~self.swept.done)]
 
-    def untold(self, names: Iterable[str]) -> list[int]:
+    def unreported(self, names: Iterable[str]) -> list[int]:
         """The numbers of the cameras whose pictures are there, and not all that these metrics tell of them."""
         lacking = np.zeros(self.swept.shape, dtype=bool)
         for name in names:
@@ -211,7 +211,7 @@ class Results:
     def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
         """Keep a picture."""
 
-    def room(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:
+    def output_buffers(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:
         """The memory of some cameras' pictures, one after the other, to make them in; None where there is none."""
         return None
 

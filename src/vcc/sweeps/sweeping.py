@@ -17,15 +17,15 @@ from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
+from vcc.base.notices import Notices
 from vcc.base.progress import Progress, tell
-from vcc.base.remarks import Remarks
 from vcc.camera import Camera, each_captured
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.plan.how import How, Options
-from vcc.plan.protocol import Room
+from vcc.plan.protocol import OutputBuffers
 from vcc.run.executors import Work as Task
-from vcc.run.executors import crew, memory_of_task
-from vcc.run.sent import check_may_be_sent
+from vcc.run.executors import memory_of_task, worker_pool
+from vcc.run.serialization import check_portable
 from vcc.sweeps.design import Cameras, Design, cameras_of
 from vcc.sweeps.identity import identity
 from vcc.sweeps.keeping import InStore
@@ -169,7 +169,7 @@ class Work(Brief):
             places: where batches are made side by side; 0 for one after the other.
         """
         wanted, ordered = set(todo), self.cameras.alike()
-        count = self.together() if wanted else 1
+        count = self.batch_size() if wanted else 1
         if places:
             count = min(count, max(len(ordered) // (4 * places), 1))
         for first in range(0, len(ordered), count):
@@ -177,7 +177,7 @@ class Work(Brief):
             if not wanted.isdisjoint(batch):
                 yield batch
 
-    def together(self) -> int:
+    def batch_size(self) -> int:
         """How many cameras are made together: as many as there is memory for, and a few seconds' work."""
         camera, channels = self.cameras[0], self.light_field.grid.channels or 1
         pixels = math.prod(camera.sensor.shape) * channels
@@ -201,18 +201,18 @@ class Work(Brief):
 
     def run(self, results: Results, executor: Any, progress: Progress | None) -> None:
         """Make the pictures that are not there yet, and tell what is not told of those that are."""
-        todo, untold, remarks = results.left(), results.untold(self.metrics), Remarks()
+        todo, untold, remarks = results.left(), results.unreported(self.metrics), Notices()
         done, total = len(self.cameras) - len(todo) - len(untold), len(self.cameras)
         made = (
             self.made_here(todo, results, remarks) if executor is None else self.made_by(executor, todo, remarks)
         )
-        for count in chain(self.told(results, untold), self.put(results, set(todo), made)):
+        for count in chain(self.reported(results, untold), self.put(results, set(todo), made)):
             results.commit()
             done += count
             tell(progress, done, total)
         remarks.say(total, "cameras")
 
-    def told(self, results: Results, untold: Sequence[int]) -> Iterator[int]:
+    def reported(self, results: Results, untold: Sequence[int]) -> Iterator[int]:
         """What metrics give of pictures that are there, put; how many each time."""
         for number in untold:
             with checks.within(self.cameras.said(number)):
@@ -227,21 +227,21 @@ class Work(Brief):
                 results.put(number, values, numbers)
             yield len(lacking)
 
-    def made_here(self, todo: Sequence[int], results: Results, remarks: Remarks) -> Iterator[Rows]:
+    def made_here(self, todo: Sequence[int], results: Results, remarks: Notices) -> Iterator[Rows]:
         """The pictures of cameras, some at a time."""
         for batch in self.batches(todo):
             with remarks.gathered():
-                for row in rows_of(self, batch, results.room):
+                for row in rows_of(self, batch, results.output_buffers):
                     yield [row]
 
-    def made_by(self, executor: Any, todo: Sequence[int], remarks: Remarks) -> Iterator[Rows]:
+    def made_by(self, executor: Any, todo: Sequence[int], remarks: Notices) -> Iterator[Rows]:
         """The same by an executor, as they come.
 
         Raises:
             InputError: a light field in memory that is too large to be sent; what `vcc.run.executors` refuses.
         """
-        check_may_be_sent(self.light_field)
-        workers = crew(executor)
+        check_portable(self.light_field)
+        workers = worker_pool(executor)
         if self.how.between_views == "depth":
             self.light_field.grid.disparities.maps()  # found once, and sent
         batches = list(self.batches(todo, workers.places))
@@ -258,31 +258,33 @@ Row = tuple[int, NDArray[np.float32] | None, dict[str, float]]
 Rows = list[Row]
 
 
-def rows_of(work: Work, batch: Sequence[int], room: Room = lambda numbers: None) -> Iterator[Row]:
+def rows_of(
+    work: Work, batch: Sequence[int], output_buffers: OutputBuffers = lambda numbers: None
+) -> Iterator[Row]:
     """The pictures of some cameras, with what is told of them, as they are made.
 
     Args:
         work: what is to be done.
         batch: the numbers of these cameras.
-        room: to make pictures in.
+        output_buffers: for the images.
 
     Raises:
         InputError: what a camera or a metric refuses, with the camera's values.
     """
 
-    def room_of(places: Sequence[int]) -> NDArray[np.float32] | None:
-        return room([batch[place] for place in places])
+    def buffers_of(places: Sequence[int]) -> NDArray[np.float32] | None:
+        return output_buffers([batch[place] for place in places])
 
     cameras = [work.cameras[number] for number in batch]
-    for place, image in each_captured(cameras, work.light_field, work.how, room=room_of):
+    for place, image in each_captured(cameras, work.light_field, work.how, output_buffers=buffers_of):
         with checks.within(work.cameras.said(batch[place])):
             row = batch[place], image.to_numpy() if work.pictures else None, row_of(image, work.metrics)
         yield row
 
 
-def rows_elsewhere(shared: tuple[Work, int], batch: Sequence[int]) -> tuple[Rows, Remarks]:
+def rows_elsewhere(shared: tuple[Work, int], batch: Sequence[int]) -> tuple[Rows, Notices]:
     """The same as a task, and what is remarked, unless it is said in the process that asks."""
-    (work, asking), remarks = shared, Remarks()
+    (work, asking), remarks = shared, Notices()
     if os.getpid() == asking:
         return list(rows_of(work, batch)), remarks
     with remarks.gathered():

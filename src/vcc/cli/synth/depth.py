@@ -12,9 +12,9 @@ from vcc.base.errors import InputError
 from vcc.cli.console import show
 from vcc.cli.options import Counts, Length
 from vcc.cli.synth.rendering import SampleType, Store, Views, check_store, make
+from vcc.files.images_with_metadata import light_in
 from vcc.files.netpbm import read_pfm
 from vcc.files.pictures import read_picture, refuse_coded
-from vcc.files.stated import light_in
 from vcc.sources.depth_map import DepthMapScene
 
 

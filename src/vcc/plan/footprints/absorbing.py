@@ -27,7 +27,7 @@ class AbsorbingChoices:
         planes: what counts in each of them.
     """
 
-    together: tuple[int, ...] = choice("which masks stand in one plane")
+    stacked: tuple[int, ...] = choice("which masks stand in one plane")
     against_sensor: tuple[bool, ...] = choice("which masks stand against the sensor")
     planes: tuple[PlaneChoices, ...] = choice("plane of masks")
 
@@ -68,7 +68,7 @@ class Absorbing(Brief):
         """
         groups = _in_one_place(train, landing)
         together = tuple(len(stages) for _, stages in groups)
-        check_unchanged("which masks stand in one plane", choices.together, together)
+        check_unchanged("which masks stand in one plane", choices.stacked, together)
         against = tuple(_same_place(place, landing.metres) for place, _ in groups)
         check_unchanged("which masks stand against the sensor", choices.against_sensor, against)
         planes = [

@@ -17,7 +17,7 @@ from vcc.plan.footprints.cells import SampleDivision
 from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews, OnSensor, SwapPixelAxes
-from vcc.plan.sharpening import BOX, MEAN, TENT, across_plane, along_axis, weights_beside
+from vcc.plan.sharpening import BOX, MEAN, TENT, across_plane, along_axis, filter_half_width
 
 Array = NDArray[np.float64]
 
@@ -165,7 +165,7 @@ class Sharpened(Brief):
         if math.prod(n + 4 * abs(size) for n, size in zip(core.raster_shape, (yl, xk), strict=True)) > FAR:
             return SharpeningChoices(True, None, None)
         spline = core.interpolation == "spline"
-        along = weights_beside(losses, yl, spline), weights_beside(losses, xk, spline)
+        along = filter_half_width(losses, yl, spline), filter_half_width(losses, xk, spline)
         return SharpeningChoices(False, along, None)
 
     @classmethod

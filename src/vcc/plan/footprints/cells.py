@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
+from vcc.plan.footprints.batch import Apart, Looks
 from vcc.plan.footprints.detail import detail_lost
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision, Taps
-from vcc.plan.footprints.together import Apart, Looks
 from vcc.plan.how import LARGEST_REFINEMENT
 from vcc.plan.parallax_rule import BetweenViews
-from vcc.shapes.sheets import clear_over, dark_over, has_edges
+from vcc.shapes.stacked_patterns import clear_over, dark_over, has_edges
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class Detail:
         """See `detail_lost`."""
         return detail_lost(plane, known, added)
 
-    def together(self, looks: Looks) -> Apart:
+    def joint_variation(self, looks: Looks) -> Apart:
         """See `Looks.apart`."""
         return looks.apart()
 
@@ -178,7 +178,7 @@ def divide_views(
     groups = [view_planes] * bool(view_planes) + [[plane] for plane in path_planes]
     apart = Apart(_no_error, 0.0, (False,) * len(groups))
     if len(groups) > 1:  # even where no view of this piece needs it: all pieces of a light field are divided alike
-        apart = detail.together(
+        apart = detail.joint_variation(
             Looks.of(
                 groups,
                 bool(view_planes),
@@ -188,7 +188,7 @@ def divide_views(
                 geometry.extent,
             )
         )
-    where = _together([group for group, even in zip(groups, apart.even, strict=True) if not even], geometry)
+    where = _where_joint([group for group, even in zip(groups, apart.even, strict=True) if not even], geometry)
     cut = [(plane, _misplaced(plane, between, geometry, detail)) for plane in path_planes]
     misplaced = max((error for _, error in cut), default=0.0)
 
@@ -213,7 +213,7 @@ def divide_views(
     return CellDivision(parts, False, finer, where, error)
 
 
-def _together(groups: list[list[Plane]], geometry: Geometry) -> NDArray[np.bool_]:
+def _where_joint(groups: list[list[Plane]], geometry: Geometry) -> NDArray[np.bool_]:
     """In which views elements in different planes vary together, (v, u)."""
     varying = sum((geometry.varying(group).astype(int) for group in groups), np.zeros(geometry.views, dtype=int))
     return np.asarray(varying > 1)

@@ -18,6 +18,7 @@ from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
 from vcc.optics.mask import Mask
 from vcc.optics.train import Train
+from vcc.plan.footprints.batch import Apart, Looks
 from vcc.plan.footprints.cells import Detail
 from vcc.plan.footprints.compile import ByFootprints, choose_taps
 from vcc.plan.footprints.detail import detail_lost, details_lost
@@ -25,12 +26,11 @@ from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.footprints.mixtures import Mixture, of_cells, of_views
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.planes import Plane
-from vcc.plan.footprints.together import Apart, Looks
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.shapes.mean_back import holds
 from vcc.shapes.patterns import Bounded, Cells, Pattern
-from vcc.shapes.sheets import Product, Shifted
+from vcc.shapes.stacked_patterns import Product, Shifted
 
 Array = NDArray[np.float64]
 
@@ -193,7 +193,7 @@ class _OneOfMany(Detail):
     def lost(self, plane: Plane, known: Array, added: Array) -> float:
         return float(self._details.lost(plane, known, added)[self._number])
 
-    def together(self, looks: Looks) -> Apart:
+    def joint_variation(self, looks: Looks) -> Apart:
         own = self._details.plane
         values = [looks.values(n) for n in range(len(looks.groups))]
         place = next(n for n, group in enumerate(looks.groups) if any(plane is own for plane in group))

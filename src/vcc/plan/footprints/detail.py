@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vcc.plan.footprints.planes import Plane
 from vcc.shapes.patterns import Cells, Pattern
-from vcc.shapes.sheets import Product, product_of_means
+from vcc.shapes.stacked_patterns import Product, product_of_means
 
 Array = NDArray[np.float64]
 

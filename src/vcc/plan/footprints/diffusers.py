@@ -28,10 +28,10 @@ from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.optics.train import Stage, Train
 from vcc.plan.following import check_unchanged, choice, plan_again
-from vcc.plan.sharpening import along_axis, weights_beside
+from vcc.plan.sharpening import along_axis, filter_half_width
 from vcc.shapes.kernel_weights import axes_of
 from vcc.shapes.kernels import Kernel
-from vcc.shapes.sheets import clear_over
+from vcc.shapes.stacked_patterns import clear_over
 
 Array = NDArray[np.float64]
 
@@ -166,16 +166,18 @@ def _passes_all(train: Train, stage: Stage, grid: Grid) -> bool:
     nv, nu, nt, ns = grid.shape[:4]
     middle = (np.array([nu, nv, ns, nt]) - 1) / 2
     half = middle + np.array([1.0, 1.0, 2.0, 2.0])  # places between views and footprints reach beyond the samples
-    slack = np.zeros(4)
+    deflection_bounds = np.zeros(4)
     for met in train.stages[: train.stages.index(stage)]:
         if met.faces.bending is not None:
             return False
         if met.faces.spread is not None:
             onward = stage.arriving @ met.leaving.inverse()
-            slack = slack + np.abs(onward.linear) @ np.array([0.0, 0.0, *met.faces.spread.reach])
+            deflection_bounds = deflection_bounds + np.abs(onward.linear) @ np.array(
+                [0.0, 0.0, *met.faces.spread.reach]
+            )
     arriving = stage.arriving @ grid.frame
     centre = arriving(middle[None])[0][:2] - stage.element.decentre
-    reach = np.abs(arriving.linear[:2]) @ half + slack[:2]
+    reach = np.abs(arriving.linear[:2]) @ half + deflection_bounds[:2]
     return bool(clear_over(stage.faces.pattern, centre - reach, centre + reach))
 
 
@@ -216,23 +218,23 @@ def _on_lattice(
         weights = kernel.weights(steps_from_slopes, None)
     else:
         check_unchanged("axes that the kernel lies along", choices.axes, axes_of(steps_from_slopes, kernel.reach))
-        needed, room = kernel.steps_beside(steps_from_slopes), choices.steps_beside
+        needed, room = kernel.half_width_in_steps(steps_from_slopes), choices.steps_beside
         if needed[0] > room[0] or needed[1] > room[1]:
             raise plan_again(f"reach of a kernel, {max(needed)} steps where there is room for {max(room)}")
         weights = kernel.weights(steps_from_slopes, room)
     if not sharp:
         return weights
     losses = _losses(kernel, steps_from_slopes, weights)
-    beside = [weights_beside(loss, 1.0) for loss in losses] if choices is None else choices.filters
+    beside = [filter_half_width(loss, 1.0) for loss in losses] if choices is None else choices.filters
     for axis, (loss, each) in enumerate(zip(losses, beside, strict=True)):
         weights = _filtered(weights, along_axis(loss, 1.0, beside=each), 1 - axis)
     return weights
 
 
 def _choose_kernel(kernel: Kernel, steps_from_slopes: Array, sharp: bool) -> KernelChoices:
-    room = kernel.steps_beside(ROOM * steps_from_slopes)
+    room = kernel.half_width_in_steps(ROOM * steps_from_slopes)
     losses = _losses(kernel, steps_from_slopes, kernel.weights(steps_from_slopes, room)) if sharp else []
-    filters = tuple(weights_beside(loss, 1.0) for loss in losses)
+    filters = tuple(filter_half_width(loss, 1.0) for loss in losses)
     return KernelChoices(axes_of(steps_from_slopes, kernel.reach), room, filters)
 
 

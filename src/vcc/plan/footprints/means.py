@@ -32,7 +32,7 @@ from vcc.shapes.patterns import (
     is_grid,
     overlap_share,
 )
-from vcc.shapes.sheets import Product, Shifted
+from vcc.shapes.stacked_patterns import Product, Shifted
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from vcc.base.lookup import smooth
 from vcc.base.values import Value
 from vcc.fields.grid import Block
 from vcc.plan.footprints.shares import REACH, Division
-from vcc.plan.numbers import numbers
+from vcc.plan.parameters import parameters
 
 Array = NDArray[np.float64]
 
@@ -129,12 +129,12 @@ class Footprints(Value):
         """Whether there is a derivative to each of some numbers.
 
         Args:
-            wanted: names of the core's numbers (`vcc.plan.numbers.numbers`).
+            wanted: names of the core's numbers (`vcc.plan.parameters.numbers`).
 
         Raises:
             InputError: a number to which there is none, with why.
         """
-        known = numbers(self) if wanted else {}
+        known = parameters(self) if wanted else {}
         for name in wanted:
             if name == "sharpen_samples":
                 raise InputError("there is no derivative to sharpen_samples: the filter of samples is a decision")
@@ -165,12 +165,12 @@ class Footprints(Value):
             samples=block.shape[2:],
         )
 
-    def needed(self, wanted: Collection[str]) -> set[str]:
+    def required(self, wanted: Collection[str]) -> set[str]:
         """The numbers of a part to which derivatives make up those to some of this core's numbers."""
         stepped = [where for where in self._stepped if where[2] in wanted]
         return {*wanted, *(name for where in stepped for name in where)}
 
-    def whole_numbers(self, block: Block, numbers: Mapping[str, Array]) -> dict[str, Array]:
+    def full_gradients(self, block: Block, numbers: Mapping[str, Array]) -> dict[str, Array]:
         """Derivatives to the numbers of `part` as those to this core's own.
 
         A part begins at its first sample, so that steps move all of its places.

@@ -12,7 +12,7 @@ from vcc.base.describe import Brief
 from vcc.plan.following import choice
 from vcc.plan.footprints.means import Boxes
 from vcc.shapes.patterns import Pattern
-from vcc.shapes.sheets import in_one_plane, not_clear_beside_others
+from vcc.shapes.stacked_patterns import in_one_plane, not_clear_next_to_others
 from vcc.shapes.tilings import Tile, tiles_of
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ def choose_plane(patterns: list[Placed]) -> PlaneChoices:
 
     About the middle of the smallest, as it would be by itself, whatever the order in which they are given.
     """
-    cutting = tuple(not_clear_beside_others(patterns))
+    cutting = tuple(not_clear_next_to_others(patterns))
     sizes = [(float(np.prod(pattern.size)), *middle) for pattern, middle in (patterns[n] for n in cutting)]
     return PlaneChoices(cutting, sizes.index(min(sizes)))
 

@@ -112,7 +112,7 @@ class AimChoices:
     rounds: tuple[bool, ...]
     everything: bool
     bends: tuple[Slopes, ...]
-    strips: tuple[int, int] | None
+    slope_bounds: tuple[int, int] | None
     towards: tuple[int, str] | None = None
     reach: tuple[int, int] = (0, 0)
     halvings: int = 0
@@ -176,7 +176,7 @@ def _as_much_as_it_likes(path: Path, kept: AimChoices) -> AimChoices:
 
     What stands where the window is, or before all that has a texture, may bend rays as much as it likes.
     """
-    pair = kept.strips
+    pair = kept.slope_bounds
     assert pair is not None
 
     def led_to(bends: tuple[Slopes, ...]) -> Array:
@@ -222,8 +222,8 @@ def aim_now(path: Path, kept: AimChoices) -> Aimed:
 
 def _chosen(path: Path, deflections: DeflectionBounds, kept: AimChoices) -> Aim:
     """The window, or the windows of cells, that were decided on."""
-    if kept.strips is not None:
-        return window_of(path, deflections.unknown, kept.everything, kept.strips)
+    if kept.slope_bounds is not None:
+        return window_of(path, deflections.unknown, kept.everything, kept.slope_bounds)
     assert kept.towards is not None
     cells = cell_windows.cell_windows_towards(path, deflections.whole, kept.everything, *kept.towards)
     if cells is None:

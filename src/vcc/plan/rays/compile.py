@@ -48,7 +48,7 @@ from vcc.plan.rays.textures import (
 )
 from vcc.shapes.lattice import CellApertures, CellBlock
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Pattern
-from vcc.shapes.sheets import Product
+from vcc.shapes.stacked_patterns import Product
 
 Array = NDArray[np.float64]
 
@@ -253,7 +253,7 @@ def _border(grid: Grid, core: Rays, before: tuple[Before, ...]) -> DarkBorder:
 
 def _with(border: DarkBorder, block: Block) -> Block:
     """A block of a whole with the border around it."""
-    ends = zip(block.ranges, border.beside, strict=True)
+    ends = zip(block.ranges, border.halo, strict=True)
     return Block(*((first - a, stop + b) for (first, stop), (a, b) in ends))
 
 

@@ -57,7 +57,7 @@ def edges_that_cut(core: Rays, changed: Collection[str] | None = None, pixels: i
 
     Args:
         core: what is traced.
-        changed: names of numbers (`vcc.plan.numbers.numbers` of the core) that change: of the edges those count
+        changed: names of numbers (`vcc.plan.parameters.numbers` of the core) that change: of the edges those count
             against which rays then move. None: all edges that cut.
         pixels: how many a side of the sensor are traced.
     """

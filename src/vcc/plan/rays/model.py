@@ -83,11 +83,11 @@ class Rays(Value):
         place = Affine.translation(-column, -row, -k, -l)
         return replace(self, index_from_ray=place @ self.index_from_ray, views=block.shape)
 
-    def needed(self, wanted: Collection[str]) -> set[str]:
+    def required(self, wanted: Collection[str]) -> set[str]:
         """The numbers of a part to which derivatives make up those to some of this core's numbers: the same."""
         return set(wanted)
 
-    def whole_numbers(self, block: Block, numbers: Mapping[str, Array]) -> dict[str, Array]:
+    def full_gradients(self, block: Block, numbers: Mapping[str, Array]) -> dict[str, Array]:
         """Derivatives to the numbers of `part` as those to this core's own: it only looks from elsewhere."""
         return dict(numbers)
 

@@ -73,20 +73,20 @@ class Bound(Brief):
                 return radius, True
         return self.half + loose, False
 
-    def strips(self) -> list[Strip]:
+    def slope_bounds(self) -> list[SlopeBound]:
         """One for each coordinate that is bounded."""
         half, disc = self.widened()
         coordinates = self.from_sensor.linear[self.axes]
         middle = self.middle - self.from_sensor.offset[self.axes]
         return [
-            Strip(coordinates[axis], float(middle[axis]), float(half[axis]), self.number, disc, self.words)
+            SlopeBound(coordinates[axis], float(middle[axis]), float(half[axis]), self.number, disc, self.words)
             for axis in (0, 1)
             if np.isfinite(half[axis])
         ]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Strip(Brief):
+class SlopeBound(Brief):
     """A bound of rays along one coordinate of one plane: |from_sensor · (x, y, s, t) − middle| ≤ half.
 
     Args:
@@ -185,19 +185,19 @@ def windows(path: Path, deflections: list[Array], everything: bool) -> list[Wind
 
 def windows_by_strips(path: Path, deflections: list[Array], everything: bool) -> list[tuple[Pair, Window]]:
     """The same, each with the numbers of the two strips that cut it out, of those that `window_of` knows."""
-    strips = [strip for bound in bounds(path, deflections, everything) for strip in bound.strips()]
+    strips = [strip for bound in bounds(path, deflections, everything) for strip in bound.slope_bounds()]
     found = list(_cut_out(path, strips))
-    return found or list(_cut_out(path, [*strips, *pictures(path, deflections).strips()]))
+    return found or list(_cut_out(path, [*strips, *pictures(path, deflections).slope_bounds()]))
 
 
 def window_of(path: Path, deflections: list[Array], everything: bool, pair: Pair) -> Window:
     """The window that two strips cut out, whatever it is now, by the numbers that `windows_by_strips` gave."""
-    strips = [strip for bound in bounds(path, deflections, everything) for strip in bound.strips()]
-    strips += pictures(path, deflections).strips() if max(pair) >= len(strips) else []
+    strips = [strip for bound in bounds(path, deflections, everything) for strip in bound.slope_bounds()]
+    strips += pictures(path, deflections).slope_bounds() if max(pair) >= len(strips) else []
     return _window(path, (strips[pair[0]], strips[pair[1]]))
 
 
-def _cut_out(path: Path, strips: list[Strip]) -> Iterator[tuple[Pair, Window]]:
+def _cut_out(path: Path, strips: list[SlopeBound]) -> Iterator[tuple[Pair, Window]]:
     bounding = [n for n, strip in enumerate(strips) if strip.bounds_slopes]
     for one, other in itertools.combinations(bounding, 2):
         rows = np.stack([strips[n].from_sensor for n in (one, other)])
@@ -208,7 +208,7 @@ def _cut_out(path: Path, strips: list[Strip]) -> Iterator[tuple[Pair, Window]]:
             yield (one, other), _window(path, (strips[one], strips[other]))
 
 
-def _window(path: Path, pair: tuple[Strip, Strip]) -> Window:
+def _window(path: Path, pair: tuple[SlopeBound, SlopeBound]) -> Window:
     """The slopes within two strips."""
     rows = np.stack([strip.from_sensor for strip in pair])
     slope_from_place = np.asarray(np.linalg.inv(rows[:, 2:]), dtype=np.float64)
@@ -222,7 +222,7 @@ def _window(path: Path, pair: tuple[Strip, Strip]) -> Window:
     )
 
 
-def _made_up(path: Path, pair: tuple[Strip, ...], slope_from_place: Array) -> Iterator[tuple[int, Array]]:
+def _made_up(path: Path, pair: tuple[SlopeBound, ...], slope_from_place: Array) -> Iterator[tuple[int, Array]]:
     """How slopes make up for the uniform diffusers before the planes of the strips; see `Window`."""
     for leg in path.legs[: max(strip.number for strip in pair)]:
         spread = leg.stage.faces.spread

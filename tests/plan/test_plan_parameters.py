@@ -9,7 +9,7 @@ import vcc
 from vcc.plan.choice import compile_best
 from vcc.plan.following import Parts, choice, differences
 from vcc.plan.how import How
-from vcc.plan.numbers import numbers, with_numbers
+from vcc.plan.parameters import parameters, with_parameters
 from vcc.units import mm, um
 
 
@@ -24,7 +24,7 @@ def plan(method="auto"):
 
 def test_footprints_are_named_as_they_are_reached():
     core = plan().core
-    found = numbers(core)
+    found = parameters(core)
     assert {"scale", "weights", "x", "y", "step", "masks[0].texture", "masks[0].column", "masks[0].step"} <= set(
         found
     )
@@ -37,21 +37,21 @@ def test_footprints_are_named_as_they_are_reached():
 def test_numbers_that_are_changed_are_found_again_and_the_rest_stays(method):
     made = plan(method)
     for thing in (made.core, made.before, made.after):
-        found = numbers(thing)
+        found = parameters(thing)
         # The last row of an affine map stays what it is.
         other = {name: value if "from" in name else value + 1 for name, value in found.items()}
-        back = numbers(with_numbers(thing, other))
+        back = parameters(with_parameters(thing, other))
         assert set(back) == set(found)
         for name, value in other.items():
             np.testing.assert_allclose(back[name], value, rtol=1e-6)
-        assert with_numbers(thing, {}) is thing
+        assert with_parameters(thing, {}) is thing
 
 
 def test_those_of_a_plan_say_where_they_stand():
     made = plan()
-    found = made.numbers()
+    found = made.parameters()
     assert {"core.masks[0].texture", "after[0].down"} <= set(found)
-    other = made.with_numbers({"core.scale": 7.0, "after[0].down": np.ones(found["after[0].down"].shape)})
+    other = made.with_parameters({"core.scale": 7.0, "after[0].down": np.ones(found["after[0].down"].shape)})
     assert other.core.scale == 7.0
     assert (other.after[0].down == 1).all()
     np.testing.assert_array_equal(other.core.x, made.core.x)
@@ -60,7 +60,7 @@ def test_those_of_a_plan_say_where_they_stand():
 
 def test_names_that_do_not_exist_are_refused():
     with pytest.raises(KeyError, match="colour"):
-        with_numbers(plan().core, {"colour": 1.0})
+        with_parameters(plan().core, {"colour": 1.0})
 
 
 @dataclass(frozen=True, eq=False)

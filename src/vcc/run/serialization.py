@@ -21,7 +21,7 @@ SENT = 2**26
 """Bytes of samples in memory that are sent with the plan; more are to be read by each where they are stored."""
 
 
-def check_may_be_sent(samples: Samples) -> None:
+def check_portable(samples: Samples) -> None:
     """Refuse samples that others cannot be sent: they are to be read by each where they are stored.
 
     Raises:
@@ -47,7 +47,7 @@ def check_may_be_sent(samples: Samples) -> None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Carried(Brief):
+class PortableSamples(Brief):
     """Samples as they go to others: the address of stored ones, or a small array.
 
     Known to be complete: that was looked at before they were sent.
@@ -61,13 +61,13 @@ class Carried(Brief):
     source: Any
 
     @classmethod
-    def of(cls, samples: Samples) -> Carried:
+    def of(cls, samples: Samples) -> PortableSamples:
         """Samples that may be sent.
 
         Raises:
             InputError: as `check_may_be_sent`.
         """
-        check_may_be_sent(samples)
+        check_portable(samples)
         whole = samples.whole()
         grid = replace(samples.grid, disparities=Disparities())
         return cls(grid, samples if whole is None else whole)
@@ -91,7 +91,7 @@ class Carried(Brief):
 
 
 @dataclass(frozen=True, eq=False)
-class Sent:
+class PortableRun:
     """All that a block's run needs but which block it is.
 
     Args:
@@ -101,10 +101,10 @@ class Sent:
     """
 
     plan: Plan
-    samples: Carried
+    samples: PortableSamples
     how: How
 
     @classmethod
-    def of(cls, plan: Plan, samples: Carried, how: How) -> Sent:
+    def of(cls, plan: Plan, samples: PortableSamples, how: How) -> PortableRun:
         """What others need: the numbers of the plan, not of what and for whom they were made."""
         return cls(replace(plan, made_for=None, notes=(), cautions=()), samples, how)

@@ -14,7 +14,7 @@ from vcc.formats.grid import Geometry
 from vcc.formats.orientation import VISIBLE_DISPARITY
 
 
-def assumed_remark(info: FolderInfo, path: Path, stated: Geometry, assumed: Sequence[str]) -> str:
+def assumed_notice(info: FolderInfo, path: Path, stated: Geometry, assumed: Sequence[str]) -> str:
     """What had to be assumed, and how to state it; empty for nothing.
 
     Args:
@@ -44,7 +44,7 @@ FAR_FROM_STATED = 0.2
 """Share by which what is given may differ from what files state without a word: measured again, it does."""
 
 
-def overruled_remark(info: FolderInfo, given: Given) -> str:
+def overruled_notice(info: FolderInfo, given: Given) -> str:
     """What is given and far from what the files state, a slip of units most often; empty for nothing.
 
     Args:
@@ -80,7 +80,7 @@ def _spacing_text(info: FolderInfo, unit: str) -> str:
     return f"a spacing of {dv} (rows) and {du} (columns), from positions whose unit is taken as {unit}"
 
 
-def vergence_remark(shown: tuple[float, float] | None) -> str:
+def vergence_notice(shown: tuple[float, float] | None) -> str:
     """A word on negative disparities, which parallel cameras cannot see.
 
     Args:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.base.progress import Progress, tell
 from vcc.engines.rays import ViewAround, pieces, samples_around, views_around
-from vcc.plan.numbers import numbers
+from vcc.plan.parameters import parameters
 from vcc.plan.rays import edges
 from vcc.plan.rays.aim_backwards import aim_back
 from vcc.plan.rays.backwards import Numbers, back, moved_back
@@ -32,7 +32,7 @@ RAYS_AT_ONCE = 2**15
 """Rays whose whole way is kept at once: some tens of MiB."""
 
 
-def ray_numbers_back(
+def ray_gradients(
     core: Rays,
     values: NDArray[Any],
     raster: NDArray[np.floating],
@@ -47,7 +47,7 @@ def ray_numbers_back(
         core: what is traced.
         values: samples (v, u, t, s[, channels]).
         raster: weights of the picture's values, (rows, columns, channels).
-        wanted: names of numbers (`vcc.plan.numbers.numbers` of the core).
+        wanted: names of numbers (`vcc.plan.parameters.numbers` of the core).
         beside: 0, or 1 for the blocks of points beside those of the first round.
         threads: not used.
         progress: called with (done, total) in pixels.
@@ -61,7 +61,7 @@ def ray_numbers_back(
     edges.check_no_edge(core, wanted)
     channels = values.shape[4] if values.ndim == 5 else 1
     samples = values.reshape(-1, channels).astype(np.float64)
-    found = {name: np.zeros_like(number) for name, number in numbers(core).items() if name in set(wanted)}
+    found = {name: np.zeros_like(number) for name, number in parameters(core).items() if name in set(wanted)}
     weights = raster.reshape(-1, channels).astype(np.float64)
     for pixel in pieces(core, RAYS_AT_ONCE):
         for name, number in _of_pixels(core, samples, weights[pixel], pixel, core.block(pixel) ^ beside):

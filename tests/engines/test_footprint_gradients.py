@@ -14,9 +14,9 @@ import pytest
 import vcc
 from tests.physics.random_cameras import AFFINE, drawn
 from vcc.engines import numba_cpu, reference
-from vcc.engines.footprint_numbers import SPAN, numbers_back
+from vcc.engines.footprint_gradients import SPAN, footprint_gradients
 from vcc.plan.footprints.model import Footprints, MaskLookup
-from vcc.plan.numbers import numbers
+from vcc.plan.parameters import parameters
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
@@ -97,13 +97,13 @@ def weights_for(core: Footprints, values: np.ndarray) -> np.ndarray:
 
 
 def wanted_of(core: Footprints) -> list[str]:
-    return [name for name in numbers(core) if name != "sharpen_samples"]
+    return [name for name in parameters(core) if name != "sharpen_samples"]
 
 
 def assert_as_the_reference(core: Footprints, values: np.ndarray, wanted: list[str]) -> None:
     weights = weights_for(core, values)
-    expected = reference.back(core, values, weights, samples=False, wanted=wanted, threads=1).numbers
-    found = numbers_back(core, values, weights, wanted, 2)
+    expected = reference.back(core, values, weights, samples=False, wanted=wanted, threads=1).gradients
+    found = footprint_gradients(core, values, weights, wanted, 2)
     assert list(found) == wanted
     for name in wanted:
         assert found[name].dtype == np.float64
@@ -163,9 +163,9 @@ def test_samples_that_are_no_more_than_one_vector_or_do_not_lie_side_by_side():
 def test_the_same_bytes_for_any_number_of_threads(name):
     core, values = PLANS[name].core(), PLANS[name].values()
     wanted, weights = wanted_of(core), weights_for(core, values)
-    first = numbers_back(core, values, weights, wanted, 1)
+    first = footprint_gradients(core, values, weights, wanted, 1)
     for threads in (1, 2, 3):
-        other = numbers_back(core, values, weights, wanted, threads)
+        other = footprint_gradients(core, values, weights, wanted, threads)
         assert all(other[name].tobytes() == first[name].tobytes() for name in wanted)
 
 
@@ -177,14 +177,14 @@ def test_nearest_pixels_say_what_is_linear_and_refuse_places(shear):
     assert_as_the_reference(core, values, wanted)
     for name in ("x", "y", "step", "opening"):
         with pytest.raises(vcc.InputError, match=name):
-            numbers_back(core, values, weights_for(core, values), [name], 1)
+            footprint_gradients(core, values, weights_for(core, values), [name], 1)
 
 
 def test_there_is_no_derivative_to_a_filter_of_samples():
     plan = PLANS["divided and filtered"]
     core = plan.core()
     with pytest.raises(vcc.InputError, match="sharpen_samples"):
-        numbers_back(core, plan.values(), weights_for(core, plan.values()), ["sharpen_samples"], 1)
+        footprint_gradients(core, plan.values(), weights_for(core, plan.values()), ["sharpen_samples"], 1)
 
 
 @pytest.mark.parametrize("shear", [0.0, 0.3])

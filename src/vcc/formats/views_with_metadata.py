@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.files.stated import StatedPicture, check_told, light_of, unknown
-from vcc.files.statement import Statement, statement_of
+from vcc.files.image_metadata import ImageMetadata, metadata_of
+from vcc.files.images_with_metadata import ImageWithMetadata, check_agrees, light_of, unknown
 
 
 @dataclass(frozen=True)
-class StatedViews:
+class ViewsWithMetadata:
     """What pictures say of their numbers, all of them alike.
 
     Args:
@@ -24,18 +24,18 @@ class StatedViews:
         transfer: how their numbers stand for light; None where nothing is said.
     """
 
-    said: dict[Path, Statement]
+    said: dict[Path, ImageMetadata]
     transfer: Literal["srgb", "linear"] | None
 
     @classmethod
-    def of(cls, files: Iterable[Path]) -> StatedViews:
+    def of(cls, files: Iterable[Path]) -> ViewsWithMetadata:
         """What these pictures say; their numbers are not read.
 
         Raises:
             InputError: some say otherwise than others, where that makes a difference; raw numbers of a sensor; or
                 a damaged statement.
         """
-        every = {file: statement_of(file) for file in files}
+        every = {file: metadata_of(file) for file in files}
         said = {file: each for file, each in every.items() if each is not None}
         silent = [file for file, each in every.items() if each is None]
         for file, each in said.items():
@@ -83,16 +83,16 @@ class StatedViews:
             InputError: it is "srgb" or "linear", and the files say the other.
         """
         for file, each in self.said.items():
-            check_told(file, each, told)
+            check_agrees(file, each, told)
             return
 
-    def picture(self, file: Path, samples: NDArray[Any]) -> StatedPicture:
+    def picture(self, file: Path, samples: NDArray[Any]) -> ImageWithMetadata:
         """A picture's numbers with what it says of them.
 
         Raises:
             InputError: another program has changed them since they were written.
         """
-        picture = StatedPicture(file, samples, self.said[file], changed=not self.said[file].fits(samples))
+        picture = ImageWithMetadata(file, samples, self.said[file], changed=not self.said[file].fits(samples))
         if picture.changed:
             raise InputError(f"{unknown(picture)}: write all views anew, without descriptions")
         return picture

@@ -76,7 +76,7 @@ def mix(tiles, gathered, span, channels, mixed):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def add_numbers(samples, a, used, fine, tables, masks, sought, channels, span, totals):  # type: ignore[no-untyped-def]
+def add_gradients(samples, a, used, fine, tables, masks, sought, channels, span, totals):  # type: ignore[no-untyped-def]
     """Add what the samples of a column of view taps say, those of a span of their columns.
 
     Args:

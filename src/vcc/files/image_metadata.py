@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.reading import check_file, shown
-from vcc.base.values import Untold, fingerprint
+from vcc.base.values import Unhashable, fingerprint
 from vcc.base.version import VERSION
 from vcc.files import npy
 from vcc.optics.train import Train
@@ -60,7 +60,7 @@ class CameraMark:
         """That of a camera."""
         try:
             return cls(camera.name, fingerprint(camera.elements, camera.sensor))
-        except Untold as why:
+        except Unhashable as why:
             return cls(camera.name, None, str(why))
 
     def __str__(self) -> str:
@@ -106,7 +106,7 @@ class RawNumbers:
 
 
 @dataclass(frozen=True)
-class Statement:
+class ImageMetadata:
     """What the numbers of a picture file mean.
 
     Args:
@@ -189,7 +189,7 @@ def checksum(samples: NDArray[Any]) -> int:
     return zlib.crc32(plain.reshape(-1).view(np.uint8).data)
 
 
-def parsed(text: str) -> Statement | None:
+def parsed(text: str) -> ImageMetadata | None:
     """The statement in a file's description; None where that is no statement of ours.
 
     Raises:
@@ -203,7 +203,7 @@ def parsed(text: str) -> Statement | None:
             raise ValueError(f"version {said[KEY]!r}")
         if said[KEY] > _VERSION:
             raise InputError(f"it says what its numbers are in form {said[KEY]} of a newer vcc: read it with that")
-        return _statement(said)
+        return _metadata(said)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, InputError) as error:
         if isinstance(error, InputError) and "newer vcc" in str(error):
             raise
@@ -213,13 +213,13 @@ def parsed(text: str) -> Statement | None:
         ) from None
 
 
-def _statement(said: dict[str, Any]) -> Statement:
+def _metadata(said: dict[str, Any]) -> ImageMetadata:
     upright = {"upright": True, "as recorded": False}[said["orientation"]]
     frame, camera, recording = said.get("frame"), said.get("camera"), said.get("recording")
     quantity, transfer = _one_of(said["quantity"], Quantity), _one_of(said["transfer"], Transfer)
     if (quantity == "digital numbers") != (recording is not None):
         raise ValueError("digital numbers go with a recording")
-    return Statement(
+    return ImageMetadata(
         quantity,
         upright,
         transfer,
@@ -278,7 +278,7 @@ def _recording(said: dict[str, Any]) -> RawNumbers:
 # --- in files ---
 
 
-def statement_of(path: Path) -> Statement | None:
+def metadata_of(path: Path) -> ImageMetadata | None:
     """What a picture file says of its numbers, which are not read; None where it says nothing.
 
     Raises:
@@ -303,7 +303,7 @@ _HEADER_END = 33
 """Bytes of a PNG's signature and first chunk, behind which others may stand."""
 
 
-def in_png(data: bytes, statement: Statement, text: str) -> bytes:
+def in_png(data: bytes, statement: ImageMetadata, text: str) -> bytes:
     """An encoded PNG with a statement: how viewers are to show it, and a text.
 
     The pitch stands in the text only: programs that set type print a picture as large as PNG says its pixels are.
@@ -342,7 +342,7 @@ def _png_text(path: Path) -> str | None:
     return None
 
 
-def tiff_tags(statement: Statement, text: str) -> dict[str, Any]:
+def tiff_tags(statement: ImageMetadata, text: str) -> dict[str, Any]:
     """What ``tifffile.imwrite`` takes for a statement: its text, and pixels per centimetre where known."""
     tags: dict[str, Any] = {"description": text}
     if statement.pitch is not None:

@@ -19,7 +19,7 @@ from vcc.base.workers import Workers
 from vcc.engines import ray_loops as kernels
 from vcc.engines import ray_tables as tables
 from vcc.engines.rays_compiled import TILE, given, light_field
-from vcc.plan.numbers import numbers
+from vcc.plan.parameters import parameters
 from vcc.plan.rays import edges, steps
 from vcc.plan.rays.bounds.windows import CellWindows, Window
 from vcc.plan.rays.model import Rays
@@ -32,7 +32,7 @@ GROUPS_BYTES = 2**26
 """Of the sums of all groups, if possible: where tables are large there are fewer groups, and fewer threads."""
 
 
-def ray_numbers_back(
+def ray_gradients(
     core: Rays,
     values: NDArray[Any],
     raster: NDArray[np.floating],
@@ -43,13 +43,13 @@ def ray_numbers_back(
 ) -> dict[str, Array]:
     """The derivative of ⟨raster, what rays make of the samples⟩ to numbers of the core.
 
-    See `vcc.engines.reference_ray_numbers.ray_numbers_back`; the same numbers for any number of threads.
+    See `vcc.engines.reference_ray_gradients.ray_gradients`; the same numbers for any number of threads.
 
     Args:
         core: what is traced.
         values: samples (v, u, t, s[, channels]).
         raster: weights of the picture's values, (rows, columns, channels).
-        wanted: names of numbers (`vcc.plan.numbers.numbers` of the core).
+        wanted: names of numbers (`vcc.plan.parameters.numbers` of the core).
         beside: 0, or 1 for the blocks of points beside those of the first round.
         threads: how many work at once.
         progress: called with (done, total) in pixels.
@@ -61,12 +61,12 @@ def ray_numbers_back(
         InputError: a number that moves nothing but a hard edge which rays run into.
     """
     edges.check_no_edge(core, wanted)
-    shapes = {name: number.shape for name, number in numbers(core).items()}
+    shapes = {name: number.shape for name, number in parameters(core).items()}
     channels = values.shape[4] if values.ndim == 5 else 1
     sensor, points, aim, packed = given(core, beside)
     weights = np.ascontiguousarray(raster, dtype=np.float64).reshape(*core.raster_shape, channels) / core.samples
     back = partial(
-        kernels.numbers_of_tiles, light_field(core, values, channels), sensor, points, aim, packed, weights
+        kernels.gradients_of_tiles, light_field(core, values, channels), sensor, points, aim, packed, weights
     )
     empty = partial(_nothing, core, packed, set(wanted))
     groups = _groups(core.raster_shape, sum(each.nbytes for each in empty()))
@@ -74,12 +74,12 @@ def ray_numbers_back(
     with Workers(threads) as pool:
 
         def of_group(tiles: NDArray[np.int64]) -> tables.Told:
-            told = empty()
-            back(pool.ended, told, tiles)
-            return told
+            gradients = empty()
+            back(pool.ended, gradients, tiles)
+            return gradients
 
-        for done, told in enumerate(pool.map(of_group, groups), start=1):
-            for mine, theirs in zip(total, told, strict=True):
+        for done, gradients in enumerate(pool.map(of_group, groups), start=1):
+            for mine, theirs in zip(total, gradients, strict=True):
                 if mine is not total.matrices:
                     mine += theirs
             tell(progress, pixels * done // len(groups), pixels)
@@ -129,24 +129,24 @@ def _matrices(core: Rays) -> Array:
     return matrices
 
 
-def _named(core: Rays, packed: tables.Steps, told: tables.Told) -> dict[str, Array]:
+def _named(core: Rays, packed: tables.Steps, gradients: tables.Told) -> dict[str, Array]:
     """The derivatives by the numbers' names, tables left out that were not summed."""
     named = {
-        "first_pixel": told.sensor[:2],
-        "pitch": told.sensor[2:4],
-        "sensitive": told.sensor[4:],
-        "index_from_ray": _square(told.indices),
-        "motion": told.motion,
+        "first_pixel": gradients.sensor[:2],
+        "pitch": gradients.sensor[2:4],
+        "sensitive": gradients.sensor[4:],
+        "index_from_ray": _square(gradients.indices),
+        "motion": gradients.motion,
     }
     aim = core.aim
-    of_aim = _of_window(aim, told) if isinstance(aim, Window) else _of_cells(aim, told)
+    of_aim = _of_window(aim, gradients) if isinstance(aim, Window) else _of_cells(aim, gradients)
     named |= {f"aim.{name}": value for name, value in of_aim.items()}
     for n, step in enumerate(core.steps):
-        of_step = _of_step(step, packed.whole[n].tolist(), told, told.steps[n])
+        of_step = _of_step(step, packed.whole[n].tolist(), gradients, gradients.steps[n])
         named |= {f"steps[{n}].{name}": value for name, value in of_step.items()}
-    if told.points.size:
-        named["points"] = told.points.T
-    return {"scale": told.scale, **{name: value * core.scale for name, value in named.items()}}
+    if gradients.points.size:
+        named["points"] = gradients.points.T
+    return {"scale": gradients.scale, **{name: value * core.scale for name, value in named.items()}}
 
 
 def _square(matrix: Array) -> Array:
@@ -154,8 +154,8 @@ def _square(matrix: Array) -> Array:
     return np.concatenate([matrix, np.zeros(5)]).reshape(5, 5)
 
 
-def _of_window(aim: Window, told: tables.Told) -> dict[str, Array]:
-    s, t, weight = told.window[:5], told.window[5:10], told.window[10]
+def _of_window(aim: Window, gradients: tables.Told) -> dict[str, Array]:
+    s, t, weight = gradients.window[:5], gradients.window[5:10], gradients.window[10]
     (a, b), (c, d) = aim.slope_from_point
     per_determinant = (np.pi if aim.disc else 4.0) * np.sign(np.linalg.det(aim.slope_from_point))
     of_weight = weight * per_determinant * np.array([[d, -c], [-b, a]])
@@ -163,12 +163,12 @@ def _of_window(aim: Window, told: tables.Told) -> dict[str, Array]:
         "slope_from_point": np.stack([s[:2], t[:2]]) + of_weight,
         "slope_from_sensor": np.stack([s[2:4], t[2:4]]),
         "offset": np.array([s[4], t[4]]),
-        **{f"slope_from_scatter[{n}][1]": term for n, term in enumerate(told.scatter)},
+        **{f"slope_from_scatter[{n}][1]": term for n, term in enumerate(gradients.scatter)},
     }
 
 
-def _of_cells(aim: CellWindows, told: tables.Told) -> dict[str, Array]:
-    x, y, rest = told.cells[:8], told.cells[8:16], told.cells[16:]
+def _of_cells(aim: CellWindows, gradients: tables.Told) -> dict[str, Array]:
+    x, y, rest = gradients.cells[:8], gradients.cells[8:16], gradients.cells[16:]
     sight = (
         "place_from_sensor",
         "place_from_slope",
@@ -184,13 +184,13 @@ def _of_cells(aim: CellWindows, told: tables.Told) -> dict[str, Array]:
         "stop.half": rest[:2],
         "opening.half": np.array([rest[2], 0.0]),
         "opening.radius": rest[3],
-        "opening.borders": told.borders,
+        "opening.borders": gradients.borders,
         **{
             f"cells.lattice.{name}": value
             for name, value in _of_lattice(aim.cells.lattice.pitch, rest[4:]).items()
         },
-        "cells.powers": told.kinds[..., 0],
-        "cells.slopes": told.kinds[..., 1:],
+        "cells.powers": gradients.kinds[..., 0],
+        "cells.slopes": gradients.kinds[..., 1:],
     }
 
 
@@ -198,7 +198,7 @@ def _of_lattice(pitch: float, sums: Array) -> dict[str, Array]:
     return {"pitch": sums[0] / pitch, "rotation": sums[1], "offset": sums[2:4]}
 
 
-def _of_step(step: steps.Step, whole: list[int], told: tables.Told, own: Array) -> dict[str, Array]:
+def _of_step(step: steps.Step, whole: list[int], gradients: tables.Told, own: Array) -> dict[str, Array]:
     """What a step's sums say of its numbers; ``whole`` is what the kernel was given of it."""
     match step:
         case steps.Move():
@@ -206,23 +206,23 @@ def _of_step(step: steps.Step, whole: list[int], told: tables.Told, own: Array) 
         case steps.CellsUnbend(lattice, _, powers):
             lattices = _of_lattice(lattice.pitch, own)
             found = {"decentre": own[2:4], **{f"lattice.{name}": value for name, value in lattices.items()}}
-            if told.slopes.size:
-                kinds = told.slopes[whole[3] :][: 3 * powers.size].reshape(*powers.shape, 3)
+            if gradients.slopes.size:
+                kinds = gradients.slopes[whole[3] :][: 3 * powers.size].reshape(*powers.shape, 3)
                 found |= {"powers": kinds[..., 0], "slopes": kinds[..., 1:]}
             return found
-        case steps.FacetsUnbend(directions) if told.slopes.size:
-            return {"slopes": told.slopes[whole[1] :][: 2 * directions.size].reshape(-1, 4)[:, 2:]}
+        case steps.FacetsUnbend(directions) if gradients.slopes.size:
+            return {"slopes": gradients.slopes[whole[1] :][: 2 * directions.size].reshape(-1, 4)[:, 2:]}
         case steps.TextureUnbend(texture):
-            return _of_texture("texture", texture, own, told.slopes[whole[2] :])
+            return _of_texture("texture", texture, own, gradients.slopes[whole[2] :])
         case steps.TextureShares(texture):
-            return _of_texture("texture", texture, own, told.shares[whole[2] :])
-        case steps.CellShares(values) if told.shares.size:
-            return {"values": told.shares[whole[2] :][: values.size]}
+            return _of_texture("texture", texture, own, gradients.shares[whole[2] :])
+        case steps.CellShares(values) if gradients.shares.size:
+            return {"values": gradients.shares[whole[2] :][: values.size]}
         case steps.Cosines():
             turned, of_frequency = own[:2], own[2:4]
             return {"middle": -np.array(step.frequency) * turned, "frequency": of_frequency, "phase": turned.sum()}
         case steps.Unscatter(width=steps.Texture() as width):
-            return _of_texture("width", width, own, told.shares[whole[8] :])
+            return _of_texture("width", width, own, gradients.shares[whole[8] :])
         case _:
             return {}
 

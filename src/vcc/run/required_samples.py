@@ -17,7 +17,7 @@ from vcc.plan.model import Plan
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Needed(Brief):
+class RequiredSamples(Brief):
     """A part of the pixels of all views, of which those of each view are read that it needs; others are dark.
 
     Args:
@@ -61,7 +61,7 @@ class Needed(Brief):
         return values
 
 
-def needed(plan: Plan, samples: Samples) -> tuple[Plan, Samples]:
+def required_samples(plan: Plan, samples: Samples) -> tuple[Plan, Samples]:
     """A plan and samples, cut to the pixels that its picture needs: the picture stays as it is.
 
     Args:
@@ -69,11 +69,11 @@ def needed(plan: Plan, samples: Samples) -> tuple[Plan, Samples]:
             look anywhere, it stays.
         samples: for which it is made. Those in memory stay.
     """
-    (cut,), part = needed_by_all([plan], samples)
+    (cut,), part = required_by_all([plan], samples)
     return cut, part
 
 
-def needed_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan], Samples]:
+def required_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan], Samples]:
     """Several plans and the samples of which they make pictures, cut to the pixels that any of these needs.
 
     Args:
@@ -95,12 +95,12 @@ def needed_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan], 
     )
     piece, _ = replace(grid, disparities=Disparities()).piece(block.slices)
     cut = [replace(plan, core=plan.core.part(plan.block(block)), grid_shape=piece.shape[:4]) for plan in plans]
-    return cut, Needed(samples, block, pixels, piece)
+    return cut, RequiredSamples(samples, block, pixels, piece)
 
 
 def _stays(plan: Plan) -> bool:
     """Whether a plan is for the light field as it is, as what is done to it before depends on where it ends."""
-    return plan.views_between is not None or any(map(any, plan.beside))
+    return plan.views_between is not None or any(map(any, plan.halo))
 
 
 def _of_any(several: Sequence[NDArray[np.intp]], shape: tuple[int, ...]) -> NDArray[np.intp]:

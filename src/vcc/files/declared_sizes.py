@@ -20,7 +20,7 @@ TIMES_PACKED = 256
 """How many times its own bytes a larger file may unpack to."""
 
 
-def check_claim(claimed: int, stored: int, what: str, most: int = PICTURE) -> None:
+def check_declared_size(claimed: int, stored: int, what: str, most: int = PICTURE) -> None:
     """Refuse a file that claims more than its bytes may hold.
 
     Args:

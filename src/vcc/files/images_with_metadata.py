@@ -14,13 +14,13 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded
 from vcc.files import transfer
+from vcc.files.image_metadata import ImageMetadata, RawNumbers, metadata_of
 from vcc.files.pictures import read_picture
-from vcc.files.statement import RawNumbers, Statement, statement_of
 from vcc.optics.electronics import Electronics
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StatedPicture(Brief):
+class ImageWithMetadata(Brief):
     """A picture's numbers as they are stored, and what the file says of them.
 
     Args:
@@ -32,11 +32,11 @@ class StatedPicture(Brief):
 
     path: Path
     samples: NDArray[Any]
-    statement: Statement | None
+    metadata: ImageMetadata | None
     changed: bool = False
 
 
-def read_stated(path: str | PathLike[str]) -> StatedPicture:
+def read_with_metadata(path: str | PathLike[str]) -> ImageWithMetadata:
     """A picture's numbers and what it says of them.
 
     Raises:
@@ -44,13 +44,13 @@ def read_stated(path: str | PathLike[str]) -> StatedPicture:
     """
     path = expanded(path)
     samples, _ = read_picture(path)
-    said = statement_of(path)
+    said = metadata_of(path)
     if said is not None and not said.fits(samples):
-        return StatedPicture(path, samples, None, changed=True)
-    return StatedPicture(path, samples, said)
+        return ImageWithMetadata(path, samples, None, changed=True)
+    return ImageWithMetadata(path, samples, said)
 
 
-def unknown(picture: StatedPicture) -> str:
+def unknown(picture: ImageWithMetadata) -> str:
     """That a picture does not say what its numbers are, in words, without a full stop."""
     if picture.changed:
         return (
@@ -60,9 +60,9 @@ def unknown(picture: StatedPicture) -> str:
     return f"{picture.path} does not say what its numbers are"
 
 
-def clipping(picture: StatedPicture) -> str:
+def clipping(picture: ImageWithMetadata) -> str:
     """What to say of a picture whose brightest pixels were lost when it was written."""
-    said = picture.statement
+    said = picture.metadata
     assert said is not None
     assert said.clipped is not None
     how = "the automatic exposure" if said.automatic else f"exposure {said.exposure:.6g}"
@@ -72,7 +72,7 @@ def clipping(picture: StatedPicture) -> str:
     )
 
 
-def light_of(picture: StatedPicture) -> NDArray[np.float32]:
+def light_of(picture: ImageWithMetadata) -> NDArray[np.float32]:
     """Light, linear, of a picture that says what its numbers are: coding and exposure undone, not turned.
 
     Of raw numbers the irradiance that they tell of, behind a colour filter each pixel in its own channel.
@@ -80,7 +80,7 @@ def light_of(picture: StatedPicture) -> NDArray[np.float32]:
     Raises:
         InputError: numbers that do not fit what the file says: other channels, or coded as sRGB in floating point.
     """
-    said, samples = picture.statement, picture.samples
+    said, samples = picture.metadata, picture.samples
     assert said is not None
     if said.recording is not None:
         return _irradiance(picture, said.recording)
@@ -93,7 +93,7 @@ def light_of(picture: StatedPicture) -> NDArray[np.float32]:
     return light if said.exposure == 1 else light / np.float32(said.exposure)
 
 
-def _irradiance(picture: StatedPicture, raw: RawNumbers) -> NDArray[np.float32]:
+def _irradiance(picture: ImageWithMetadata, raw: RawNumbers) -> NDArray[np.float32]:
     light = picture.samples.astype(np.float32) - np.float32(raw.dark_level_dn)
     channels = light.shape[2] if light.ndim == 3 else 1
     scale = np.array(raw.dn_per_irradiance, dtype=np.float32)
@@ -120,8 +120,8 @@ def light_in(path: Path, told: Literal["auto", "srgb", "linear"]) -> NDArray[np.
     Raises:
         InputError: a file that cannot be read, one that says otherwise than told, or the raw numbers of a sensor.
     """
-    picture = read_stated(path)
-    said = picture.statement
+    picture = read_with_metadata(path)
+    said = picture.metadata
     if said is None and picture.changed:
         raise InputError(f"{unknown(picture)}: save it without its description")
     if said is None:
@@ -130,12 +130,12 @@ def light_in(path: Path, told: Literal["auto", "srgb", "linear"]) -> NDArray[np.
         return linear if told == "linear" else transfer.decode(picture.samples)
     if said.recording is not None:
         raise InputError(f"{path} says that it holds {said.in_words}: save a picture of it, demosaiced")
-    check_told(path, said, told)
+    check_agrees(path, said, told)
     light = light_of(picture)
     return light if said.upright else light[::-1, ::-1]
 
 
-def check_told(path: Path, said: Statement, told: str) -> None:
+def check_agrees(path: Path, said: ImageMetadata, told: str) -> None:
     """Refuse a transfer function that a file contradicts.
 
     Raises:
@@ -151,7 +151,7 @@ def check_usual(path: Path) -> None:
     Raises:
         InputError: it was exposed, turned or is a raw recording, or its whole numbers are linear.
     """
-    said = statement_of(path)
+    said = metadata_of(path)
     whole = path.suffix.lower() not in (".exr", ".npy")
     if said is not None and (not said.is_neutral or (whole and said.transfer != "srgb")):
         raise InputError(

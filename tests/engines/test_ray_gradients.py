@@ -16,9 +16,10 @@ import vcc
 from tests.physics.random_cameras import BENT, drawn
 from vcc.base.errors import InputError
 from vcc.base.units import mm
-from vcc.engines import ray_numbers, reference
-from vcc.engines.reference_ray_numbers import ray_numbers_back
-from vcc.plan.numbers import numbers, with_numbers
+from vcc.engines import ray_gradients as compiled
+from vcc.engines import reference
+from vcc.engines.reference_ray_gradients import ray_gradients
+from vcc.plan.parameters import parameters, with_parameters
 from vcc.plan.rays.bounds.windows import CellWindows
 from vcc.plan.rays.edges import EDGES
 from vcc.shapes import kernels, patterns
@@ -109,7 +110,7 @@ def wanted(core):
     of_edges = {f"steps[{n}].{name}" for n, step in enumerate(core.steps) for name in EDGES.get(type(step), ())}
     return [
         name
-        for name, value in numbers(core).items()
+        for name, value in parameters(core).items()
         if value.size and not any(name == edge or name.startswith(f"{edge}.") for edge in of_edges)
     ]
 
@@ -138,18 +139,18 @@ CASES += ["lenses, 1", "one mask, 1", "two masks, 1", "blur, 1", *OWN]
 def test_the_reference_agrees_with_difference_quotients(name):
     core, values, raster = case(name)
     names, random = wanted(core), np.random.default_rng(11)
-    told = ray_numbers_back(core, values, raster, names)
+    told = ray_gradients(core, values, raster, names)
     assert list(told) == names
     picture = reference.run(core, values, threads=1).values
     size = float(np.abs(picture * raster).sum())
     for each in names:
-        value, gradient = numbers(core)[each], told[each]
+        value, gradient = parameters(core)[each], told[each]
         assert gradient.shape == value.shape
         way = direction(each, value, gradient, random)
         slope, both = float((gradient * way).sum()), float(np.abs(gradient * way).sum())
         # What changes nothing must not: it is moved by a share of what it is.
         step = STEP * (size / both if both > 0 else float(np.abs(value[np.isfinite(value)]).max(initial=1e-6)))
-        changed = [with_numbers(core, {each: value + sign * step * way}) for sign in (1, -1)]
+        changed = [with_parameters(core, {each: value + sign * step * way}) for sign in (1, -1)]
         ahead, behind = (
             float((reference.run(other, values, threads=1).values * raster).sum()) for other in changed
         )
@@ -167,11 +168,11 @@ def test_compiled_rays_agree_with_the_reference(name):
     core, values, raster = case(name)
     values = values.astype(np.float32)
     names, size = wanted(core), np.abs(reference.run(core, values, threads=1).values * raster).sum()
-    right = ray_numbers_back(core, values, raster, names, beside=1)
-    told = ray_numbers.ray_numbers_back(core, values, raster, names, beside=1, threads=2)
+    right = ray_gradients(core, values, raster, names, beside=1)
+    told = compiled.ray_gradients(core, values, raster, names, beside=1, threads=2)
     assert list(told) == names
     for each in names:
-        number = numbers(core)[each]
+        number = parameters(core)[each]
         rounding = 1e-14 * size / np.abs(number[np.isfinite(number)]).max(initial=1e-6)
         largest = np.abs(right[each]).max(initial=0)
         np.testing.assert_allclose(told[each], right[each], rtol=0, atol=1e-5 * largest + rounding, err_msg=each)
@@ -185,7 +186,7 @@ def test_any_number_of_threads_makes_the_same_bytes():
     values, raster = random.random(core.views, np.float32), random.standard_normal((70, 40, 1))
     names = wanted(core)
     one, two, three = (
-        ray_numbers.ray_numbers_back(core, values, raster, names, threads=threads) for threads in (1, 2, 3)
+        compiled.ray_gradients(core, values, raster, names, threads=threads) for threads in (1, 2, 3)
     )
     for each in names:
         assert np.any(one[each]) == (each != "points")
@@ -207,6 +208,6 @@ def test_the_cases_go_by_all_ways():
 def test_what_moves_only_an_edge_is_refused():
     core, values, raster = case("zeros and cosines")
     edge = next(f"steps[{n}].radius" for n, step in enumerate(core.steps) if type(step).__name__ == "Disc")
-    for engine in (ray_numbers_back, ray_numbers.ray_numbers_back):
+    for engine in (ray_gradients, compiled.ray_gradients):
         with pytest.raises(InputError, match="is a hard edge inside the path of rays"):
             engine(core, values, raster, [edge])

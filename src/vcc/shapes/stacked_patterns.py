@@ -219,7 +219,7 @@ class Product(Pattern):
         """
         factors = self.factors
         placed = [(f.pattern, f.middle) if isinstance(f, Shifted) else (f, (0.0, 0.0)) for f in factors]
-        factors = tuple(factors[n] for n in not_clear_beside_others(placed, (Circle, Tiles)))
+        factors = tuple(factors[n] for n in not_clear_next_to_others(placed, (Circle, Tiles)))
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if not factors:
             return np.ones(np.broadcast_shapes(x.shape, y.shape))
@@ -326,7 +326,7 @@ def dark_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:
     return np.asarray(((low >= half) | (high <= -half)).any(axis=-1))
 
 
-def not_clear_beside_others(
+def not_clear_next_to_others(
     patterns: list[tuple[Pattern, tuple[float, float]]], kinds: tuple[type[Pattern], ...] = (Circle,)
 ) -> tuple[int, ...]:
     """Which patterns of one plane cut light off: what is clear all over another of them does not.

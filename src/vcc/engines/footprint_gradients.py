@@ -1,4 +1,4 @@
-"""From the weights of a raster back to the numbers of footprints, by compiled loops: see `numbers_back`.
+"""From the weights of a raster back to the numbers of footprints, by compiled loops: see `footprint_gradients`.
 
 With I(y, x) = scale · Σ L · w · Π T · F_y · F_x and weights G of I, the weights are first mixed into the columns
 of the samples of one column of view taps, H(y, k) = Σ_x F_x · G, and by the slopes of F_x, if places along x are
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
-from vcc.engines import footprint_number_kernels as kernels
+from vcc.engines import footprint_gradient_kernels as kernels
 from vcc.engines import footprint_tables as tables
 from vcc.engines.footprint_axes import axes
 from vcc.engines.footprint_samples import (
@@ -40,7 +40,7 @@ from vcc.engines.footprint_samples import (
     textures,
     view_of,
 )
-from vcc.engines.vector_sums import EIGHT, LANES, room
+from vcc.engines.vector_sums import EIGHT, LANES, aligned_buffer
 from vcc.plan.footprints.model import Footprints
 
 Array = NDArray[np.float64]
@@ -78,7 +78,7 @@ NEEDED = {
 """Which of them each number takes."""
 
 
-def numbers_back(
+def footprint_gradients(
     core: Footprints,
     values: NDArray[Any],
     raster: NDArray[np.floating],
@@ -95,7 +95,7 @@ def numbers_back(
         core: what is computed.
         values: the samples, (v, u, t, s[, channels]).
         raster: weights of the raster's values, (rows, columns, channels).
-        wanted: names of the core's numbers (`vcc.plan.numbers.numbers`).
+        wanted: names of the core's numbers (`vcc.plan.parameters.numbers`).
         threads: how many work at once. The same bytes for any number.
         progress: called with (done, total).
 
@@ -193,7 +193,7 @@ class _ByColumns:
 
     def turned(self, raster: NDArray[np.float32], width: int) -> NDArray[np.float32]:
         """The raster, eight rows side by side, with zeros beyond the last column."""
-        tiles = room(-(-len(raster) // EIGHT), raster.shape[1] + width * self.channels, EIGHT)
+        tiles = aligned_buffer(-(-len(raster) // EIGHT), raster.shape[1] + width * self.channels, EIGHT)
         tiles[:] = 0
         list(self.pool.map(lambda tile: kernels.turned(raster, tile, tiles), range(len(tiles))))
         return tiles
@@ -239,10 +239,10 @@ class _ByColumns:
         shares = self.gathered[a]
         length = (span.stop - span.start) * self.channels
         height = EIGHT * len(self.tiles) + self.reached.shares.shape[3]
-        mixed = room(len(shares), height, length)
+        mixed = aligned_buffer(len(shares), height, length)
         kernels.mix(self.tiles, tables.Gathered(self.first[a], shares), span, self.channels, mixed)
         given = mixed, self.reached, self.pairs, self.weights[:, a] * self.core.scale
-        kernels.add_numbers(
+        kernels.add_gradients(
             samples, a, used, fine, given, masks, sought._replace(places=places), self.channels, span, totals
         )
         return totals, places
@@ -252,11 +252,11 @@ class _ByColumns:
         met = self.masks.at(a, self.held.size) or no_masks()
         if self.texture.any():
             if len(self.lines) < len(met.lines):
-                self.lines = room(*met.lines.shape)
+                self.lines = aligned_buffer(*met.lines.shape)
             self.lines[:] = 0
         if self.place.any():
             if len(self.slopes) < len(met.lines):
-                self.slopes = room(*met.lines.shape)
+                self.slopes = aligned_buffer(*met.lines.shape)
                 self.slopes[:] = 0  # and so beyond the samples' last column
             list(self.pool.map(self.look_up, self.masks.pieces))
         return met, tables.Sought(self.lines, self.slopes, self.texture, self.place, np.zeros((0, 0, 6)))

@@ -8,7 +8,7 @@ import pytest
 from vcc.base.units import mm
 from vcc.shapes import patterns
 from vcc.shapes.patterns import Bounded, Cells, Circle, CosineSum, Open, Polygon, as_pattern
-from vcc.shapes.sheets import Product, Shifted, Tiles, in_one_plane, not_clear_beside_others
+from vcc.shapes.stacked_patterns import Product, Shifted, Tiles, in_one_plane, not_clear_next_to_others
 
 CHECKERS = np.indices((8, 8)).sum(axis=0) % 2.0
 GRID = np.linspace(-5 * mm, 5 * mm, 43)[None, :], np.linspace(-4.6 * mm, 5.2 * mm, 37)[:, None]
@@ -114,8 +114,8 @@ def test_a_single_pattern_in_the_middle_of_a_plane_stays_itself():
 def test_a_round_hole_that_is_clear_all_over_another_pattern_says_nothing():
     narrow, wide = patterns.Circle(2 * mm), patterns.Circle(20 * mm)
     here, aside, cells = (1 * mm, 0.0), (0.0, 8 * mm), patterns.Cells(np.eye(4), 3 * mm, 3 * mm)
-    assert not_clear_beside_others([(narrow, here), (wide, aside)]) == (0,)
-    assert not_clear_beside_others([(wide, aside), (cells, here)]) == (1,)
+    assert not_clear_next_to_others([(narrow, here), (wide, aside)]) == (0,)
+    assert not_clear_next_to_others([(wide, aside), (cells, here)]) == (1,)
     # It cuts a corner; and of two that are one, one stays.
-    assert not_clear_beside_others([(narrow, here), (wide, (0.0, 9.6 * mm))]) == (0, 1)
-    assert not_clear_beside_others([(narrow, here), (narrow, here)]) == (0, 1)
+    assert not_clear_next_to_others([(narrow, here), (wide, (0.0, 9.6 * mm))]) == (0, 1)
+    assert not_clear_next_to_others([(narrow, here), (narrow, here)]) == (0, 1)

@@ -16,8 +16,8 @@ import pytest
 import tifffile
 
 import vcc
+from vcc.files.image_metadata import LONGEST, CameraMark, ImageMetadata, metadata_of, parsed
 from vcc.files.pictures import read_grey
-from vcc.files.statement import LONGEST, CameraMark, Statement, parsed, statement_of
 from vcc.sources.textures import Picture
 from vcc.units import mm, um
 
@@ -132,7 +132,7 @@ def test_pictures_come_back(
     half_a_code = 0.501 * CODE / (2**bits - 1) / exposure if bits else 0  # encoded in float32
     assert np.abs(back.values - lies.values).max() <= half_a_code
     back.save(tmp_path / "again.npy", upright=False)
-    assert statement_of(tmp_path / "again.npy").camera == back.camera  # type: ignore[union-attr]
+    assert metadata_of(tmp_path / "again.npy").camera == back.camera  # type: ignore[union-attr]
 
 
 def test_what_clipped_is_said(tmp_path: Path) -> None:
@@ -166,7 +166,7 @@ def test_recordings_come_back(ending: str, color_filter: str | None, tmp_path: P
 
 def test_files_that_say_nothing_are_refused(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.ones((2, 2), np.float32))
-    assert statement_of(tmp_path / "a.npy") is None
+    assert metadata_of(tmp_path / "a.npy") is None
     with pytest.raises(vcc.InputError, match=r"a\.npy does not say what its numbers are: .*read_picture"):
         vcc.load_image(tmp_path / "a.npy")
     with pytest.raises(vcc.InputError, match="does not say what its numbers are, not those of a recording"):
@@ -189,7 +189,7 @@ def test_numbers_that_another_program_changed_are_noticed(tmp_path: Path) -> Non
 
 def test_statements_of_others_and_damaged_ones() -> None:
     numbers = np.ones((2, 2), np.float32)
-    whole = Statement("light").text(numbers)
+    whole = ImageMetadata("light").text(numbers)
     found = parsed(whole)
     assert found is not None
     assert found.fits(numbers)

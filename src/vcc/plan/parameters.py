@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Thing = TypeVar("Thing")
 
 
-def numbers(thing: Any) -> dict[str, Array]:
+def parameters(thing: Any) -> dict[str, Array]:
     """All floating-point leaves of a dataclass, tuple, array or number, by name, as float64.
 
     Args:
@@ -31,7 +31,7 @@ def numbers(thing: Any) -> dict[str, Array]:
     return dict(_leaves(thing, ""))
 
 
-def with_numbers(thing: Thing, changed: Mapping[str, Any]) -> Thing:
+def with_parameters(thing: Thing, changed: Mapping[str, Any]) -> Thing:
     """The same with some of its numbers changed; those that are not named stay what they are.
 
     Args:

@@ -16,7 +16,7 @@ import vcc
 from tests.physics.random_cameras import AFFINE, drawn
 from vcc.base.units import mm
 from vcc.fields.grid import Block
-from vcc.run.needed import Needed, needed, needed_by_all
+from vcc.run.required_samples import RequiredSamples, required_by_all, required_samples
 from vcc.shapes.patterns import CosineSum
 from vcc.store import StoredLightField, save_store
 
@@ -94,22 +94,22 @@ def test_the_pixels_are_those_that_the_sensor_sees(tmp_path):
     """In focus each pixel of a view falls on one of the sensor: those, and what interpolation looks at beside."""
     stored = save_store(light_field(), tmp_path / "a.zarr")
     camera = vcc.Camera([LENS], vcc.Sensor(FOCUS, (8, 10), FOCUS * 2e-3))
-    plan, samples = needed(camera.compile(stored), stored)
-    assert isinstance(samples, Needed)
+    plan, samples = required_samples(camera.compile(stored), stored)
+    assert isinstance(samples, RequiredSamples)
     assert plan.grid_shape == samples.grid.shape == (*SHAPE[:2], *samples.grid.shape[2:])
     for size, (first, stop) in zip((8, 10), samples.block.ranges[2:], strict=True):
         assert size <= stop - first <= size + 12
     middle = [(first + stop) / 2 for first, stop in samples.block.ranges[2:]]
     np.testing.assert_allclose(middle, [20, 24], atol=1)
-    assert needed(plan, samples)[1].grid.shape == samples.grid.shape
-    by_rays = needed(camera.compile(stored, method="rays"), stored)[1]
-    assert isinstance(by_rays, Needed)
+    assert required_samples(plan, samples)[1].grid.shape == samples.grid.shape
+    by_rays = required_samples(camera.compile(stored, method="rays"), stored)[1]
+    assert isinstance(by_rays, RequiredSamples)
     for size, one, other in zip((8, 10), by_rays.block.ranges[2:], samples.block.ranges[2:], strict=True):
         assert size <= one[1] - one[0] <= size + 8
         np.testing.assert_allclose(sum(one), sum(other), atol=2)
     plate = vcc.PhasePlate(vcc.surfaces.Cubic(5.0), diameter=7 * mm)  # its rays may look anywhere
     bent = vcc.Camera([LENS, plate], camera.sensor).compile(stored, method="rays")
-    assert needed(bent, stored) == (bent, stored)
+    assert required_samples(bent, stored) == (bent, stored)
 
 
 def test_all_samples_that_rays_look_at_are_needed(tmp_path):
@@ -153,8 +153,8 @@ def test_of_several_cameras_all_that_any_of_them_needs_is_read(tmp_path):
     views = [plan.used_views(SHAPE) for plan in plans]
     assert (views[0] & ~views[1]).any()
     assert (views[1] & ~views[0]).any()
-    cut, part = needed_by_all(plans, stored)
-    assert isinstance(part, Needed)
+    cut, part = required_by_all(plans, stored)
+    assert isinstance(part, RequiredSamples)
     each = [plan.used_pixels(SHAPE) for plan in plans]
     for view in np.ndindex(SHAPE[:2]):
         there = [one[view] for one in each if (one[view][:, 1] > one[view][:, 0]).all()]
@@ -194,17 +194,17 @@ def test_where_all_is_needed_nothing_is_cut(tmp_path):
     pitch = FOCUS * 2e-3
     whole = vcc.Camera([LENS], vcc.Sensor(FOCUS, (60, 70), pitch))
     plan = whole.compile(stored)
-    assert needed(plan, stored) == (plan, stored)
+    assert required_samples(plan, stored) == (plan, stored)
     for shape, axis in (((60, 10), 3), ((10, 70), 2)):
         camera = vcc.Camera([LENS], vcc.Sensor(FOCUS, shape, pitch))
-        part = needed(camera.compile(stored), stored)[1]
-        assert isinstance(part, Needed)
+        part = required_samples(camera.compile(stored), stored)[1]
+        assert isinstance(part, RequiredSamples)
         assert part.grid.shape[axis] < SHAPE[axis]
         assert part.grid.shape[5 - axis] == SHAPE[5 - axis]
     # One that looks at none of the samples, and one beside another that stays.
     aside = vcc.Camera([LENS], vcc.Sensor(FOCUS, (4, 4), pitch, decentre=(1.0, 0.0))).compile(stored)
-    assert needed(aside, stored) == (aside, stored)
+    assert required_samples(aside, stored) == (aside, stored)
     few = vcc.Camera([LENS], vcc.Sensor(FOCUS, (8, 10), pitch)).compile(stored)
-    assert needed_by_all([few, plan], stored) == ([few, plan], stored)
+    assert required_by_all([few, plan], stored) == ([few, plan], stored)
     in_memory = light_field()
-    assert needed(few, in_memory) == (few, in_memory)
+    assert required_samples(few, in_memory) == (few, in_memory)

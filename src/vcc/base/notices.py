@@ -13,7 +13,7 @@ MANY_KINDS = 5
 """Kinds of remarks on pictures that are still passed on."""
 
 
-class Remarks:
+class Notices:
     """What is remarked on pictures while they are made."""
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class Remarks:
             share = f"{count} of {total} {of}, one of them: " if total > 1 else ""
             warn_of_result(f"{share}{self._first[kind]}")
 
-    def add(self, other: Remarks) -> None:
+    def add(self, other: Notices) -> None:
         """Take note of what was remarked elsewhere."""
         self._kinds += other._kinds
         self._first = {**other._first, **self._first}
