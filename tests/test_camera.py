@@ -172,3 +172,53 @@ def test_what_is_said_of_a_picture_is_said_at_the_readers_line(verb):
     with pytest.warns(vcc.ResultWarning, match="of the rays that this camera asks for") as said:
         verb(lens_beyond_the_views, light_field())
     assert {each.filename for each in said} == {__file__}
+
+
+def test_a_camera_is_focused_again():
+    camera = vcc.Camera.focused([vcc.Lens(50 * mm)], vcc.Sensor(0, (4, 4), 1e-5), 1.0, name="mine")
+    moved = camera.focused_at(2.0)
+    assert moved.sensor.z == pytest.approx(1 / (1 / 0.05 - 1 / 2.0))
+    assert (moved.elements, moved.name) == (camera.elements, "mine")
+
+
+def test_parts_of_a_camera_are_replaced_by_name():
+    lens, mask = vcc.Lens(50 * mm), vcc.Mask(np.eye(3), width=3 * mm, z=20 * mm, name="code")
+    camera = vcc.Camera([lens, mask], vcc.Sensor(52 * mm, (4, 4), 1e-5), name="mine")
+    other = camera.replace(code=vcc.Mask(np.ones((2, 2)), width=4 * mm, z=10 * mm), lens=vcc.Lens(60 * mm))
+    assert [element.label for element in other.elements] == [vcc.Lens(60 * mm).label, 'mask "code"']
+    assert (other.elements[1].z, other.sensor, other.name) == (10 * mm, camera.sensor, "mine")
+    assert camera.replace(elements=[lens], name="bare") == vcc.Camera([lens], camera.sensor)
+    with pytest.raises(vcc.InputError, match="no element is called 'mask': this camera has lens, code"):
+        camera.replace(mask=mask)
+    two = vcc.Camera([lens, vcc.Lens(60 * mm, z=1 * mm)], camera.sensor)
+    with pytest.raises(vcc.InputError, match="several elements are called 'lens'"):
+        two.replace(lens=lens)
+
+
+@pytest.mark.parametrize("pixels", [3, 4, 9, 10])
+def test_a_plenoptic_camera_by_its_sensor(pixels):
+    """Of n pixels across a micro-image, 1 + 2·floor((n − 1)/2) views each way are decoded."""
+    given = {"lenslet_pitch": 0.2 * mm, "f_number": 6.3, "focus_distance": 1.3}
+    one = vcc.Camera.plenoptic(50 * mm, pixels_per_lenslet=pixels, lenslets=(11, 21), **given)
+    size = tuple(count * one.sensor.pitch for count in one.sensor.shape)
+    assert vcc.Camera.plenoptic(50 * mm, sensor_size=size, pixel_pitch=one.sensor.pitch, **given) == one
+    assert vcc.recover.Decoder.of(one).views == (1 + 2 * ((pixels - 1) // 2),) * 2
+    for wrong in ({}, {"pixels_per_lenslet": 3}, {"lenslets": (3, 3), "sensor_size": size, "pixel_pitch": 1e-5}):
+        with pytest.raises(vcc.InputError, match="give both of one pair"):
+            vcc.Camera.plenoptic(50 * mm, **given, **wrong)
+
+
+@pytest.mark.parametrize(
+    ("guess", "hint"),
+    [
+        (lambda: vcc.patterns.MURA, "Did you mean mura"),
+        (lambda: vcc.patterns.Disk, "Did you mean Circle"),
+        (lambda: vcc.load_light_field, "Did you mean open_light_field"),
+        (lambda: vcc.lens, "Did you mean Lens"),
+        (lambda: vcc.PhasePlate.cubic, r"write PhasePlate\(surfaces\.Cubic"),
+        (lambda: vcc.nothing_like_it, "has no attribute 'nothing_like_it'$"),
+    ],
+)
+def test_wrong_guesses_get_a_hint(guess, hint):
+    with pytest.raises(AttributeError, match=hint):
+        guess()

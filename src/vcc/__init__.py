@@ -99,6 +99,19 @@ _MODULES = {
     "units",
 }
 
+_INSTEAD = {
+    "load_light_field": "open_light_field",
+    "read_light_field": "open_light_field",
+    "open_camera": "load_camera",
+    "open_image": "load_image",
+    "microlenses": "LensArray",
+    "microlensarray": "LensArray",
+    "aperture": "Mask(patterns.Circle(diameter), width=...)",
+    "stop": "Mask(patterns.Circle(diameter), width=...)",
+    "capture": "Camera.capture",
+}
+"""Names that users of other programs try, in lower case, and what to write here."""
+
 __all__ = [*sorted(_HOMES), *sorted(_MODULES)]
 
 
@@ -110,7 +123,11 @@ def __getattr__(name: str) -> Any:
         return getattr(importlib.import_module(_HOMES[name]), name)
     if name in _MODULES:
         return importlib.import_module(f"vcc.{name}")
-    raise AttributeError(f"module 'vcc' has no attribute {name!r}")
+    if name.startswith("__"):
+        raise AttributeError(f"module 'vcc' has no attribute {name!r}")
+    from vcc.base.hints import no_such_name
+
+    raise no_such_name("vcc", name, __all__, _INSTEAD)
 
 
 def __dir__() -> list[str]:

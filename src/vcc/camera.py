@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
@@ -51,6 +52,15 @@ def _check_of_the_run(options: Options) -> None:
             )
 
 
+def _place_of(name: str, elements: Sequence[Element]) -> int:
+    """The index of the element of a name, or of a kind."""
+    called = [element.name or element.kind.replace(" ", "_") for element in elements]
+    if called.count(name) == 1:
+        return called.index(name)
+    found = "several elements are" if name in called else "no element is"
+    raise InputError(f"{found} called {name!r}: this camera has {', '.join(called) or 'no elements'}")
+
+
 class Camera(Train):
     """Elements along an axis and a sensor behind them.
 
@@ -87,6 +97,45 @@ class Camera(Train):
         train = focused_train(elements, sensor, distance)
         return cls(train.elements, train.sensor, name=name)
 
+    def focused_at(self, distance: float) -> Self:
+        """The same camera with its sensor moved to where a point is sharp; see `Camera.focused`.
+
+        Args:
+            distance: Z, from the point to the entrance plane, metres, above 0; ``math.inf`` for a distant scene.
+
+        Raises:
+            InputError: as in `Camera.focused`.
+        """
+        return type(self).focused(self.elements, self.sensor, distance, name=self.name)
+
+    def replace(
+        self,
+        *,
+        elements: Iterable[Element] | None = None,
+        sensor: Sensor | None = None,
+        name: str | None = None,
+        **by_name: Element,
+    ) -> Self:
+        """The same camera with some of its parts replaced.
+
+        ``camera.replace(code=dataclasses.replace(mask, z=30 * mm))`` replaces the element named "code".
+
+        Args:
+            elements: all elements; None keeps them.
+            sensor: None keeps it.
+            name: None keeps it.
+            by_name: new elements by the name of the element that each replaces; an element without a name is
+                called by its kind, such as ``lens`` or ``lens_array``, if it is the only one of its kind.
+
+        Raises:
+            InputError: no element, or several, of such a name; or as for the camera itself.
+        """
+        listed = list(self.elements if elements is None else elements)
+        for wanted, new in by_name.items():
+            place = _place_of(wanted, listed)
+            listed[place] = new if new.name else dataclasses.replace(new, name=listed[place].name)
+        return type(self)(listed, sensor or self.sensor, name=self.name if name is None else name)
+
     @classmethod
     def plenoptic(
         cls,
@@ -94,8 +143,10 @@ class Camera(Train):
         *,
         lenslet_pitch: float,
         f_number: float,
-        pixels_per_lenslet: int,
-        lenslets: tuple[int, int],
+        pixels_per_lenslet: int | None = None,
+        lenslets: tuple[int, int] | None = None,
+        sensor_size: tuple[float, float] | None = None,
+        pixel_pitch: float | None = None,
         focus_distance: float = math.inf,
         electronics: Electronics | None = None,
         name: str = "",
@@ -104,23 +155,40 @@ class Camera(Train):
 
         F-numbers match, so that micro-images touch and do not overlap (Ng et al. 2005): with b from lenslets to
         sensor, d from main lens to lenslets and the pitch p, b = f_number · p and the main lens is
-        D = d·p·(1 + b/d)/b wide. A micro-image is p·(1 + b/d) wide, so many pixels across.
+        D = d·p·(1 + b/d)/b wide. A micro-image is p·(1 + b/d) wide.
+
+        Two ways give the sensor: ``pixels_per_lenslet`` and ``lenslets``, or ``sensor_size`` and ``pixel_pitch``.
+
+        Decoding counts views from the middle of a micro-image, a pixel apart, and uses no pixel that two
+        micro-images share: n pixels across give 1 + 2·floor((n − 1)/2) views each way. 9 pixels give 9×9 views,
+        4 pixels give 3×3. `vcc.recover.Decoder.of(camera).views` returns their number.
 
         Args:
             focal_length: of the main lens, metres.
             lenslet_pitch: p, metres.
             f_number: of the lenslets, b/p, and of the main lens as the sensor sees it, (d + b)/D.
-            pixels_per_lenslet: across one micro-image: as many views each way.
+            pixels_per_lenslet: pixels across one micro-image.
             lenslets: (rows, columns): the pixels of a view.
+            sensor_size: (height, width) of the sensor, metres; whole pixels that fit are used.
+            pixel_pitch: metres; micro-images need not be whole numbers of pixels.
             focus_distance: of the plane that the main lens images on the lenslets, metres; may be infinite.
             electronics: of the sensor.
             name: as for the camera itself.
 
         Raises:
-            InputError: a length or f-number of 0 or less, no whole numbers of pixels and lenslets, or a distance
-                within the focal length.
+            InputError: a length or f-number of 0 or less, no whole numbers of pixels and lenslets, a sensor given
+                in neither or in both ways, or a distance within the focal length.
         """
-        design = Plenoptic(focal_length, lenslet_pitch, f_number, pixels_per_lenslet, lenslets, focus_distance)
+        design = Plenoptic(
+            focal_length,
+            lenslet_pitch,
+            f_number,
+            pixels_per_lenslet,
+            lenslets,
+            focus_distance,
+            sensor_size,
+            pixel_pitch,
+        )
         return cls(design.elements, design.sensor(electronics), name=name)
 
     def compile(

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import operator
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from numbers import Real
 from os import PathLike
 from typing import Any
 
@@ -87,6 +90,89 @@ class Image(Shown):
         """The values as a float32 NumPy array, wherever they are."""
         return to_numpy(self.values).astype(np.float32, copy=False)
 
+    def __add__(self, other: Any) -> Any:
+        """The sum of two images of one frame, or of an image and a number; see `_combined`."""
+        return self._combined(other, operator.add, "added to")
+
+    def __sub__(self, other: Any) -> Any:
+        """The difference of two images of one frame, or of an image and a number."""
+        return self._combined(other, operator.sub, "subtracted from")
+
+    def __mul__(self, factor: Any) -> Any:
+        """The image times a number."""
+        return self._scaled(factor, operator.mul)
+
+    def __truediv__(self, divisor: Any) -> Any:
+        """The image divided by a number."""
+        return self._scaled(divisor, operator.truediv)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def _combined(self, other: Any, operation: Callable[[Any, Any], Any], what: str) -> Any:
+        """Sum or difference; of two images the result misses as many rays as the worse, and errors add up.
+
+        Raises:
+            InputError: images of different shapes, frames or orientations.
+        """
+        if isinstance(other, Real):
+            return replace(self, values=operation(self.values, float(other)))
+        if not isinstance(other, Image):
+            raise TypeError(
+                f"a {type(other).__name__} cannot be {what} an image: calculate with np.asarray(image)"
+            )
+        if (self.shape, self.frame, self.inverted) != (other.shape, other.frame, other.inverted):
+            raise InputError(
+                f"{other!r} cannot be {what} {self!r}: shape, frame and inverted must agree. Without frames, "
+                "calculate with np.asarray(image)"
+            )
+        return replace(
+            self,
+            values=operation(self.values, other.values),
+            missing_rays=max(self.missing_rays, other.missing_rays),
+            sampling_error=self.sampling_error + other.sampling_error,
+            camera=self.camera if self.camera == other.camera else None,
+        )
+
+    def _scaled(self, factor: Any, operation: Callable[[Any, Any], Any]) -> Any:
+        if not isinstance(factor, Real):
+            raise TypeError(
+                f"an image is multiplied or divided by a number, not by a {type(factor).__name__}: use "
+                "np.asarray(image)"
+            )
+        values = operation(self.values, float(factor))
+        return replace(self, values=values, sampling_error=abs(operation(self.sampling_error, float(factor))))
+
+    def to_xarray(self) -> Any:
+        """The image as an `xarray.DataArray` with the positions of its pixels; needs the package xarray.
+
+        Returns:
+            Dimensions (y, x[, channel]). Coordinates x, y: middles of the pixels on the sensor, metres, x
+            to the right and y down. Attributes: missing_rays, sampling_error, inverted.
+
+        Raises:
+            InputError: xarray is not installed, or the pixels are rotated or sheared.
+        """
+        linear, offset = self.frame.linear, self.frame.offset
+        if linear[0, 1] or linear[1, 0]:
+            raise InputError("pixels of this image are rotated or sheared: they have no coordinates along x and y")
+        try:
+            import xarray
+        except ImportError:
+            raise InputError("to_xarray needs the package xarray: pip install xarray") from None
+        rows, columns = self.shape[:2]
+        places = {
+            "y": ("y", offset[1] + linear[1, 1] * np.arange(rows), {"units": "m"}),
+            "x": ("x", offset[0] + linear[0, 0] * np.arange(columns), {"units": "m"}),
+        }
+        about = {
+            "long_name": "irradiance",
+            "missing_rays": self.missing_rays,
+            "sampling_error": self.sampling_error,
+            "inverted": int(self.inverted),  # netCDF has no booleans
+        }
+        axes = ("y", "x", "channel")[: len(self.shape)]
+        return xarray.DataArray(self.to_numpy(), coords=places, dims=axes, name="image", attrs=about)
+
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """The values, for ``numpy.asarray(image)``: as light lands on the sensor, not copied where that can be."""
         return as_array(self.values, dtype, copy)
@@ -122,6 +208,7 @@ class Image(Shown):
 
         - ``.png``: sRGB, 8 bits (or 16), for people
         - ``.tif``, ``.tiff``: sRGB, 16 bits (or 8)
+        - ``.jpg``, ``.jpeg``: sRGB, 8 bits, lossy, for slides; `load_image` does not read it
         - ``.exr``: linear float32, values untouched; channels R, G, B or Y
         - ``.npy``: linear float32, values untouched
 
@@ -134,7 +221,7 @@ class Image(Shown):
                 returned, so that a second picture can be written with the same.
             upright: turn a real image (which lies upside down on the sensor) so that people see it upright.
             bits: bits per sample for PNG and TIFF.
-            format: of a buffer: "png", "tif", "exr" or "npy".
+            format: of a buffer: "png", "tif", "jpg", "exr" or "npy".
 
         Returns:
             The path, the exposure used, the share of clipped pixels, and all that in words. The file appears

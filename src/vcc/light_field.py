@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vcc.base.affine import Affine
+from vcc.base.errors import InputError
 from vcc.camera import Camera
 from vcc.engines import on_gpu
-from vcc.fields.grid import Sample, camera_array_frame
+from vcc.fields.grid import ALL, Beyond, Sample, camera_array_frame
 from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import InMemory, shape_of
 from vcc.fields.view_arrays import in_grid, warn_of_codes
@@ -54,6 +55,24 @@ class LightField(InMemory):
             samples that are NaN, infinite or negative, a frame that is not 5×5 and invertible, another word for
             ``sample``, or a disparity of another shape or that is not finite.
     """
+
+    def __init__(
+        self,
+        values: Any = None,
+        frame: Affine | None = None,
+        disparity_range: tuple[float, float] | None = None,
+        sample: Sample = "mean",
+        disparity: Any = None,
+        extent: tuple[float, float] | None = None,
+        beyond: Beyond = ALL,
+    ) -> None:
+        if values is None or frame is None:
+            raise InputError(
+                f"LightField needs {'values and a frame' if values is None else 'a frame'}: "
+                "LightField.from_views(values, spacing, slope_per_pixel, focus_distance) makes it for views of "
+                "parallel cameras, and vcc.open_light_field reads files"
+            )
+        super().__init__(values, frame, disparity_range, sample, disparity, extent, beyond)
 
     @classmethod
     def from_views(

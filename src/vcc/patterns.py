@@ -6,6 +6,9 @@ a rectangle, never its value at a point: patterns with a closed form give it exa
 raster. Any function of (x, y) can be used as a pattern through `as_pattern`.
 """
 
+from typing import Any
+
+from vcc.base.hints import no_such_name
 from vcc.shapes.patterns import (
     Bounded,
     Cells,
@@ -35,3 +38,19 @@ __all__ = [
     "mura",
     "owned",
 ]
+
+
+_INSTEAD = {
+    "ura": "mura",
+    "pinhole": "Circle(diameter)",
+    "disc": "Circle",
+    "disk": "Circle",
+    "cosine": "CosineSum",
+    "sinusoid": "CosineSum",
+    "random": "Cells(array)",
+    "checkerboard": "Cells(array)",
+}
+
+
+def __getattr__(name: str) -> Any:
+    raise no_such_name(__name__, name, __all__, _INSTEAD)

@@ -101,6 +101,7 @@ LEARNING = {
 """But these: they are for programs that use that library, and nothing else of ours imports them, but by name."""
 
 LATE = {
+    "xarray",
     "numba",
     "scipy",
     "matplotlib",

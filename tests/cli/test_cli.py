@@ -168,7 +168,7 @@ CAPTURE = "capture", "camera.toml", "views"
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((*CAPTURE, "-o", "p.jpg"), 'Error: "p.jpg" cannot be written'),
+        ((*CAPTURE, "-o", "p.gif"), 'Error: "p.gif" cannot be written'),
         ((*CAPTURE, "-o", "lost/p.png"), "there is no folder lost"),
         ((*CAPTURE, "-o", "folder.png"), "is a folder"),
         (("capture", "lost.toml", "views", "-o", "p.npy"), "there is no camera file"),

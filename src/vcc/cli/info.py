@@ -235,7 +235,11 @@ def _missing(places: Iterable[tuple[int, int]], total: int) -> str:
     missing = list(places)
     named = ", ".join(f"({row}, {column})" for row, column in missing[:_NAMED_AT_MOST])
     more = ", …" if len(missing) > _NAMED_AT_MOST else ""
-    return f"{len(missing)} of the {total} views, by (row, column): {named}{more}"
+    return (
+        f"{len(missing)} of the {total} views, by (row, column): {named}{more}. A capture "
+        "raises an error, as it needs all views: add them, or open the others in Python with "
+        "vcc.formats.open_sparse_views"
+    )
 
 
 def _light(views: Views) -> dict[str, str]:

@@ -334,8 +334,8 @@ def counted(place, point):  # type: ignore[no-untyped-def]
 
 @cuda.jit
 def texture_back(products, weights, places, grid, step, m, start, texture):  # type: ignore[no-untyped-def]
-    """texture[i, r, c] += Σ over taps (b, start + p), b = i, i + parts, …, of weight · products · what point (r, c)
-    counts.
+    """texture[i, r, c] += Σ over taps (b, start + p), b = i, i + parts, …, of weight · products · weight of
+    point (r, c).
 
     products: (columns of taps, rows of taps, rows of samples, columns of samples). step: (masks, 2, 2).
     texture: (parts, rows, columns), sums that are put together afterwards.

@@ -297,7 +297,7 @@ def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[
 
     Line by line what `vcc.plan.rays.aim_backwards` says of `CellWindows.aimed`. Sums: of cotangents of an image's
     middle, of these times the place, of its half size, of the cell's centre. ``of_cells``: (cells, kinds, borders)
-    of `vcc.engines.ray_tables.Told`, and room for the sums, (2, 4).
+    of `vcc.engines.ray_tables.RayGradients`, and room for the sums, (2, 4).
     """
     points, start, n, flipped = drawn
     middle, along, half, centre, reach = images[0, 0], images[0, 1], images[0, 2], images[0, 3], images[0, 4]

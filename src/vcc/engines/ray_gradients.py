@@ -73,7 +73,7 @@ def ray_gradients(
     total, pixels = empty(), math.prod(core.raster_shape)
     with Workers(threads) as pool:
 
-        def of_group(tiles: NDArray[np.int64]) -> tables.Told:
+        def of_group(tiles: NDArray[np.int64]) -> tables.RayGradients:
             gradients = empty()
             back(pool.ended, gradients, tiles)
             return gradients
@@ -96,13 +96,13 @@ def _groups(raster_shape: tuple[int, int], size: int) -> list[NDArray[np.int64]]
     return np.array_split(tiles, max(min(GROUPS, len(tiles), GROUPS_BYTES // max(size, 1)), 1))
 
 
-def _nothing(core: Rays, packed: tables.Steps, wanted: set[str]) -> tables.Told:
+def _nothing(core: Rays, packed: tables.Steps, wanted: set[str]) -> tables.RayGradients:
     """Sums of nothing yet, with those of tables where they are wanted."""
     last = {name.rsplit(".", 1)[-1] for name in wanted if name.startswith("steps[")}
     by_shares = any(name.endswith((".values", ".texture.values")) for name in wanted)
     aim = core.aim
     scatters = len(aim.slope_from_scatter) if isinstance(aim, Window) else 0
-    return tables.Told(
+    return tables.RayGradients(
         scale=np.zeros(1),
         sensor=np.zeros(6),
         window=np.zeros(11),
@@ -129,7 +129,7 @@ def _matrices(core: Rays) -> Array:
     return matrices
 
 
-def _named(core: Rays, packed: tables.Steps, gradients: tables.Told) -> dict[str, Array]:
+def _named(core: Rays, packed: tables.Steps, gradients: tables.RayGradients) -> dict[str, Array]:
     """The derivatives by the numbers' names, tables left out that were not summed."""
     named = {
         "first_pixel": gradients.sensor[:2],
@@ -154,7 +154,7 @@ def _square(matrix: Array) -> Array:
     return np.concatenate([matrix, np.zeros(5)]).reshape(5, 5)
 
 
-def _of_window(aim: Window, gradients: tables.Told) -> dict[str, Array]:
+def _of_window(aim: Window, gradients: tables.RayGradients) -> dict[str, Array]:
     s, t, weight = gradients.window[:5], gradients.window[5:10], gradients.window[10]
     (a, b), (c, d) = aim.slope_from_point
     per_determinant = (np.pi if aim.disc else 4.0) * np.sign(np.linalg.det(aim.slope_from_point))
@@ -167,7 +167,7 @@ def _of_window(aim: Window, gradients: tables.Told) -> dict[str, Array]:
     }
 
 
-def _of_cells(aim: CellWindows, gradients: tables.Told) -> dict[str, Array]:
+def _of_cells(aim: CellWindows, gradients: tables.RayGradients) -> dict[str, Array]:
     x, y, rest = gradients.cells[:8], gradients.cells[8:16], gradients.cells[16:]
     sight = (
         "place_from_sensor",
@@ -198,7 +198,7 @@ def _of_lattice(pitch: float, sums: Array) -> dict[str, Array]:
     return {"pitch": sums[0] / pitch, "rotation": sums[1], "offset": sums[2:4]}
 
 
-def _of_step(step: steps.Step, whole: list[int], gradients: tables.Told, own: Array) -> dict[str, Array]:
+def _of_step(step: steps.Step, whole: list[int], gradients: tables.RayGradients, own: Array) -> dict[str, Array]:
     """What a step's sums say of its numbers; ``whole`` is what the kernel was given of it."""
     match step:
         case steps.Move():

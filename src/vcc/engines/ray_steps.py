@@ -363,8 +363,8 @@ def texture_back(table, sizes, real, rays, values, out, own):  # type: ignore[no
 def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[no-untyped-def]
     """Cotangents ``bar`` (5, rays) of a packet behind a step become those before it.
 
-    ``sums``: (steps, matrices, shares, slopes, points) of `vcc.engines.ray_tables.Told`, to which is added what
-    they say of the step's numbers. ``found``: room for two numbers a ray.
+    ``sums``: (steps, matrices, shares, slopes, points) of `vcc.engines.ray_tables.RayGradients`; gradients of the
+    step's parameters are added to them. ``found``: a buffer of two numbers per ray.
     """
     codes, whole, real, shares, slopes = steps
     points, first, n, _ = drawn

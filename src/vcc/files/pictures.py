@@ -23,7 +23,9 @@ from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_
 
 READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
 """The endings that `read_picture` knows."""
-WRITE_ENDINGS = (".png", ".tif", ".tiff", ".exr", ".npy")
+WRITE_ENDINGS = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".exr", ".npy")
+_JPEG = (".jpg", ".jpeg")
+_JPEG_QUALITY = 92
 """The endings that `save_picture` knows."""
 RAW_ENDINGS = (".tif", ".tiff", ".png", ".npy")
 """The endings that `save_numbers` knows."""
@@ -326,19 +328,28 @@ def _save_display(
 ) -> SavedPicture:
     ending = place.ending
     if bits is None:
-        bits = 8 if ending == ".png" else 16
+        bits = 16 if ending in (".tif", ".tiff") else 8
+    if ending in _JPEG and bits != 8:
+        raise InputError(f"{ending} files have 8 bits per sample, not {bits}: write a .png or .tif")
     if bits not in (8, 16):
         raise InputError(f"{ending} files are written with 8 or 16 bits per sample, not {bits}")
     coded = coded_picture(values, exposure, bits, f"as {ending}, which")
     automatic = exposure == "auto"
     said = replace(statement, transfer="srgb", exposure=coded.exposure, automatic=automatic, clipped=coded.clipped)
     with place.opened() as temporary:
-        write_codes(coded.codes, temporary, ending, said)
+        if ending in _JPEG:
+            import imagecodecs
+
+            codes = np.ascontiguousarray(_grey_if_one(coded.codes))
+            temporary.write_bytes(imagecodecs.jpeg8_encode(codes, level=_JPEG_QUALITY))
+        else:
+            write_codes(coded.codes, temporary, ending, said)
+    lossy = ", lossy: vcc cannot load it as an image" if ending in _JPEG else ""
     reason = f" ({auto_in_words(values, coded.exposure)})" if automatic else ""
     below = f", {coded.negative:.2%} below 0 and shown black" if coded.negative > 0 else ""
     description = (
         f"{place.words}: {_size(values)}, {bits}-bit sRGB, exposure {coded.exposure:.6g}{reason}, "
-        f"{coded.clipped:.2%} of the pixels clipped{below}"
+        f"{coded.clipped:.2%} of the pixels clipped{below}{lossy}"
     )
     return SavedPicture(place.path, coded.exposure, coded.clipped, description)
 

@@ -234,6 +234,6 @@ def _refuse_missing(at: dict[tuple[int, int], Path], rows: range, columns: range
     count = total - len(at)
     raise InputError(
         f"{folder} has {len(at)} of the {total} views of its {length(rows)}×{length(columns)} grid; "
-        f"{count} are missing, by (row, column): {first_few(missing, count)}. Incomplete grids are no "
-        "light field: add the missing files, or open those that there are with vcc.formats.open_sparse_views"
+        f"{count} {'is' if count == 1 else 'are'} missing, by (row, column): {first_few(missing, count)}. A "
+        "light field needs all views: add the missing files, or open the others with vcc.formats.open_sparse_views"
     )

@@ -97,9 +97,10 @@ def _line(
     missing = count - len(numbered)
     if missing and (not sparse or count > MOST_PLACES):
         named = (number for number in range(first, first + count * step, step) if number not in numbered)
+        verb = "is" if missing == 1 else "are"
         way_out = "Add them, or open those that there are with vcc.formats.open_sparse_views"
         raise InputError(
-            f"{folder} has {len(numbered)} of {count} numbered views; {missing} are missing: "
+            f"{folder} has {len(numbered)} of {count} numbered views; {missing} {verb} missing: "
             f"{first_few(named, missing)}. {way_out if not sparse else 'Is a number wrong?'}"
         )
     return [numbered.get(first + n * step) for n in range(count)]

@@ -14,6 +14,7 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.describe import parameters_in_words
 from vcc.base.errors import InputError
+from vcc.base.hints import NoSuchMember
 from vcc.base.units import short
 from vcc.optics.deflections import Deflection, SlopeFunction, checked_slopes
 from vcc.optics.faces import Element, Faces
@@ -69,6 +70,10 @@ class PhasePlate(Element):
         InputError: a surface of another type, a size of zero or less, a diameter and a width together, a height
             without a width, or an opening larger than the surface's sheet.
     """
+
+    cubic = NoSuchMember("PhasePlate(surfaces.Cubic(strength))")
+    zernike = NoSuchMember("PhasePlate(surfaces.Zernike(...))")
+    axicon = NoSuchMember("PhasePlate(surfaces.Axicon(...))")
 
     surface: Surface | Callable[[Array, Array], Any]
     diameter: float | None = field(default=None, metadata={"unit": "length"})

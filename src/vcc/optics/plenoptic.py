@@ -21,16 +21,17 @@ class Plenoptic:
     focal_length: float
     lenslet_pitch: float
     f_number: float
-    pixels_per_lenslet: int
-    lenslets: tuple[int, int]
+    pixels_per_lenslet: int | None
+    lenslets: tuple[int, int] | None
     focus_distance: float
+    sensor_size: tuple[float, float] | None = None
+    pixel_pitch: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("focal_length", "lenslet_pitch"):
             checks.above_zero(name, getattr(self, name), unit="m")
         checks.above_zero("f_number", self.f_number)
-        checks.whole_number_between("pixels_per_lenslet", self.pixels_per_lenslet, 1)
-        checks.counts("lenslets", self.lenslets, "rows", "columns")
+        self._check_sensor()
         checks.above_zero("focus_distance", self.focus_distance, unit="m", infinite=True)
         if self.focus_distance <= self.focal_length:
             raise InputError(
@@ -41,6 +42,23 @@ class Plenoptic:
                     if self.focal_length < 1
                     else f"Lengths are metres: did you mean {self.focal_length:g} * mm?"
                 )
+            )
+
+    def _check_sensor(self) -> None:
+        by_lenslets, by_size = (self.pixels_per_lenslet, self.lenslets), (self.sensor_size, self.pixel_pitch)
+        if None not in by_lenslets and by_size == (None, None):
+            checks.whole_number_between("pixels_per_lenslet", self.pixels_per_lenslet, 1)
+            checks.counts("lenslets", self.lenslets, "rows", "columns")
+        elif None not in by_size and by_lenslets == (None, None):
+            checks.above_zero("pixel_pitch", self.pixel_pitch, unit="m")
+            if not isinstance(self.sensor_size, tuple | list) or len(self.sensor_size) != 2:
+                raise InputError(f"sensor_size is (height, width) in metres, not {self.sensor_size!r}")
+            for size in self.sensor_size:
+                checks.above_zero("each side of sensor_size", size, unit="m")
+        else:
+            raise InputError(
+                "the sensor of a plenoptic camera is given by pixels_per_lenslet and lenslets, or by "
+                "sensor_size and pixel_pitch: give both of one pair and none of the other"
             )
 
     @property
@@ -66,14 +84,22 @@ class Plenoptic:
     @property
     def elements(self) -> tuple[Element, ...]:
         """The main lens and the lenslets, which have the axis in their middle."""
-        # Of an even number of lenslets two are as far from the axis.
-        down, across = (self.lenslet_pitch / 2 if count % 2 == 0 else 0.0 for count in self.lenslets)
+        # Of an even number of lenslets two are as far from the axis. Without a number one is on the axis.
+        counts = self.lenslets or (1, 1)
+        down, across = (self.lenslet_pitch / 2 if count % 2 == 0 else 0.0 for count in counts)
         main = Lens(self.focal_length, self.diameter, name="main lens")
         array = LensArray(self.lenslet_pitch, self.gap, offset=(across, down), z=self.to_lenslets, name="lenslets")
         return main, array
 
     def sensor(self, electronics: Electronics | None) -> Sensor:
-        """Behind the lenslets at their focal length, so many pixels for each."""
-        rows, columns = (count * self.pixels_per_lenslet for count in self.lenslets)
-        pitch = self.micro_image / self.pixels_per_lenslet
+        """Behind the lenslets at their focal length."""
+        if self.lenslets is not None and self.pixels_per_lenslet is not None:
+            rows, columns = (count * self.pixels_per_lenslet for count in self.lenslets)
+            pitch = self.micro_image / self.pixels_per_lenslet
+        else:
+            assert self.sensor_size is not None
+            assert self.pixel_pitch is not None
+            pitch = self.pixel_pitch
+            # A side of exactly so many pixels has that many, whatever the division rounds to.
+            rows, columns = (int(size / pitch * (1 + 1e-9)) for size in self.sensor_size)
         return Sensor(self.to_lenslets + self.gap, (rows, columns), pitch, electronics=electronics)
