@@ -64,6 +64,7 @@ def lint(session: nox.Session) -> None:
     session.run("ruff", "check", ".")
     session.run("ruff", "format", "--check", ".")
     session.run("mypy")
+    session.run("python", "tools/words.py")
     session.run("zizmor", "--offline", "--quiet", ".github")
     session.run("repo-review", ".")
 

@@ -382,8 +382,7 @@ class Camera(Train):
         Args:
             light_field: given at the entrance plane; in memory or on disk.
             how: as in `capture`.
-            executor: as in `capture`: what it would take with it is foretold, too, and which to take said. It runs
-                some views for that.
+            executor: as in `capture`; it runs some views, and the times with and without it are estimated.
             progress: called with (done, total) while disparities are found, where they are needed.
             options: as in `capture`.
         """

@@ -62,7 +62,7 @@ def load_camera(path: str | PathLike[str]) -> Camera:
 
 
 def save_camera(camera: Camera, path: str | PathLike[str]) -> None:
-    """Write a camera as TOML, so that `load_camera` gives back an equal one.
+    """Write a camera as TOML, so that `load_camera` returns an equal one.
 
     Arrays are written beside the file, as .npy named after it and the element, in SI; a mask's not if the
     file that it came from is there already. A real lens keeps its lens file if that is beside the camera

@@ -37,7 +37,7 @@ def test_both_times_are_told_and_which_to_take(stored):
             assert 0 < seconds < 1e9
         rays = CAMERA.explain(stored, executor=pool, method="rays")
         assert rays.expected_seconds_by_executor is None
-        assert "not foretold" in rays.splitlines()[-1]
+        assert "not estimated" in rays.splitlines()[-1]
     assert CAMERA.explain(stored).expected_seconds_by_executor is None
 
 

@@ -35,7 +35,7 @@ PLACES_END = 20
 
 
 class Explanation(Shown, str):
-    """Text that shows itself plainly in a notebook or at the prompt."""
+    """Text that shows itself plainly in a notebook or on the command line."""
 
     __slots__ = ("expected_seconds", "expected_seconds_by_executor", "plan")
     plan: Plan
@@ -49,7 +49,7 @@ class Explanation(Shown, str):
 def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: Any = None) -> Explanation:
     """A plan for a light field in words; see `vcc.Camera.explain`.
 
-    The time is foretold by running a part of the plan on the light field and scaling it up.
+    The time is estimated by running a part of the plan on the light field and scaling it up.
 
     Args:
         train: that the plan was made of.
@@ -127,11 +127,11 @@ def of_store(run: Drive) -> tuple[str, float | None]:
     """The section of `vcc.Camera.explain`, and the seconds expected.
 
     Args:
-        run: of which a few views are read, to foretell the time.
+        run: of which a few views are read, to estimate the time.
     """
     lines = [f"  read in {run.blocks.words}", f"  {run.given.stored_bytes / 1e6:.0f} MB on disk, as packed"]
     if run.plan.by_rays:
-        lines.append(f"  {_traced_for(run)}; the time is not foretold")
+        lines.append(f"  {_traced_for(run)}; the time is not estimated")
         return "Light field on disk\n" + "\n".join(lines), None
     seconds = seconds_from_store(run)
     lines.append(f"  about {seconds:.2g} s expected (some views were read and timed on this machine)")
@@ -142,8 +142,8 @@ def of_executor(run: Drive, here: float | None) -> tuple[str, float | None]:
     """The section of `vcc.Camera.explain`, and the seconds expected.
 
     Args:
-        run: by an executor, which runs a few views to foretell the time.
-        here: seconds that all takes without it; None where that is not foretold.
+        run: by an executor, which runs a few views to estimate the time.
+        here: seconds that all takes without it; None where that is not estimated.
     """
     assert run.worker_pool is not None
     blocks, places = len(list(run.blocks)), run.worker_pool.places
@@ -152,7 +152,7 @@ def of_executor(run: Drive, here: float | None) -> tuple[str, float | None]:
     lines = [f"  {run.blocks.words}, {places} at once, {each}"]
     seconds = None
     if run.plan.by_rays:
-        lines.append(f"  {_traced_for(run)}; the time is not foretold")
+        lines.append(f"  {_traced_for(run)}; the time is not estimated")
     else:
         seconds = expected_seconds(run, blocks, max(places, 1))
         lines.append(f"  about {seconds:.2g} s expected (some views were run there and timed)")

@@ -17,14 +17,14 @@ from vcc.plan.rays.model import Rays
 from vcc.run.drive import Drive, sampling_error
 
 PATCH = 32
-"""Pixels a side, and for each thread, of the pieces of the picture that are traced to foretell time and error."""
+"""Pixels a side, and for each thread, of the pieces of the picture that are traced to estimate time and error."""
 PLACES = (0.1, 0.5, 0.9)
 """Where they lie along each axis, as a share of the sensor's size."""
 
 
 @dataclass(frozen=True)
 class _Pilot:
-    """What pieces of the picture foretell of all of it.
+    """What pieces of the picture estimate of all of it.
 
     Args:
         seconds: of a run.
@@ -49,7 +49,7 @@ def sections(run: Drive) -> tuple[list[str], float | None]:
 
 
 def _pilot(run: Drive, core: Rays) -> _Pilot | None:
-    """What tracing pieces of the picture foretells; None where the samples cannot be run, or are not in memory."""
+    """What tracing pieces of the picture estimates; None where the samples cannot be run, or are not in memory."""
     whole = run.samples.whole()
     if whole is None or not has_values(whole):
         return None

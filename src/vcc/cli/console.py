@@ -94,7 +94,7 @@ def progress(task: str) -> Iterator[Progress]:
 
 
 SOON, LONG = 5.0, 30.0
-"""Seconds of work after which its time is foretold, and from which on that is worth a line."""
+"""Seconds of work after which its time is estimated, and from which on that is worth a line."""
 
 
 class _Estimate:
@@ -123,7 +123,7 @@ class _Estimate:
 
 
 def _in_words(seconds: float) -> str:
-    """A time that is foretold, in two digits at most."""
+    """A time that is estimated, in two digits at most."""
     if seconds < 90:
         return f"{max(1, round(seconds / 10)) * 10} s"
     minutes = seconds / 60

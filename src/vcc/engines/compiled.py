@@ -66,7 +66,7 @@ def compiled(borrowing: bool = False, **options: Any) -> Callable[[Callable[...,
 
     Args:
         borrowing: it makes no arrays, and counts no references to those that its callers hold. Functions that were
-            given tuples of arrays for each pixel spent half of their time counting, in all threads by turns.
+            given tuples of arrays for each pixel spent half of their time counting, in all threads alternately.
         options: of `numba.njit`.
     """
 

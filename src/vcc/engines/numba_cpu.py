@@ -42,7 +42,7 @@ SMALL = 2**17
 
 
 TURNS = 8
-"""Pictures that one thread makes by turns, at most: what they read is then in its cache."""
+"""Pictures that one thread interleaves, at most: what they read is then in its cache."""
 TURNS_BYTES = 2**25
 """Bytes of their rasters."""
 

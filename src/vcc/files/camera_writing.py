@@ -1,4 +1,4 @@
-"""Camera files written: an optical train as TOML, so that reading gives back an equal one."""
+"""Camera files written: an optical train as TOML, so that reading returns an equal one."""
 
 from __future__ import annotations
 

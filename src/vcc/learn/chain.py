@@ -1,7 +1,7 @@
 """The way from values of parameters to the numbers of a plan, and from weights of these back to the parameters.
 
-A plan is made anew for each value of its parameters, by choices that were made once (`vcc.plan.choice.decide`), so
-that its numbers are smooth functions of the parameters. The derivative to a parameter is the central difference of
+A plan is recomputed for each value of its parameters, by choices made once (`vcc.plan.choice.decide`), so that
+its numbers are smooth functions of the parameters. The derivative to a parameter is the central difference of
 all numbers that follow it, in double precision. A plan takes milliseconds to make where what costs (textures) did
 not change. What numbers are linear in (the cells of a mask, heights of a plate) is learned by the transposes of
 these maps, all at once (`vcc.plan.following.Linear`).

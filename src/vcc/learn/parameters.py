@@ -359,7 +359,7 @@ def _as_tuple(numbers: Any) -> Any:
 
 
 def _changed(thing: Any, changes: Mapping[Any, Any]) -> Any:
-    """A thing made anew with what is changed in its fields."""
+    """An object recomputed with changed fields."""
     if not changes:
         return thing
     if isinstance(thing, tuple):

@@ -147,7 +147,7 @@ class MovingCamera(Brief):
             options: as in `capture`.
 
         Returns:
-            Text; its plan, and the seconds that are foretold, are those of this moment.
+            Text; its plan, and the seconds that are estimated, are those of this moment.
 
         Raises:
             InputError: as `vcc.Camera.explain`; a video that has not begun then, or is over.

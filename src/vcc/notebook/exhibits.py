@@ -1,4 +1,4 @@
-"""The exhibit of each kind of thing. What is not named here shows its own words, as at the prompt."""
+"""The exhibit of each kind of thing. What is not named here shows its own words, as on the command line."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 A plan is choices (how many taps, how fine a texture, which filter) and numbers. Each module chooses by functions
 ``choose_…``, which give a frozen record, and computes numbers from such records. A picture that is taken once
-chooses stage by stage (`vcc.plan.choice.compile_best`). While a camera learns, its plan is made anew for each
+chooses stage by stage (`vcc.plan.choice.compile_best`). While a camera learns, its plan is recomputed for each
 value of its parameters from one record of all choices (`vcc.plan.choice.decide`, `vcc.plan.choice.compute`): its
 numbers then follow the parameters smoothly.
 """

@@ -2,7 +2,7 @@
 
 A sample's light is spread by a tent one step wide, which leaves sinc²(ν) of a cosine of ν cycles a step; a sample
 that is a mean over its cell has lost sinc(ν) before. Every sample of a light field loses alike, so one filter of
-the finished picture gives back what all of them lost. With x = πν and s = sin² x,
+the finished image compensates the loss. With x = πν and s = sin² x,
 
     (x / sin x)ⁿ = 1 + n/6 s + (11n/180 + n²/72) s² + …,
 

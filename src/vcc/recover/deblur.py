@@ -411,11 +411,11 @@ def _divergence_of(edges: Array) -> Array:
     return found
 
 
-def _divergence(counts: Array, foretold: Array) -> float:
+def _divergence(counts: Array, estimated: Array) -> float:
     """The Kullback–Leibler divergence Σ y·ln(y/m) − y + m."""
     from scipy.special import kl_div
 
-    return float(kl_div(counts, np.maximum(foretold, 1e-12 * max(float(counts.max()), 1e-300))).sum())
+    return float(kl_div(counts, np.maximum(estimated, 1e-12 * max(float(counts.max()), 1e-300))).sum())
 
 
 def _check_noise(noise: float, above: bool) -> None:

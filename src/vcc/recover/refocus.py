@@ -109,7 +109,7 @@ def refocused(
         distance: metres before the light field's plane; may be infinite.
         diameter: of the round aperture, metres; None takes all views. Smaller ones have more depth of field.
         centre: (u, v) of the aperture's middle, metres.
-        interpolation: within a view, see `vcc.Camera.capture`. What ``"sharp"`` gives back it gives back after the
+        interpolation: within a view, see `vcc.Camera.capture`. ``"sharp"`` compensates after the
             division by what the views cover, so that their borders do not ring.
         between_views: whether ghosts of views too far apart are filled, see `vcc.Camera.capture`.
         memory_limit: for a light field on disk, see `vcc.Camera.capture`.
@@ -164,7 +164,7 @@ def refocused(
 
 
 def _sharpened(values: NDArray[np.float64], plan: Plan) -> NDArray[np.float64]:
-    """A picture with what a plan gives back to sharpness; beyond its border it goes on as its edge."""
+    """An image sharpened as a plan does; beyond its border it goes on as its edge."""
     from scipy.ndimage import convolve, convolve1d
 
     for operator in plan.after:

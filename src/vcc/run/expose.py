@@ -28,7 +28,7 @@ AUTO_LEVEL: Final = 0.9
 
 UNDERSHOOT: Final = 0.15
 """Of the largest value: as far below 0 a picture may go beside an edge from dark to its brightest light, by what
-interpolation gives back of sharpness (13 % at a border of the light field itself)."""
+interpolation compensates (13 % at a border of the light field itself)."""
 
 _BLOCK: Final = 2**18
 """Numbers drawn at once: they stay in the cache of a core, and a large sensor has enough blocks for all."""

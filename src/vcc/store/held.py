@@ -1,7 +1,7 @@
 """What a reader holds on to: that what stands under a name is still what it opened.
 
-A folder of Zarr may be replaced, or removed and made anew, while somebody reads it: the metadata that were read
-and the samples that are read next would then be of two. Each states an identity, drawn when it was made, which
+A folder of Zarr may be replaced, or removed and written again, while it is read: metadata that were read and
+samples that are read next would then belong to two. Each states an identity, drawn when it was made, which
 stays while a writer goes on with it; what is older is told by all that it states.
 """
 

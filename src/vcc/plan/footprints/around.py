@@ -100,7 +100,7 @@ class Around(Brief):
         """What is done around a core.
 
         Args:
-            filters: the core, and what gives back what its interpolation takes.
+            filters: the core, and the filter that compensates its interpolation.
             sensor: of the camera.
             tents: which fill gaps between taps' pictures, and from how far they bring in light (`filled`).
             blurs: what diffusers come to.
@@ -134,7 +134,7 @@ class Around(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sharpened(Brief):
-    """A core, and the filter of the picture that gives back what its interpolation takes (`vcc.plan.sharpening`).
+    """A core, and the filter of the image that compensates its interpolation (`vcc.plan.sharpening`).
 
     Args:
         core: which filters samples as it divides them.
@@ -170,7 +170,7 @@ class Sharpened(Brief):
 
     @classmethod
     def of(cls, core: Footprints, sample: Sample, choices: SharpeningChoices) -> Sharpened:
-        """What gives back what linear interpolation takes.
+        """The filter that compensates linear interpolation.
 
         Where samples are divided because a mask is finer than they are, they are filtered as they are divided,
         before the mask; the picture then lacks only what its finer samples lost, each a mean over its own cell.

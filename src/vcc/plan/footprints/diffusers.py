@@ -61,7 +61,7 @@ class KernelChoices:
     Args:
         axes: that the kernel lies along (`vcc.shapes.kernel_weights.axes_of`).
         steps_beside: (rows, columns) of steps on each side of its middle, with room to grow.
-        filters: weights beside the middle of those that give back, (down, across), what sharing out takes.
+        filters: weights on each side of the middle, (down, across), of those that compensate sharing out.
     """
 
     axes: Hashable = choice("axes that the kernel lies along")
