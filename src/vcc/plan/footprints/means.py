@@ -1,8 +1,8 @@
 """Means of patterns over rectangles, as numbers that follow the rectangles and the patterns smoothly.
 
 A pattern without a mean in closed form is sampled on a raster. Computed for each camera alone, its points would
-move with the rectangles, and what is hard in a pattern would jump from point to point. Where numbers follow a camera,
-the raster is chosen once: its points stand still on the pattern, and means are exact for what they show.
+move with the rectangles, and what is hard in a pattern would jump from point to point. Where numbers follow a
+camera, the raster is chosen once: its points stand still on the pattern, and means are exact for what they show.
 """
 
 from __future__ import annotations
