@@ -121,7 +121,10 @@ WRONG = {
         lambda: vcc.LightField.from_views("views", 1.0, 1.0),
         "vcc.open_light_field('views')",
     ),
-    "no frame": (lambda: vcc.LightField(VIEWS, None), "vcc.LightField.from_views(values, spacing=…"),
+    "no frame": (
+        lambda: vcc.LightField(VIEWS, None),
+        "LightField.from_views(values, spacing, slope_per_pixel, focus_distance)",
+    ),
     "spacing in words": (lambda: vcc.open_light_field(".", spacing="2"), "no light field was found"),
     "open an array": (
         lambda: vcc.open_light_field(VIEWS),

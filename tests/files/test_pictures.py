@@ -325,8 +325,8 @@ def test_nothing_is_written_to_a_buffer_of_what_cannot_be_written() -> None:
 @pytest.mark.parametrize(
     ("target", "format", "message"),
     [
-        (io.BytesIO(), None, r"add format=, png, tif, tiff, exr, npy$"),
-        (io.BytesIO(), "jpg", r'format="jpg": there are png'),
+        (io.BytesIO(), None, r"add format=, png, tif, tiff, jpg, jpeg, exr, npy$"),
+        (io.BytesIO(), "gif", r'format="gif": there are png'),
         (io.StringIO(), "png", "takes text: use io.BytesIO"),
         (3, None, "not to a int"),
         ("picture.tif", "png", "does not go with picture.tif"),

@@ -107,7 +107,7 @@ def test_what_is_not_told_and_not_seen(tmp_path: Path) -> None:
 def test_missing_numbers(grid: Views, tmp_path: Path) -> None:
     folder = write(grid, "row-major", tmp_path / "a")
     (folder / "frame_007.png").unlink()
-    with pytest.raises(InputError, match=r"19 of 20 numbered views; 1 are missing: 7\..*open_sparse_views"):
+    with pytest.raises(InputError, match=r"19 of 20 numbered views; 1 is missing: 7\..*open_sparse_views"):
         open_light_field(folder)
     (folder / "frame_019.png").unlink()
     with pytest.raises(InputError, match=r"18 of 20 numbered views; 2 are missing: 7, 19\."):

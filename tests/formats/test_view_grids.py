@@ -241,7 +241,7 @@ def test_hci_without_parameters_must_be_square(square_views: Views, folder_of: W
     folder = folder_of(square_views, hci_name(3))
     np.testing.assert_array_equal(open_light_field(folder, transfer="linear", **GIVEN).values, square_views)
     (folder / "input_Cam004.png").unlink()
-    with pytest.raises(InputError, match=r"8 of the 9 views .*1 are missing.*\(1, 1\)"):
+    with pytest.raises(InputError, match=r"8 of the 9 views .*1 is missing.*\(1, 1\)"):
         read_geometry(folder)
     (folder / "input_Cam008.png").unlink()
     with pytest.raises(InputError, match="not a square grid"):
