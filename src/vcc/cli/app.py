@@ -17,7 +17,7 @@ from vcc.cli.console import notes, say
 
 COMMANDS = {
     "capture": (
-        "Make the picture that a camera records of a light field.",
+        "Capture the image that a camera records of a light field.",
         'vcc capture camera.toml views/ -o picture.png --spacing "1 mm"',
         "vcc capture camera.toml views/ -o picture.exr --interpolation cubic",
         "vcc capture camera.toml scene.zarr -o picture.exr --executor processes",
@@ -31,11 +31,11 @@ COMMANDS = {
         "vcc expose camera.toml views/ -o raw.npy --picture picture.png",
     ),
     "explain": (
-        "Say how a picture would be made, what it costs and what to beware of.",
+        "Report how an image is made, what it costs, and which limits apply.",
         "vcc explain camera.toml views/",
     ),
     "info": (
-        "Say what a light field is: views, cameras, disparities, brightness, and what its files leave open.",
+        "Report views, geometry, disparities and brightness of a light field, and what is unknown.",
         "vcc info views/",
         "vcc info views/ --quick",
         "vcc info views/ --picture grid.png",
@@ -48,14 +48,14 @@ COMMANDS = {
         "vcc plot camera.toml --phase-space --light-field views/",
     ),
     "sweep": (
-        "Make the pictures of many cameras: a camera file whose parameters change.\n\n"
-        "Pictures and a table go to a Zarr group that xarray opens; the same command goes on where it stopped.",
+        "Capture the images of many cameras: a camera file with varied parameters.\n\n"
+        "Images and a table are saved in a Zarr group for xarray; the same command resumes an interrupted sweep.",
         'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" --set "code.pattern=mura,circle" -o all.zarr',
         'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm" --design sobol -o table.csv --sharpness',
         'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" -o all.zarr --sheet all.png --table all.csv',
     ),
     "bench": (
-        "Open the optical bench in the browser: move elements along the axis, and see the picture follow.\n\n"
+        "Open the optical bench in the browser: move elements and see the image change.\n\n"
         "Without a camera and a light field it opens a lens before the demo's scene.",
         "vcc bench",
         "vcc bench --gallery plenoptic",
@@ -87,7 +87,7 @@ COMMANDS = {
         "vcc decode raw.png --centres centres.csv --color-filter BGGR -o field.zarr",
     ),
     "refocus": (
-        "Focus a light field on a distance after the fact, on many, or on all of them.",
+        "Refocus a light field on one distance, on many, or on all.",
         'vcc refocus views/ --distance "1.2 m" -o picture.png',
         'vcc refocus views/ --stack "0.8 m" "3 m" 12 -o stack.mp4',
         "vcc refocus views/ --all-in-focus -o sharp.png",
@@ -98,7 +98,7 @@ COMMANDS = {
         "vcc spectrum scene.zarr -o section.svg --across vt --of section",
     ),
     "gallery": (
-        "Rebuild a published camera, from optics to decoded result, beside what was claimed of it.",
+        "Rebuild a published camera, from optics to decoded result, and compare it with its claims.",
         "vcc gallery",
         "vcc gallery wavefront-coding",
         "vcc gallery biprism-stereo --light-field views/ -o stereo",

@@ -35,7 +35,7 @@ def bench(
     gallery: Annotated[str | None, Parameter(metavar="NAME")] = None,
     reading: Reading = Reading(),
 ) -> None:
-    """Open the optical bench in the browser: move elements along the axis, and see the picture follow.
+    """Open the optical bench in the browser: move elements and see the image change.
 
     Args:
         host: The address to listen at. Anything but this machine's own lets others in, who then need the token in

@@ -25,10 +25,10 @@ def capture(
     executing: Executing = Executing(),
     reading: Reading = Reading(),
 ) -> None:
-    """Make the picture that a camera records of a light field.
+    """Capture the image that a camera records of a light field.
 
     Args:
-        output: The picture: .png and .tif are for people (sRGB); .exr and .npy hold linear values untouched.
+        output: The image: .png, .tif and .jpg are for viewing (sRGB); .exr and .npy contain linear values.
         exposure: Factor from irradiance to the brightness of a .png or .tif. auto shows the brightest parts white
             and says which factor that took.
         as_recorded: Leave the picture upside down, as it lies on the sensor.

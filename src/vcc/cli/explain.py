@@ -15,7 +15,7 @@ def explain(
     executing: Executing = Executing(),
     reading: Reading = Reading(),
 ) -> None:
-    """Say how a picture would be made, what it costs and what to beware of."""
+    """Report how an image is made, what it costs, and which limits apply."""
     moving = load_moving_camera(camera)
     executing.check(light_field)
     field = reading.light_field(light_field)

@@ -16,7 +16,7 @@ def gallery(
     light_field: Annotated[Path | None, Parameter(metavar="LIGHT_FIELD")] = None,
     output: Annotated[Path | None, Parameter(alias="-o", metavar="FOLDER")] = None,
 ) -> None:
-    """Rebuild a published camera, from optics to decoded result, beside what was claimed of it.
+    """Rebuild a published camera, from optics to decoded result, and compare it with its claims.
 
     Args:
         name: Of a camera. Without it, all are listed.

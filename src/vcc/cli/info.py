@@ -40,7 +40,7 @@ def info(
     cameras: ViewCameras = ViewCameras(),
     arrangement: Arrangement = Arrangement(),
 ) -> None:
-    """Say what a light field is: views, cameras, disparities, brightness, and what its files leave open.
+    """Report views, geometry, disparities and brightness of a light field, and what is unknown.
 
     Args:
         quick: Read one view only: nothing is measured, and no view compared.

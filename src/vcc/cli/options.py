@@ -1,7 +1,7 @@
 """Options that several commands share: values with units, and records that are laid flat into each command.
 
-A record is declared once; its docstring is its help. `told` says which of its options somebody gave. Annotations
-are objects here, not strings: cyclopts reads them also where a record is extended in another file.
+A record is declared once; its docstring is its help. `given_options` returns the options that a user gave.
+Annotations are objects here, not strings: cyclopts reads them also where a record is extended in another file.
 """
 
 import dataclasses

@@ -66,7 +66,7 @@ class RawRecording:
         largest: what stands for the most light; 1 where nothing is known, and of irradiance.
         color_filter: of a mosaic.
         turned: whether the file has it upright.
-        statement: what the file says of its numbers; None where they are as told, or of a Lytro camera.
+        metadata: of the file; None for values as given on the command line, or of a Lytro camera.
     """
 
     path: Path

@@ -58,7 +58,7 @@ def refocus(
     memory_limit: Size | None = None,
     reading: Reading = Reading(),
 ) -> None:
-    """Focus a light field on a distance after the fact, on many, or on all of them.
+    """Refocus a light field on one distance, on many, or on all.
 
     Args:
         output: A picture, .png, .tif, .exr or .npy; of a focal stack a film, .mp4 or .gif.

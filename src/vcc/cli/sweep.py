@@ -117,7 +117,7 @@ def sweep(
     executing: MakingMany = MakingMany(),
     reading: Reading = Reading(),
 ) -> None:
-    """Make the pictures of many cameras: a camera file whose parameters change.
+    """Capture the images of many cameras: a camera file with varied parameters.
 
     Args:
         set: A parameter by the names of its element and its own, and values: a range "sensor.z=50mm:54mm:40" or

@@ -83,7 +83,7 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
         steps: what rays meet.
         few: True where all steps are among `FEW`, else None.
         rare: the other way round.
-        within: as what `room` makes.
+        within: as returned by `working_arrays`.
         sums: of a packet, float32, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
     """
     table, samples, _, seed = points
@@ -200,7 +200,7 @@ def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # t
 
 @_compiled
 def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, within):  # type: ignore[no-untyped-def]
-    """As `find_tile`, within what `room` gives."""
+    """As `find_tile`, within `working_arrays`."""
     table, samples, _, seed = points
     cells = aim.cells
     rays, near, images, flipped = within
@@ -360,7 +360,7 @@ def gradients_of_tiles(field, sensor, points, aim, steps, weights, ended, gradie
 
 @_back
 def gradients_within(field, sensor, points, aim, steps, weights, ended, gradients, tiles, within, ways):  # type: ignore[no-untyped-def]
-    """As `numbers_of_tiles`, within what `room` gives, and the ways of `packet_back`."""
+    """As `gradients_of_tiles`, within `working_arrays`, and the ways of `packet_back`."""
     table, samples, _, seed = points
     cells = aim.cells
     _, near, images, flipped = within

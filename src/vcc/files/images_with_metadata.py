@@ -26,7 +26,7 @@ class ImageWithMetadata(Brief):
     Args:
         path: the file.
         samples: see `vcc.files.pictures.read_picture`.
-        statement: None where it says nothing, or says it of other numbers.
+        metadata: None if the file has none, or has that of other numbers.
         changed: whether it says it of other numbers: another program has changed these, and kept the words.
     """
 

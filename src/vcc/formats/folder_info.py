@@ -44,9 +44,9 @@ class FolderInfo(Brief):
         missing: (row, column) of the views that there are not.
         transfer: "srgb" or "linear", as the format has it.
         frame: the full 5×5 frame, where the format states one; spacing and the next two are then read from it.
-        remarks: what the format's reader has to say, sentences.
+        notices: of the format's reader, sentences.
         sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; means unless the files say otherwise.
-        stated: what the pictures of a folder say of their numbers.
+        metadata: of the pictures of a folder.
     """
 
     format: str

@@ -86,7 +86,7 @@ class Decoded(Brief):
             shape (t, s).
         disparity: likewise true disparities, pixels per view, positive where nearer than the focus.
         weights: how much each sample is to be trusted, 0 (unknown) to 1, shape (v, u, t, s).
-        remarks: what a person should be told, each a sentence.
+        notices: for the user, each a sentence.
         metadata: everything else that the file states, as plain values.
     """
 

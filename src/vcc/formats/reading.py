@@ -212,14 +212,14 @@ class _Opened:
 
     Args:
         info: what it holds.
-        stated: what its format states of the cameras.
+        geometry: of the cameras, as the format states it.
         cameras: these, and what the user says; None where a frame is stated.
         values: linear, shape (v, u, t, s[, channel]).
         counted: whether they were integers as stored: neither these nor light decoded from them are negative or
             infinite, and there is no need to look through them all.
         truth: true disparity of the middle view, where known.
         seen: what parallax says.
-        remark: what to say of the order of the files.
+        notice: about the order of the files, or empty.
     """
 
     info: FolderInfo

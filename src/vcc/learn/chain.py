@@ -86,7 +86,7 @@ class Chain:
         return self._at(values or {}).plan
 
     def followed(self, values: Values | None = None) -> dict[str, tuple[str, ...]]:
-        """For each parameter the names of the plan's numbers (`Plan.numbers`) whose derivatives to it are not 0.
+        """For each parameter, the plan's parameters (`Plan.parameters`) with a derivative to it that is not 0.
 
         Those of even functions are missing where such a function begins (`vcc.learn.verdicts.following` has them).
 
@@ -114,7 +114,7 @@ class Chain:
 
         Args:
             values: as for `plan`.
-            cotangents: derivatives to numbers of the plan, by the names of `Plan.numbers`, each of its number's
+            cotangents: derivatives to numbers of the plan, by the names of `Plan.parameters`, each of its number's
                 shape; those that are left out are 0.
             names: of the parameters whose derivatives are wanted; None: of all.
 

@@ -67,7 +67,7 @@ def verdict(train: Train, grid: Grid, name: str, how: How | None = None) -> Verd
 
 
 def following(chain: Chain, name: str) -> Collection[str]:
-    """The numbers of the plan (`vcc.plan.model.Plan.numbers`) that change where a parameter does.
+    """The numbers of the plan (`vcc.plan.model.Plan.parameters`) that change where a parameter does.
 
     Args:
         chain: from parameters to plans, as learning begins.

@@ -40,7 +40,7 @@ class Linear:
 
     Args:
         follows: whether they follow what a thing (cells of a mask, a surface, an element) holds in a field.
-        numbers: their names in a plan (`vcc.plan.model.Plan.numbers`).
+        numbers: their names in a plan (`vcc.plan.model.Plan.parameters`).
         back: from the thing and weights of the numbers, in that order, to weights of what the field holds.
     """
 

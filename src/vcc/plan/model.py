@@ -172,7 +172,7 @@ class Plan(Value, Shown):
         }
 
     def with_parameters(self, changed: Mapping[str, Any]) -> Plan:
-        """The same with some numbers changed, by the names of `numbers`; the others stay."""
+        """The same plan with some parameters changed, by the names of `parameters`."""
         parts: dict[str, dict[str, Any]] = {name: {} for name in NUMBERED}
         for full, value in changed.items():
             name = next(name for name in NUMBERED if full.startswith((f"{name}.", f"{name}[")))

@@ -226,7 +226,7 @@ class DarkBorder(Value):
     the pieces add up to the picture of the whole.
 
     Args:
-        beside: (before, after) along (v, u, t, s): how many samples.
+        halo: (before, after) along (v, u, t, s): how many samples.
     """
 
     halo: tuple[tuple[int, int], ...]

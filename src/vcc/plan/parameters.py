@@ -35,8 +35,8 @@ def with_parameters(thing: Thing, changed: Mapping[str, Any]) -> Thing:
     """The same with some of its numbers changed; those that are not named stay what they are.
 
     Args:
-        thing: as for `numbers`.
-        changed: by the names that `numbers` gives; each of its number's own shape. Arrays keep their type.
+        thing: as for `parameters`.
+        changed: by the names that `parameters` returns; each of the parameter's shape. Arrays keep their type.
     """
     made, unknown = _changed(thing, "", dict(changed))
     if unknown:

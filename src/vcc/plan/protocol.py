@@ -63,7 +63,7 @@ class Gradient(Brief):
 
     Args:
         samples: like the samples that the core took, (v, u, t, s[, channels]); None where nobody asked.
-        numbers: by their names (`vcc.plan.parameters`), float64, each of its number's shape.
+        gradients: by parameter (`vcc.plan.parameters`), float64, each of the parameter's shape.
     """
 
     samples: Any = None

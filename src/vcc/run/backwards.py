@@ -1,7 +1,7 @@
 """The driver backwards: from weights of a picture to the samples and the numbers that made it.
 
 A picture is after ∘ core ∘ before of the samples. For weights G of it, this gives the derivative of ⟨G, picture⟩
-to the samples (the adjoint of the plan, applied to G) and to any of `Plan.numbers`, through the same blocks by
+to the samples (the adjoint of the plan, applied to G) and to any of `Plan.parameters`, through the same blocks by
 which `vcc.run.drive` makes the picture. A block that runs with a border of dark views keeps its own.
 """
 
@@ -57,7 +57,7 @@ def back(
         picture_weights: one for each value of the picture, (rows, columns[, channels]).
         how: engine, threads and memory.
         samples_wanted: whether the derivative to the samples is wanted.
-        wanted: names of `Plan.numbers`.
+        wanted: names of `Plan.parameters`.
         found: the raster that `Drive.rounds` gave for these samples, where it is at hand: derivatives to numbers
             of what is done after the core need it, and it is made where it is not given.
         progress: called with (done, total).
@@ -80,7 +80,7 @@ class Backwards:
 
     Args:
         drive: the plan on its way ahead, of a fixed number of rays (`Drive.of_linear`).
-        wanted: names of `Plan.numbers`.
+        wanted: names of `Plan.parameters`.
 
     Raises:
         InputError: a name that the plan does not have.

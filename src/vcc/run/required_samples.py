@@ -77,7 +77,7 @@ def required_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan]
     """Several plans and the samples of which they make pictures, cut to the pixels that any of these needs.
 
     Args:
-        plans: as for `needed`; where one of them stays, all do.
+        plans: as for `required_samples`; where one of them stays, all do.
         samples: likewise.
     """
     if samples.whole() is not None or any(map(_stays, plans)):

@@ -65,7 +65,7 @@ class PortableSamples(Brief):
         """Samples that may be sent.
 
         Raises:
-            InputError: as `check_may_be_sent`.
+            InputError: as `check_portable`.
         """
         check_portable(samples)
         whole = samples.whole()

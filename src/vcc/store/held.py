@@ -42,7 +42,7 @@ class Held:
         folder: of a group of Zarr.
         what: it is, for messages.
         states: what tells one from another, of a folder.
-        stated: a word for what it told when the folder was opened.
+        attributes: a hash of the folder's attributes when it was opened.
     """
 
     folder: Path

@@ -22,7 +22,7 @@ class AbsorbingChoices:
     """In which planes masks are taken together.
 
     Args:
-        together: how many masks stand in each plane, from the front.
+        stacked: how many masks stand in each plane, from the front.
         against_sensor: which planes lie against the sensor.
         planes: what counts in each of them.
     """

@@ -102,7 +102,7 @@ class AimChoices:
         rounds: see `vcc.plan.rays.path.Path`.
         everything: see `vcc.plan.rays.bounds.slopes.bounds`.
         bends: by how much each leg's stage bends rays at most, with room; None: as it does now, however much.
-        strips: the two that cut out the window; None where cells have windows of their own.
+        slope_bounds: the two that form the window; None if cells have their own windows.
         towards: (number of the leg, words) of the bound that cells look at; None for a window.
         reach: (rows, columns) of cells that are looked at on each side.
         halvings: of the rays of a pixel.
