@@ -90,26 +90,29 @@ class Image(Shown):
         """The values as a float32 NumPy array, wherever they are."""
         return to_numpy(self.values).astype(np.float32, copy=False)
 
-    def __add__(self, other: Any) -> Any:
-        """The sum of two images of one frame, or of an image and a number; see `_combined`."""
+    def __add__(self, other: Any) -> Image:
+        """The sum of two images of one frame, or of an image and a number.
+
+        The sum misses as many rays as the worse image; sampling errors add up. Other frames raise `InputError`.
+        """
         return self._combined(other, operator.add, "added to")
 
-    def __sub__(self, other: Any) -> Any:
-        """The difference of two images of one frame, or of an image and a number."""
+    def __sub__(self, other: Any) -> Image:
+        """The difference of two images of one frame, or of an image and a number; see the sum."""
         return self._combined(other, operator.sub, "subtracted from")
 
-    def __mul__(self, factor: Any) -> Any:
+    def __mul__(self, factor: Any) -> Image:
         """The image times a number."""
         return self._scaled(factor, operator.mul)
 
-    def __truediv__(self, divisor: Any) -> Any:
+    def __truediv__(self, divisor: Any) -> Image:
         """The image divided by a number."""
         return self._scaled(divisor, operator.truediv)
 
     __radd__, __rmul__ = __add__, __mul__
 
-    def _combined(self, other: Any, operation: Callable[[Any, Any], Any], what: str) -> Any:
-        """Sum or difference; of two images the result misses as many rays as the worse, and errors add up.
+    def _combined(self, other: Any, operation: Callable[[Any, Any], Any], what: str) -> Image:
+        """Sum or difference.
 
         Raises:
             InputError: images of different shapes, frames or orientations.
@@ -133,7 +136,7 @@ class Image(Shown):
             camera=self.camera if self.camera == other.camera else None,
         )
 
-    def _scaled(self, factor: Any, operation: Callable[[Any, Any], Any]) -> Any:
+    def _scaled(self, factor: Any, operation: Callable[[Any, Any], Any]) -> Image:
         if not isinstance(factor, Real):
             raise TypeError(
                 f"an image is multiplied or divided by a number, not by a {type(factor).__name__}: use "

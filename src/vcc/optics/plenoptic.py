@@ -45,11 +45,12 @@ class Plenoptic:
             )
 
     def _check_sensor(self) -> None:
-        by_lenslets, by_size = (self.pixels_per_lenslet, self.lenslets), (self.sensor_size, self.pixel_pitch)
-        if None not in by_lenslets and by_size == (None, None):
+        pairs = (self.pixels_per_lenslet, self.lenslets), (self.sensor_size, self.pixel_pitch)
+        given = [[value is not None for value in pair] for pair in pairs]
+        if given == [[True, True], [False, False]]:
             checks.whole_number_between("pixels_per_lenslet", self.pixels_per_lenslet, 1)
             checks.counts("lenslets", self.lenslets, "rows", "columns")
-        elif None not in by_size and by_lenslets == (None, None):
+        elif given == [[False, False], [True, True]]:
             checks.above_zero("pixel_pitch", self.pixel_pitch, unit="m")
             if not isinstance(self.sensor_size, tuple | list) or len(self.sensor_size) != 2:
                 raise InputError(f"sensor_size is (height, width) in metres, not {self.sensor_size!r}")
