@@ -441,3 +441,14 @@ def test_what_is_not_done_is_refused_by_name():
         engine.back(core, values, weights, wanted=["masks[0].column"], threads=1)
     with pytest.raises(vcc.InputError, match=r"does not go backwards through rays.*engine='numba'"):
         engine.back(rays, None, None, threads=1)
+
+
+def test_what_was_used_last_is_given_up_last():
+    made = []
+    kept = cuda_arrays.LastUsed(lambda core: made.append(core) or len(made))
+    cores = [drawn(seed).compile(field(samples((2, 2, 4, 5)))).core for seed in range(cuda_arrays.KEPT + 1)]
+    first = kept.of(cores[0])
+    for core in cores[1:]:
+        kept.of(core)
+        assert kept.of(cores[0]) == first
+    assert len(made) == len(cores)

@@ -1,4 +1,4 @@
-"""Draw docs/images/sharpness.png: python tools/docs/sharpness_images.py. Prints the figures that the pages state.
+"""Draw docs/images/sharpness.webp: python tools/docs/sharpness_images.py. Prints the figures that the pages state.
 
 A hard edge in focus, as pixel means and as the sensor records it, with what interpolation takes given back
 (the default, "sharp") and without ("linear"); and white noise of the samples, likewise.

@@ -279,8 +279,10 @@ class LastUsed:
         """What is on this GPU of a core, or is made now."""
         with self._lock:
             here = self._kept.setdefault(this_gpu(), deque(maxlen=KEPT))
-            for known, made in here:
+            for n, (known, made) in enumerate(here):
                 if _alike(known, core):
+                    del here[n]
+                    here.append((known, made))  # the one used last is given up last
                     return made
             made = self.make(core)
             here.append((core, made))
