@@ -25,7 +25,7 @@ from vcc.base.reading import expanded
 from vcc.optics import Element, FirstOrder
 from vcc.prescriptions import load_lens
 from vcc.prescriptions.model import Reference
-from vcc.shapes import height_maps, kernels, lattice, patterns, surfaces, zernike
+from vcc.shapes import directional, height_maps, kernels, lattice, patterns, surfaces, zernike
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern
 from vcc.shapes.stacked_patterns import Product
@@ -43,7 +43,7 @@ def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
 ELEMENT_KINDS: dict[str, type[Element]] = dict(sorted(_named(Element, optics).items()))
 """Which class each ``kind`` in a camera file stands for. Add your own to read and write them."""
 
-PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice) | {"product": Product}
+PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice, directional) | {"product": Product}
 """Which class each ``name`` of a pattern in a camera file stands for. Add your own."""
 del PATTERN_NAMES["function_pattern"]  # Python, which no file can hold
 

@@ -1,8 +1,8 @@
 """What a thin element does, in the form that a camera needs: faces, functions of position only.
 
 The paper's three categories of optics (section 3.2) are three faces of one thing: a linear transform is a
-deflection (Δs, Δt) of each ray, a dot product is a transmission, a convolution is a scatter kernel. What a
-thin element does may depend on where a ray meets it, not on the ray's slope (a louvre is outside this form).
+deflection (Δs, Δt) of each ray, a dot product is a transmission, a convolution is a scatter kernel. A deflection and a
+scatter kernel depend on where a ray meets the element; a transmission may also depend on the ray's slopes (`Term`).
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.optics.deflections import Deflection, as_deflection
 from vcc.optics.scatter import Scatter
+from vcc.optics.terms import Term
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern, as_pattern
 
@@ -45,6 +46,7 @@ class Faces:
             (x, y) in metres; None lets all light pass.
         scatter: how light is spread over slopes: a `Kernel`, or a `Scatter` whose kernel varies with the
             position; None spreads nothing.
+        terms: further factors of the transmission, which depend on the direction of the arriving ray, too.
 
     Raises:
         InputError: an affine deflection that moves positions or mixes slopes (then the element is not thin),
@@ -54,8 +56,14 @@ class Faces:
     deflection: Affine | Deflection | Callable[[Array, Array], Any] | None = None
     transmission: Pattern | Callable[[Array, Array], ArrayLike] | None = None
     scatter: Scatter | Kernel | None = None
+    terms: tuple[Term, ...] = ()
 
     def __post_init__(self) -> None:
+        terms = (self.terms,) if isinstance(self.terms, Term) else tuple(self.terms)
+        for term in terms:
+            if not isinstance(term, Term):
+                raise InputError(f"terms of Faces are vcc.Term objects, not {type(term).__name__}")
+        object.__setattr__(self, "terms", terms)
         if isinstance(self.deflection, Affine):
             _check_thin(self.deflection)
         elif self.deflection is not None:

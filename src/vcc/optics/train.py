@@ -24,6 +24,7 @@ from vcc.base.units import short
 from vcc.base.values import Value
 from vcc.optics.faces import Element, Faces
 from vcc.optics.sensor import Sensor
+from vcc.optics.terms import Term
 from vcc.shapes.patterns import owned
 
 
@@ -39,6 +40,8 @@ class Stage(Brief):
         faces: what it does, in coordinates centred on the element.
         arriving: rays from the entrance plane to just before this stage, what is affine on the way folded; what
             bends rays otherwise (lens arrays, phase plates) and what scatters them is passed over.
+        term: for a factor of the transmission that depends on direction: the stage stands in the term's own plane
+            (`Term.to_plane`), ``approach`` leads there, and that of the next stage leads back.
     """
 
     element: Element
@@ -46,6 +49,7 @@ class Stage(Brief):
     approach: Affine
     faces: Faces
     arriving: Affine = field(default_factory=Affine.identity)
+    term: Term | None = None
 
     def __post_init__(self) -> None:
         if self.faces.pattern is not None:
@@ -229,6 +233,16 @@ class Train(Value, Shown):
                 if isinstance(part, Affine):
                     approach = about(element.decentre, part) @ approach
                     continue
+                for term in part.terms:
+                    to_plane = about(element.decentre, term.to_plane)
+                    approach = to_plane @ approach
+                    faces = Faces(transmission=term.pattern)
+                    stages.append(Stage(element, here, approach, faces, approach @ leaving, term))
+                    approach, leaving = to_plane.inverse(), stages[-1].leaving
+                if part.terms:
+                    part = replace(part, terms=())
+                    if part.deflection is None and part.transmission is None and part.scatter is None:
+                        continue
                 stages.append(Stage(element, here, approach, part, approach @ leaving))
                 approach, leaving = Affine.identity(), stages[-1].leaving
             here += element.length
