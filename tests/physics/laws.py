@@ -46,6 +46,8 @@ TARGETS = {
     "three masks": 50.0,
     "stop, mask and prism": 50.0,
     "blur": 55.0,
+    "angle filter": 55.0,
+    "two terms": 50.0,
 } | dict.fromkeys(BENT, 50.0)
 """Brute force by default options, dB; by rays of 256 samples, or what they state."""
 RAYS = 256

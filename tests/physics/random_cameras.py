@@ -45,11 +45,26 @@ AFFINE = (
     "turned lenses",
     "turned mask",
     "blur",
+    "angle filter",
+    "two terms",
 )
 """Kinds of cameras that are made of footprints."""
-BENT = ("facets", "plate", "lenslets", "prism array", "coded diffuser", "diffuser before a mask")
+BENT = ("facets", "plate", "lenslets", "prism array", "coded diffuser", "diffuser before a mask", "louvre")
 """Kinds that are traced."""
-KINDS = AFFINE + BENT
+DIRECTED = ("angle filter", "two terms", "louvre")
+"""Kinds that transmit by direction."""
+KINDS = tuple(kind for kind in AFFINE + BENT if kind not in DIRECTED) + DIRECTED
+
+
+@dataclass(frozen=True)
+class MaskBehind(vcc.Element):
+    """An element of a user's: it transmits as a mask does that stands ``ahead`` metres behind it."""
+
+    pattern: Any
+    ahead: float
+
+    def faces(self) -> vcc.Faces:
+        return vcc.Faces(terms=(vcc.Term.behind(self.pattern, self.ahead),))
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,6 +341,9 @@ class _Drawing:
             "turned lenses": lambda: [],
             "turned mask": lambda: [self._mask()],
             "blur": lambda: [self._diffuser()],
+            "angle filter": lambda: [self._angle_filter()],
+            "two terms": lambda: [self._angle_filter(), self.one_of(self._mask_behind, self._mask)()],
+            "louvre": lambda: [self._louvre()],
             "facets": lambda: [self._facets()],
             "plate": lambda: [self._plate()],
             "lenslets": lambda: [self._lenslets()],
@@ -389,6 +407,39 @@ class _Drawing:
         half = self._beam(z)
         pattern, width, height = self._pattern(half, finest)
         return vcc.Mask(pattern, width=width, height=height, z=z, decentre=self.off_axis(0.2 * half))
+
+    def _directions(self) -> tuple[float, float]:
+        """Half the range of slopes behind the lens, and by how much they differ from view to view."""
+        away = self.sensor.z - self.lens_z
+        return (self._beam(self.lens_z) + max(self.sensor.size) / 2) / away, min(self.spacing) / away
+
+    def _angle_filter(self) -> Any:
+        half, step = self._directions()
+        pattern, width, height = self._pattern(half, 0.4 * step)
+        if isinstance(pattern, np.ndarray):
+            pattern = patterns.Cells(pattern, width, height)
+        elif self.chance(0.3):
+            pattern = vcc.patterns.AngularFringes(
+                self.between(2, 6) / half, self.between(0, 6), self.between(0.5, 1), self.between(0, 3)
+            )
+        z = max(self._place(), self.optics[-1].z, self.lens_z)
+        z = max(z, max(each.z + each.length for each in self.optics))
+        return vcc.AngleFilter(pattern, z=z, decentre=self.off_axis(1 * mm))
+
+    def _mask_behind(self) -> Any:
+        """A mask some way behind the place where it is listed, as one term of an element of the user's."""
+        mask = self._mask(self.between(0.2, 0.9) * self.sensor.z)
+        ahead = self.between(0.1, 0.9) * (mask.z - max(each.z + each.length for each in self.optics))
+        pattern = mask.faces().transmission
+        return MaskBehind(pattern, max(ahead, 0.0), z=mask.z - max(ahead, 0.0), decentre=mask.decentre)
+
+    def _louvre(self) -> Any:
+        z = self.lens_z + self.between(0.0, 0.9) * (self.sensor.z - self.lens_z)
+        pitch = self.between(0.3, 1.5) * self._beam(z)
+        height = pitch * self.between(0.3, 1.2) / self._directions()[0]
+        wall = pitch * self.one_of(0.0, self.between(0, 0.4))
+        turn = self.one_of(0.0, self.between(0, 3))
+        return vcc.Louvre(pitch, height, wall, turn, z=z, decentre=self.off_axis(0.5 * pitch))
 
     def _two_masks(self) -> list[Any]:
         first = self._mask()

@@ -443,6 +443,16 @@ def _pattern(pattern: Any, middle: tuple[float, float]) -> list[Opening]:
             return [Cosines(x, y, periods, pattern.harmonics, pattern.phase)]
         case "FunctionPattern":
             return [Smooth(x, y, pattern.function)]
+        case "Bounded":
+            return _pattern(pattern.pattern, middle) + _sheet_of(pattern.width, pattern.height, middle)
+        case "AngularFringes":
+            along = np.array([np.cos(pattern.rotation), np.sin(pattern.rotation)])
+
+            def fringes(s: Array, t: Array) -> Array:
+                angle = np.arctan(along[0] * s + along[1] * t)
+                return np.asarray((1 + pattern.modulation * np.cos(pattern.frequency * angle + pattern.phase)) / 2)
+
+            return [Smooth(0.0, 0.0, fringes)]
     raise NotImplementedError(type(pattern).__name__)
 
 
@@ -596,7 +606,39 @@ def _sheets(element: Any) -> list[Sheet]:
             return [Sheet(here, openings=openings, scatter=lambda xi, eta, *_: draw(xi, eta), reach=reach)]
         case "CodedDiffuser":
             return [_coded(element)]
+        case "AngleFilter":
+            # Slopes as places, and back: what stands there is told apart by direction alone.
+            swapped = np.eye(4, 5)[[2, 3, 0, 1]]
+            return [Sheet(swapped, openings=_pattern(element.pattern, (0.0, 0.0))), Sheet(_undone(swapped))]
+        case "MaskBehind":
+            ahead = _flight(element.ahead)
+            return [Sheet(ahead, openings=_pattern(element.pattern, middle)), Sheet(_undone(ahead))]
+        case "Louvre":
+            return _louvre(element)
     raise NotImplementedError(type(element).__name__)
+
+
+def _louvre(element: Any) -> list[Sheet]:
+    """Rays in a plane of (place across the walls where they enter, place where they leave, …), and back."""
+    x0, y0 = element.decentre
+    cosine, sine = np.cos(element.rotation), np.sin(element.rotation)
+    matrix = np.array(
+        [
+            [cosine, sine, 0, 0],
+            [cosine, sine, element.height * cosine, element.height * sine],
+            [-sine, cosine, 0, 0],
+            [0, 0, -sine, cosine],
+        ]
+    )
+    step = np.column_stack([matrix, -matrix @ [x0, y0, 0, 0]])
+    gap = element.pitch - element.wall
+
+    def same_gap(entered: Array, left: Array) -> Array:
+        one, other = np.rint(entered / element.pitch), np.rint(left / element.pitch)
+        inside = np.maximum(np.abs(entered - one * element.pitch), np.abs(left - other * element.pitch)) <= gap / 2
+        return np.asarray((one == other) & inside, dtype=np.float64)
+
+    return [Sheet(step, openings=[Smooth(0.0, 0.0, same_gap)]), Sheet(_undone(step))]
 
 
 def _first_order_sheets(element: Any) -> list[Sheet]:
@@ -729,7 +771,7 @@ class Bench:
         here = -flown
         for element in camera.elements:
             added = _sheets(element)
-            added[0].step = _flight(element.z - here)
+            added[0].step = _then(added[0].step, _flight(element.z - here))
             self.sheets += added
             here = element.z + element.length
         sensor = camera.sensor
