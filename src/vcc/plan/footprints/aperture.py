@@ -66,7 +66,7 @@ class Aperture(Brief):
         taps: of the plan.
         motion: of the scene.
         samples: (rows, columns) of a view.
-            chosen: for taps of each level, if parameters follow a camera.
+        chosen: for taps of each level, if parameters follow a camera.
     """
 
     planes: list[Plane]
@@ -203,8 +203,7 @@ class _Cells(Brief):
 
     @property
     def closed(self) -> bool:
-        """Whether the open share of a whole cell follows directly: there is one plane, and cells lie along its
-        axes.
+        """Whether the open share of a whole cell is exact: there is one plane, and cells lie along its axes.
 
         The open share through several planes is not the product of their shares. For a rotated cell, the means
         over the rectangles that stand for it come from its parts.

@@ -152,8 +152,7 @@ class Looks(Brief):
 
 
 def _linear(first: Array, means: list[Array], others: list[Array]) -> Array:
-    """Linear part of the other elements' effect on the light, evaluated at the middle of the first one's open
-    part."""
+    """Linear part of what other elements do to the light in the middle of the first element's open part."""
     each = first.shape[-1]
     place = (np.arange(each) - (each - 1) / 2) / max(math.sqrt((each**2 - 1) / 12), 1e-300)
     total = np.zeros(means[0].shape)
@@ -167,8 +166,7 @@ def _linear(first: Array, means: list[Array], others: list[Array]) -> Array:
 
 
 def _and_mirrored(places: Array) -> Array:
-    """Places (n, …, 2), their mirror images, and all of them with x and y exchanged: mirrored cameras are
-    treated alike."""
+    """Places (n, …, 2), their mirror images, and all with x and y exchanged, so that mirrored cameras agree."""
     signs = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
     mirrored = np.concatenate([places * sign for sign in signs])
     return np.concatenate([mirrored, mirrored[..., ::-1]])

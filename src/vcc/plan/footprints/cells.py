@@ -25,8 +25,7 @@ Array = NDArray[np.float64]
 ERROR = 1e-3
 """Error, as a share of the light, that masks may cause within parts of cells and of samples: 60 dB."""
 FINE_DETAIL_IN_VIEW = 0.04
-"""Variance of a mask, relative to its mean squared, that may be lost inside a view's cell before cells are
-divided."""
+"""Variance of a mask, over its mean squared, that may be lost inside a view's cell before cells are divided."""
 LARGEST_CHOSEN_DIVISION = 4
 """A plan divides cells of views further than this only on request: the cost grows with the square."""
 SPILT = 0.25
@@ -119,8 +118,7 @@ class Geometry(Brief):
         return np.asarray(np.abs(by_view) @ np.array(self.extent[::-1]))
 
     def _by_pixel(self, plane: Plane) -> Array | None:
-        """2×2: metres on a plane per pixel of the sensor, within a view; None if a view falls into one point
-        there."""
+        """2×2: metres on a plane per pixel of the sensor, within a view; None if a view is a point."""
         step = self.on_sensor[:, 2:]
         if abs(np.linalg.det(step)) <= 1e-12 * np.abs(step).max() ** 2:
             return None
@@ -261,8 +259,8 @@ class SampleDivision(NamedTuple):
     """How samples are divided.
 
     Args:
-            parts: of each sample, along each axis.
-            error: remaining, a share of the light.
+        parts: of each sample, along each axis.
+        error: remaining, a share of the light.
         hard: whether a mask has edges.
     """
 

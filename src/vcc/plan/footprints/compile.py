@@ -306,8 +306,7 @@ class ByFootprints:
     @property
     @cached
     def choose_open_cells(self) -> tuple[CellChoices, ...] | None:
-        """How the open shares of taps' cells are computed, for each level; None if no parameter follows a
-        camera."""
+        """How the open shares of taps' cells are computed, for each level; None if nothing follows a camera."""
         return None if self.follow is None else self._all_taps.choices()
 
     @property

@@ -116,9 +116,9 @@ class MaskMet(Brief):
         plane: the mask.
         taps: of the plan.
         samples: (rows, columns) of a view.
-            place: where sample (0, 0) of each tap meets it, (rows of taps, columns of taps, 2), metres.
+        place: where sample (0, 0) of each tap meets it, (rows of taps, columns of taps, 2), metres.
         sides: of the footprints of samples in taps of each level, (2, 4): of a view's part, and of a sample.
-            finest: sides for the finest level, which a piece of a light field may lack.
+        finest: sides for the finest level, which a piece of a light field may lack.
     """
 
     plane: Plane
@@ -149,8 +149,8 @@ class MaskMet(Brief):
             motion: see `tap_origin`.
             samples: (rows, columns) of a view.
             fine: parts of a sample, each way.
-                over_samples: whether to average over the sample's cell in addition to the view's cell: point
-                    samples meet the mask in a point.
+            over_samples: whether to average over the sample's cell in addition to the view's cell: point samples
+                meet the mask in a point.
         """
         place = tap_origin(plane.at_index, plane.offset, taps.index, taps.shift + off_middle, motion)
         sample_sides = plane.sample_step / fine * over_samples
@@ -291,7 +291,7 @@ def _region(place: Array, step: Array, samples: tuple[int, int], bound: Array) -
         place: of sample (0, 0) of each tap, (..., 2).
         step: 2×2, from sample to sample.
         samples: (rows, columns) of a view.
-            bound: half the size (x, y) of the readable region.
+        bound: half the size (x, y) of the readable region.
     """
     rows, columns = samples
     ends = [[k, l] for k in (-DIVIDED, columns - 1 + DIVIDED) for l in (-DIVIDED, rows - 1 + DIVIDED)]
@@ -320,7 +320,7 @@ def _texture(
         lattice: its points.
         sides: see `MaskMet`.
         chosen: see `TextureChoices.means`.
-            parts: cached parts of nearby plans.
+        parts: cached parts of nearby plans.
     """
     found: list[NDArray[np.floating]] = []
     for level, (footing, each) in enumerate(zip(lattice.footings, sides, strict=True)):
@@ -392,7 +392,7 @@ def texture_back(plane: Plane, kept: Textured, weights: Array, cells: Cells) -> 
         plane: the mask.
         kept: how its texture was made.
         weights: of the texture's points, (rows, columns).
-            cells: the same object as in the pattern.
+        cells: the same object as in the pattern.
     """
     total = np.zeros(cells.values.shape)
     rows = round(kept.lattice.last[1] - kept.lattice.first[1]) + 1
@@ -411,7 +411,7 @@ class _Averaging(Brief):
         x: places, metres.
         y: likewise.
         size: (width, height) of the rectangles.
-            filters: (across, down), or a single 2-D filter, (rows, columns), all symmetric about their middles.
+        filters: (across, down), or a single 2-D filter, (rows, columns), all symmetric about their middles.
     """
 
     x: Array
