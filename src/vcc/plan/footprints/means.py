@@ -117,8 +117,7 @@ def mean_over(pattern: Pattern, boxes: Boxes, chosen: MeanChoice | None, parts: 
 
 
 def _values(pattern: Pattern, points: Boxes, chosen: MeanChoice) -> Array:
-    """Values of a pattern at points that stand for rectangles; for a product, the product of the factors'
-    means."""
+    """Values of a pattern at points for rectangles; for a product, the product of the factors' means."""
     if isinstance(pattern, Product):
         pairs = zip(pattern.factors, chosen.factors, strict=True)
         means = (mean_or_value(factor, points, its) for factor, its in pairs)
@@ -260,8 +259,7 @@ def _rasters(pattern: Pattern, boxes: Boxes) -> tuple[Raster, Raster] | None:
 
 
 def _raster(centre: Array, length: float, bound: float) -> Raster | None:
-    """`RASTER_PER_CELL` points across a rectangle, fewer if there are many rectangles, with a margin around
-    them."""
+    """`RASTER_PER_CELL` points across a rectangle, fewer for many rectangles, with a margin around them."""
     room = length + ROOM * float(np.ptp(centre))
     reach = (1 + ROOM) * bound / 2
     low = max(float(centre.min()) - length / 2 - room, -reach)

@@ -15,8 +15,7 @@ from vcc.plan.how import LARGEST_REFINEMENT
 from vcc.plan.parallax_rule import BetweenViews
 
 TOO_MUCH = 5e-3
-"""Error, as a share of the light, above which an image carries a warning; estimates are about twice the true
-error."""
+"""Error, as a share of the light, above which an image carries a warning; estimates are about twice it."""
 GHOSTS = 1.5
 """Distance between views' images of one object above which they are visible as separate, in pixels or samples."""
 COARSE_TEXTURE = 5e-3
