@@ -120,8 +120,7 @@ class Plan(Value, Shown):
         return next((o.half_widths for o in self.after if isinstance(o, AlongAxes)), (0.0, 0.0))
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
-        """The shape of the samples that the core reads, from the shape (v, u, t, s[, channels]) of the given
-        samples."""
+        """The shape of the samples that the core reads, for given samples of a shape (v, u, t, s[, channels])."""
         for operator in self.before:
             shape = operator.shape(shape)
         return shape
@@ -133,8 +132,7 @@ class Plan(Value, Shown):
         return block
 
     def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """The views that are used of a light field with samples of this shape, (v, u); all views if none is
-        used."""
+        """The views of a light field with samples of this shape that are used, (v, u); all if none is used."""
         used = self._of_views(self.core.used_views(self.shape(shape)))
         return used if used.any() else np.ones(shape[:2], dtype=bool)
 
@@ -163,11 +161,10 @@ class Plan(Value, Shown):
         for operator in self.before:
             kind, one = operator.kept_as(kind)
             factor *= one
-        return (np.dtype(np.float32) if kind == np.float16 else kind), factor  # compiled code does not support float16
+        return (np.dtype(np.float32) if kind == np.float16 else kind), factor  # no float16 in compiled code
 
     def parameters(self) -> dict[str, NDArray[np.float64]]:
-        """The parameters of the core and of the operators before and after it: ``"core.x"``,
-        ``"after[0].down"``."""
+        """The parameters of the core and of the operators around it: ``"core.x"``, ``"after[0].down"``."""
         return {
             name + rest if rest.startswith("[") else f"{name}.{rest}": value
             for name in NUMBERED

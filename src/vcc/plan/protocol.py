@@ -1,5 +1,4 @@
-"""The interfaces of cores and engines: cores define what is computed, engines compute it, partial results add
-up."""
+"""The interfaces of cores and engines: cores define the computation, engines run it, partial results add up."""
 
 from __future__ import annotations
 
@@ -264,8 +263,7 @@ class Core(Protocol):
 
     @property
     def scale(self) -> float:
-        """Factor from samples, which are radiance, to the raster: radiance, or irradiance times shares; see
-        `scaled`."""
+        """Factor from samples (radiance) to the raster (radiance, or irradiance times shares); see `scaled`."""
         ...
 
     @property
@@ -284,8 +282,7 @@ class Core(Protocol):
     def full_gradients(
         self, block: Block, numbers: Mapping[str, NDArray[np.float64]]
     ) -> dict[str, NDArray[np.float64]]:
-        """Convert derivatives to the parameters of a `part`, by name, to the core's own; those of all parts add
-        up."""
+        """Convert derivatives to the parameters of a `part`, by name, to the core's own; all parts add up."""
         ...
 
     def scaled(self, factor: float) -> Any:

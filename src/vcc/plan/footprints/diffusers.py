@@ -61,7 +61,7 @@ class KernelChoices:
     Args:
         axes: that the kernel lies along (`vcc.shapes.kernel_weights.axes_of`).
         steps_beside: (rows, columns) of steps on each side of its middle, with room to grow.
-        filters: weights on each side of the middle of the filters that compensate the distribution, (down, across).
+        filters: weights on each side of the middle of filters that compensate the distribution, (down, across).
     """
 
     axes: Hashable = choice("axes that the kernel lies along")
