@@ -32,8 +32,7 @@ Array = NDArray[np.float64]
 Held = NDArray[np.bool_]
 
 RAYS = 2**16
-"""Rays, evenly spread over the sensor and over the aperture that bounds the light: shares are accurate to 0.1
-%."""
+"""Rays, evenly spread over the sensor and over the bounds of the light: shares are accurate to 0.1 %."""
 BORDER = 1e-6
 """Tolerance at borders, as a share of a cell or a sample: a stop as wide as the grid of views misses nothing."""
 WORTH_SAYING = 1e-3
@@ -123,12 +122,11 @@ class AskedLight(Brief):
         return Missing.of(amounts, self._stop)
 
     def missing_with(self, number: int, cells: Sequence[Cells]) -> list[Missing]:
-        """The missing light with other cells of one size in a mask, for affine optics; the mask's own cells are
-        all open.
+        """The missing light with other cells in a mask whose own cells are all open, for affine optics.
 
         Args:
             number: of the mask among the elements.
-            cells: several.
+            cells: several, of one size.
         """
         if self.aimed is None or self._bounds_are_held():
             return [Missing(0.0, "")] * len(cells)

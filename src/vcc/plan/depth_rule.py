@@ -105,7 +105,7 @@ class ViewsBetween(Value):
 
 
 def on_sensor(train: Train, grid: Grid) -> tuple[Array, Array]:
-    """Places of samples, pixels (column, row): per step of each index (i, j, k, l), 2×4, and of the first sample."""
+    """Places of samples, pixels (column, row): steps of the indices (i, j, k, l), 2×4, and the first sample."""
     pixels = train.sensor.frame.inverse()
     rays = train.rays_at(train.sensor.z) @ grid.frame
     return pixels.linear @ rays.linear[:2], pixels.linear @ rays.offset[:2] + pixels.offset

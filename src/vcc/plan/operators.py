@@ -42,7 +42,7 @@ class Before(Protocol):
     reach: int
     """Rows of pixels on each side of a block that are read with it."""
     copies: bool
-    """Whether new samples are made, which take memory: columns of views are then processed one by one if possible."""
+    """Whether new samples are made, which take memory: columns of views are then processed one by one."""
 
     def apply(self, values: Any) -> Any:
         """Samples (v, u, t, s[, channels]) for the next operator, or the core."""
@@ -578,7 +578,7 @@ def tent(half_width: float, beside: int | None = None) -> Array:
 
 
 def spreading_matrix(weights: Array, samples: int) -> Array:
-    """The matrix of a convolution with an odd number of weights along one axis, from samples to the longer result."""
+    """The matrix from samples along one axis to their full convolution with an odd number of weights."""
     matrix = np.zeros((samples + len(weights) - 1, samples))
     for shift, weight in enumerate(weights):
         matrix[np.arange(samples) + shift, np.arange(samples)] = weight
